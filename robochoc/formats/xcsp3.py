@@ -13,7 +13,7 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import Codes, Network, Table, UnsupportedError
 from robochoc.solver.team_network import identifiers, team_network
-from robochoc.solver.weighted import MAX_TOTAL_COST
+from robochoc.solver.weighted import MAX_CODE
 
 
 def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
@@ -52,7 +52,7 @@ def _as_told(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes
     constant = flat_units(team).constant
     if team.kind != ProblemKind.DISWCSP or (sign == 1 and not constant):
         return network, costs
-    if abs(constant) > MAX_TOTAL_COST:
+    if abs(constant) > MAX_CODE:
         raise UnsupportedError(f"{team.name} has a constant cost of {constant:,}, too much for XCSP3's solvers")
     paid = set(costs)
     domains = [

@@ -36,7 +36,7 @@ from robochoc.solver.ace_messages import (
     ToSolver,
     codes_of,
 )
-from robochoc.solver.encoding import Codes, Network
+from robochoc.solver.encoding import Codes, Costs, Network
 from robochoc.solver.enumeration import (
     STEPS_BEFORE_ACE,
     STEPS_EACH,
@@ -139,13 +139,12 @@ class AceProcess:
         limit: int | None = None,
         count_only: bool = False,
         strategy: Strategy = "default",
-        costs: Codes = (),
+        costs: Costs = (),
         deadline: float | None = None,
     ) -> bool:
         """Give the solver a task, whose `answer` is to be asked for before the next.
 
-        With `costs`, the answer is one solution, for which the codes of the variables at these places sum up to the
-        least.
+        With `costs`, the answer is one solution with the least sum of these codes.
 
         Returns:
             False when there was nothing left to ask ACE, and so nothing to wait for: propagation had the answer, or
@@ -219,12 +218,14 @@ class AceProcess:
 
         Raises as `solve` does.
         """
-        self._ask(Export(list(names), _task(network, None, count_only=True, strategy="default", costs=costs)))
+        paid = tuple((place, 1) for place in costs)
+        self._ask(Export(list(names), _task(network, None, count_only=True, strategy="default", costs=paid)))
         word = self._hear(None)
         if not isinstance(word, Exported):
             raise SolverLostError(f"the solver answered with a {type(word).__name__}")
         return word.xml
 
+    @signals_held()
     def close(self) -> None:
         """End the process and remove its files."""
         if self._process is not None:
@@ -266,13 +267,14 @@ class AceProcess:
 
     # The process
 
+    @signals_held()
     def _start(self) -> None:
         self._folder = PrivateFolder()
         ours, theirs = socket.socketpair()
         # The process reads from this pipe, whose other end only this process has: it ends with this process.
         watched, self._lifeline = os.pipe()
         try:
-            with (self._folder.path / "stderr").open("wb") as stderr, signals_held():
+            with (self._folder.path / "stderr").open("wb") as stderr:
                 self._process = subprocess.Popen(  # noqa: S603 - our own module
                     [sys.executable, "-P", "-m", "robochoc.solver.ace_process"]
                     + [str(theirs.fileno()), str(watched), str(self._folder.path)]
@@ -365,7 +367,7 @@ def _left_s(deadline: float | None) -> float | None:
     return None if deadline is None else min(max(1e-3, deadline - time.monotonic()), LONGEST_WAIT_S)
 
 
-def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Codes = ()) -> Task:
+def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Costs = ()) -> Task:
     rows: dict[tuple[Codes, ...], int] = {}
     forms = [
         EncodedTable(table.scope, table.allowed, rows.setdefault(table.rows, len(rows))) for table in network.tables

@@ -39,8 +39,8 @@ class EncodedTable(msgspec.Struct, frozen=True, array_like=True):
 class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Solve this network: all solutions up to `limit`, or only their number, or one that costs least.
 
-    `domains` holds each variable's codes, `different` scopes on which all differ. What a solution costs is the sum of
-    the codes of the variables at the places `costs`; where there are none, nothing is minimised.
+    `domains` holds each variable's codes, `different` scopes on which all differ. A solution costs the sum of
+    the codes of the variables at the places in `costs`, each times the unit there; without any, nothing is minimised.
     """
 
     domains: list[list[int]]
@@ -50,7 +50,7 @@ class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     limit: int | None
     count_only: bool
     strategy: Strategy
-    costs: list[int] = []
+    costs: list[tuple[int, int]] = []
 
 
 class Export(msgspec.Struct, frozen=True, array_like=True, tag=True):

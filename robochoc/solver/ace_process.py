@@ -277,7 +277,9 @@ class _Models:
         if task.costs:
             root.set("type", "COP")
             total = etree.SubElement(etree.SubElement(root, "objectives"), "minimize", type="sum")
-            etree.SubElement(total, "list").text = " ".join(names[place] for place in task.costs)
+            etree.SubElement(total, "list").text = " ".join(names[place] for place, _ in task.costs)
+            if any(unit != 1 for _, unit in task.costs):
+                etree.SubElement(total, "coeffs").text = " ".join(str(unit) for _, unit in task.costs)
         return bytes(etree.tostring(root, pretty_print=True))
 
     def _rows(self, task: Task, table: EncodedTable) -> list[Any]:

@@ -25,7 +25,7 @@ from robochoc.solver.encoding import Codes, Component, Network, components
 from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.query import SolvedBy, SolverAnswer
 from robochoc.solver.symmetry import break_symmetries, orbits, symmetries
-from robochoc.solver.weighted import WeightedComponent, components_with_withdrawal, constant_costs, weighted_components
+from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 MAX_CLIQUE_ROWS = 20_000
@@ -128,12 +128,8 @@ class CentralSolver:
             UnsupportedError: if a constraint or its costs are too large.
         """
         try:
-            if withdrawal_cost is not None:
-                parts = computed_by(self._deadline, components_with_withdrawal, team, withdrawal_cost)
-                return self._minimum(team, parts)
-            if team.kind == ProblemKind.DISWCSP and not count:
-                variables, constraints = team.variables.values(), list(team.constraints())
-                return self._minimum(team, computed_by(self._deadline, weighted_components, variables, constraints))
+            if withdrawal_cost is not None or (team.kind == ProblemKind.DISWCSP and not count):
+                return self._minimum(team, computed_by(self._deadline, priced_components, team, withdrawal_cost))
             return self._all_components(team, count=count)
         except (SolverTimeoutError, TimeLimitError):
             return CentralAnswer(Verdict.UNKNOWN)

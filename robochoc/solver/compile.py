@@ -153,8 +153,10 @@ class Compiler:
 
     def _solved(self, robot: str, network: Network, limit: float) -> SolverAnswer:
         deadline = limit if self._deadline is None else min(limit, self._deadline)
+        solver = self._solver()
         try:
-            return self._solver().solve(network, limit=self._limits.solutions + 1, strategy="static", deadline=deadline)
+            solver.begin(network, limit=self._limits.solutions + 1, strategy="static", deadline=self._deadline)
+            return solver.answer(deadline)
         except SolverTimeoutError as timeout:
             if self._deadline is not None and self._deadline <= limit:
                 raise

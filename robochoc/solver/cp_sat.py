@@ -1,8 +1,8 @@
 """OR-Tools as a second central solver: CP-SAT decides the whole team's problem, in a process of its own.
 
 It gets the tables over codes that ACE gets too (`solver/encoding.py`, `solver/weighted.py`), and shares nothing else
-with it: no cliques, no symmetries, no enumeration. Costs are codes whose sum is bounded by
-`weighted.MAX_TOTAL_COST`, far below 64 bits.
+with it: no cliques, no symmetries, no enumeration. The sum of costs is at most `weighted.MAX_TOTAL_COST`, far below
+64 bits.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -23,14 +23,9 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.central import CentralAnswer
 from robochoc.solver.cp_sat_messages import LENGTH, CpSatAnswer, CpSatFailed, CpSatTable, CpSatTask, FromCpSat
-from robochoc.solver.encoding import Network, UnsupportedError
+from robochoc.solver.encoding import Costs, Network, UnsupportedError
 from robochoc.solver.failures import SolverLostError, SolverMissingError
-from robochoc.solver.weighted import (
-    WeightedComponent,
-    components_with_withdrawal,
-    constant_costs,
-    weighted_components,
-)
+from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.signals import signals_held
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
@@ -98,6 +93,7 @@ class CpSatSolver:
             if not self._kept:
                 self.close()
 
+    @signals_held()
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
@@ -109,11 +105,7 @@ class CpSatSolver:
             self._socket = None
 
     def _solve(self, team: Team, withdrawal_cost: int | None) -> CentralAnswer:
-        if withdrawal_cost is None:
-            variables, constraints = team.variables.values(), list(team.constraints())
-            parts = computed_by(self._deadline, weighted_components, variables, constraints)
-        else:
-            parts = computed_by(self._deadline, components_with_withdrawal, team, withdrawal_cost)
+        parts = computed_by(self._deadline, priced_components, team, withdrawal_cost)
         cost = bound = constant_costs(team)
         assignment: dict[str, int] | None = {}
         proven = True
@@ -169,17 +161,17 @@ class CpSatSolver:
             return CpSatAnswer(None, proven=False)
         return word
 
+    @signals_held()
     def _start(self) -> socket.socket:
         ours, theirs = socket.socketpair()
         try:
-            with signals_held():
-                self._process = subprocess.Popen(  # noqa: S603 - our own module
-                    [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", str(theirs.fileno())],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                    pass_fds=(theirs.fileno(),),
-                )
+            self._process = subprocess.Popen(  # noqa: S603 - our own module
+                [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(),),
+            )
         except BaseException:
             ours.close()
             raise
@@ -214,6 +206,6 @@ class CpSatSolver:
         )
 
 
-def _task(network: Network, costs: Sequence[int], deadline: float | None) -> CpSatTask:
+def _task(network: Network, costs: Costs, deadline: float | None) -> CpSatTask:
     tables = tuple(CpSatTable(table.scope, table.allowed, table.rows) for table in network.tables)
     return CpSatTask(network.domains, tables, tuple(costs), deadline)

@@ -18,15 +18,15 @@ class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
 
 
 class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """Find one solution; with `costs`, one whose codes at these places sum up to the least.
+    """Find one solution; with `costs`, one with the least sum of these codes.
 
-    `domains` holds each variable's codes, `deadline` the end of the time on the monotonic clock, which all processes
-    of a machine share (None: there is no limit).
+    A cost is the place of a variable, and the unit of its codes. `domains` holds each variable's codes, `deadline` the
+    end of the time on the monotonic clock, which all processes of a machine share (None: there is no limit).
     """
 
     domains: tuple[tuple[int, ...], ...]
     tables: tuple[CpSatTable, ...]
-    costs: tuple[int, ...] = ()
+    costs: tuple[tuple[int, int], ...] = ()
     deadline: float | None = None
 
 

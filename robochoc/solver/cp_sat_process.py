@@ -80,7 +80,8 @@ def _solve(task: CpSatTask) -> CpSatAnswer:
         else:
             model.add_forbidden_assignments(scope, table.rows)
     if task.costs:
-        model.minimize(cp_model.LinearExpr.sum([variables[place] for place in task.costs]))
+        paid, units = zip(*task.costs, strict=True)
+        model.minimize(cp_model.LinearExpr.weighted_sum([variables[place] for place in paid], units))
     solver = cp_model.CpSolver()
     solver.parameters.num_workers = WORKERS
     solver.parameters.random_seed = 0

@@ -32,6 +32,8 @@ MAX_ALLOWED_ROWS = 100_000
 """The largest number of combinations of values for which a constraint is always a table of allowed tuples."""
 
 Codes = tuple[int, ...]
+Costs = tuple[tuple[int, int], ...]
+"""The places of variables whose codes are costs, each with the unit of its codes."""
 
 
 class UnsupportedError(Exception):

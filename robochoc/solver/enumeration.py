@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.encoding import Codes, Costs, Network, Table
 
 STEPS_EACH = 100_000
 """The steps that every task may take: about as long as ACE takes where it runs already."""
@@ -78,8 +78,8 @@ def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, 
     return Enumeration(count, complete=True, solutions=sorted(solutions))
 
 
-def minimum_solution(network: Network, budget: Budget, costs: Codes) -> Codes | None:
-    """Return a solution of `network` in which the codes at the places `costs` sum up to the least, if there is one.
+def minimum_solution(network: Network, budget: Budget, costs: Costs) -> Codes | None:
+    """Return a solution of `network` with the least sum of `costs`, if there is one.
 
     `network` is propagated.
 
@@ -152,7 +152,7 @@ class _Search:
                 self._budget.spend(len(domains) * len(bits))
                 yield [self._codes(_with(domains, place, bit)) for bit in bits]
 
-    def cheapest(self, costs: Codes) -> Codes | None:
+    def cheapest(self, costs: Costs) -> Codes | None:
         """Return the first of the cheapest solutions. Raises `OutOfStepsError`."""
         best: Codes | None = None
         least: int | None = None
@@ -171,15 +171,15 @@ class _Search:
             stack += alive
         return best
 
-    def _below(self, domains: list[int], left: list[int], costs: Codes, least: int) -> bool:
+    def _below(self, domains: list[int], left: list[int], costs: Costs, least: int) -> bool:
         """Return whether something may cost less than `least`; what cannot is taken from the domains of the costs."""
         spare = least - 1 - self._bound(domains, costs)
         if spare < 0:
             return False
         shrunk = []
-        for place in costs:
+        for place, unit in costs:
             domain, codes = domains[place], self._code[place]
-            most = codes[domain & -domain] + spare
+            most = codes[domain & -domain] + spare // unit
             high = domain
             while high and codes[1 << (high.bit_length() - 1)] > most:
                 high ^= 1 << (high.bit_length() - 1)
@@ -188,9 +188,9 @@ class _Search:
                 shrunk.append(place)
         return self._propagates(domains, left, shrunk) and self._bound(domains, costs) < least
 
-    def _bound(self, domains: Sequence[int], costs: Codes) -> int:
+    def _bound(self, domains: Sequence[int], costs: Costs) -> int:
         """Return a lower bound on the cost of the variables at `costs`."""
-        return sum([self._code[place][domains[place] & -domains[place]] for place in costs])
+        return sum([unit * self._code[place][domains[place] & -domains[place]] for place, unit in costs])
 
     def _next(self, domains: Sequence[int]) -> tuple[int, bool]:
         """Return the variable to branch on (dom/deg; the first if all are assigned), and whether there are others."""

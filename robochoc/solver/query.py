@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Self
 
-from robochoc.solver.encoding import Codes, Network
+from robochoc.solver.encoding import Codes, Costs, Network
 
 
 class SolvedBy(StrEnum):
@@ -43,7 +43,7 @@ class Query:
     free: dict[int, Codes]
     limit: int | None
     count_only: bool
-    costs: Codes
+    costs: Costs
     """The variables at `places` whose codes are minimised. Of `free` ones the smallest code comes first."""
 
     @property
@@ -52,7 +52,7 @@ class Query:
         return not self.places
 
     @classmethod
-    def of(cls, network: Network, limit: int | None, *, count_only: bool, costs: Codes) -> Self:
+    def of(cls, network: Network, limit: int | None, *, count_only: bool, costs: Costs) -> Self:
         """Return what has to be asked of `network`, which is propagated."""
         bound = {place for table in network.tables for place in table.scope}
         bound.update(place for scope in network.different for place in scope)
@@ -64,7 +64,8 @@ class Query:
             tuple(tuple([at[place] for place in scope]) for scope in network.different),
         )
         free = {place: domain for place, domain in enumerate(network.domains) if place not in bound}
-        return cls(asked, places, free, limit, count_only, tuple([at[place] for place in costs if place in at]))
+        paid = tuple([(at[place], unit) for place, unit in costs if place in at])
+        return cls(asked, places, free, limit, count_only, paid)
 
     def rows(self, numbers: Sequence[int]) -> list[Codes]:
         """Return the solutions of `asked` whose codes stand one after the other in `numbers`."""

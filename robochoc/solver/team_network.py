@@ -10,7 +10,7 @@ from robochoc.model.problem import Constraint, ProblemKind, Team
 from robochoc.solver.cliques import with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft
 from robochoc.solver.propagation import propagate
-from robochoc.solver.weighted import MAX_TOTAL_COST, constant_costs, costs_by_scope
+from robochoc.solver.weighted import MAX_CODE, constant_costs, costs_by_scope
 
 MIN_VALUE, MAX_VALUE = -(2**31) + 10, 2**31 - 11
 """Values that ACE 2.6 reads: of 32 bits, but for a few that it keeps for itself (tried with ACE, one by one)."""
@@ -64,9 +64,9 @@ def _cost_domains(team: Team, charges: Sequence[Table]) -> list[Codes]:
     constant = constant_costs(team)
     if constant or (team.kind == ProblemKind.DISWCSP and not domains):
         domains.append((constant,))
-    if sum(map(max, domains)) > MAX_TOTAL_COST:
+    if sum(map(max, domains)) > MAX_CODE:
         raise UnsupportedError(
-            f"{team.name} has costs that add up to more than {MAX_TOTAL_COST:,}, too much for XCSP3's solvers"
+            f"{team.name} has costs that add up to more than {MAX_CODE:,}, too much for XCSP3's solvers"
         )
     return domains
 

@@ -12,10 +12,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable
 from robochoc.solver.encoding import (
     Codes,
     Component,
+    Costs,
     Network,
     Table,
     UnsupportedError,
@@ -27,8 +29,12 @@ from robochoc.solver.propagation import propagate
 
 MAX_COST_ROWS = 1_000_000
 """The maximum number of combinations of values in a cost table."""
-MAX_TOTAL_COST = 2**30
-"""The maximum of all costs together, in units of their greatest common divisor: ACE's codes are small."""
+MAX_TOTAL_COST = 2**53
+"""The maximum of all costs together, in units of their greatest common divisor: solvers add them up in 64 bits."""
+MAX_CODE = 2**30
+"""Costs up to this are one code each; ACE's codes are small. Larger costs are two codes."""
+DIGIT = 2**27
+"""The unit of the higher one of two codes."""
 
 CostRows = dict[Codes, float]
 """The costs of combinations of codes. Combinations that are not in it are forbidden."""
@@ -38,24 +44,56 @@ CostRows = dict[Codes, float]
 class WeightedComponent:
     """A component with costs. In `network`, the variables of `part` come first.
 
-    The cost of a solution is `base`, plus `unit` times the sum of the codes at the places `costs`.
+    The cost of a solution is `base`, plus `unit` times the sum of `costs`.
     """
 
     part: Component
     network: Network
-    costs: Codes
+    costs: Costs
     base: int
     unit: int
 
     def cost(self, codes: Sequence[int]) -> int:
         """Return what a solution of `network` costs."""
-        return self.base + self.unit * sum(codes[place] for place in self.costs)
+        return self.base + self.unit * sum(unit * codes[place] for place, unit in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
         """Return the values of the variables behind a solution of `network`; withdrawn ones have none."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
+
+
+class _CostSumError(Exception):
+    """The costs of a component may add up to `total`, which is more than `limit`."""
+
+    def __init__(self, total: int, limit: int) -> None:
+        super().__init__(total, limit)
+        self.total = total
+        self.limit = limit
+
+
+def priced_components(team: Team, withdrawal_cost: int | None = None) -> list[WeightedComponent]:
+    """Return the independent parts of the problem of `team`.
+
+    Args:
+        team: The team, with normalised costs.
+        withdrawal_cost: The cost of withdrawing a robot of weight 1. None: no robot may withdraw.
+
+    Raises:
+        UnsupportedError: when a constraint has too many tuples, or costs are too high.
+    """
+    try:
+        if withdrawal_cost is not None:
+            return components_with_withdrawal(team, withdrawal_cost)
+        return weighted_components(team.variables.values(), list(team.constraints()))
+    except _CostSumError as error:
+        units = replace(team.told_in, constant=0)
+        total, limit = (cost_shown(units.told(cost)) for cost in (error.total, error.limit))
+        raise UnsupportedError(
+            f"costs may add up to {total}, and central solvers minimise sums up to {limit}: round costs to fewer"
+            " decimals, or write those that stand for 'never' as infinity"
+        ) from None
 
 
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
@@ -109,25 +147,31 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
     Combinations of codes that a scope has no price for are forbidden.
 
     Raises:
-        UnsupportedError: when they are too high.
+        _CostSumError: when they are too high.
     """
     least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
     unit = math.gcd(*(price for prices in above.values() for price in prices.values())) or 1
     worst = sum(max(prices.values(), default=0) for prices in above.values()) // unit
     if worst > MAX_TOTAL_COST:
-        raise UnsupportedError(
-            f"costs add up to {worst * unit:,} at worst, which is more than the central solver can minimise; costs that"
-            " stand for 'never' are better written as infinity"
-        )
-    domains, tables, costs = list(network.domains), list(network.tables), []
+        raise _CostSumError(worst * unit, MAX_TOTAL_COST * unit)
+    domains, tables, costs = list(network.domains), list(network.tables), list[tuple[int, int]]()
     for scope, prices in above.items():
-        rows = tuple(sorted((*row, price // unit) for row, price in prices.items()))
-        if any(prices.values()):
-            costs.append(len(domains))
-            tables.append(Table((*scope, len(domains)), allowed=True, rows=rows))
-            domains.append(tuple(sorted({row[-1] for row in rows})))
+        if not any(prices.values()):
+            continue
+        rows, units = _cost_rows({row: price // unit for row, price in prices.items()})
+        places = range(len(domains), len(domains) + len(units))
+        costs += zip(places, units, strict=True)
+        tables.append(Table((*scope, *places), allowed=True, rows=rows))
+        domains += [tuple(sorted(set(column))) for column in [*zip(*rows, strict=True)][len(scope) :]]
     return WeightedComponent(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
+
+
+def _cost_rows(prices: Mapping[Codes, int]) -> tuple[tuple[Codes, ...], Codes]:
+    """Return the rows of a cost table, each with one or two codes of its cost at the end, and their units."""
+    if max(prices.values()) <= MAX_CODE:
+        return tuple(sorted((*row, price) for row, price in prices.items())), (1,)
+    return tuple(sorted((*row, *divmod(price, DIGIT)) for row, price in prices.items())), (DIGIT, 1)
 
 
 def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[WeightedComponent]:

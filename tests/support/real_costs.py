@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from fractions import Fraction
 from random import Random
 
@@ -27,13 +28,16 @@ _PREDICATES = ("ne(X,Y)", "lt(X,Y)", "eq(add(X,Y),1)")
 _FUNCTIONS = ("sub(mul(X,Y),3)", "abs(sub(X,Y))", "div(X,Y)", "neg(add(X,Y,2))", "if(eq(X,Y),-4,mod(X,3))")
 
 
-def random_costs_team(seed: int) -> Team:
-    """Return a team of 2 to 4 robots: decimal, negative and maximised costs, functions, constants, infinities."""
+def random_costs_team(seed: int, most: int = 9, places: Sequence[int] = (0, 0, 1, 3)) -> Team:
+    """Return a team of 2 to 4 robots: decimal, negative and maximised costs, functions, constants, infinities.
+
+    Relations have costs up to `most`, in units of as many decimal places as one of `places` says.
+    """
     chance = Random(seed)
     robots = chance.randint(2, 4)
     variables = {f"r{number}": [_variable(chance, number)] for number in range(robots)}
-    constraints = [_constraint(chance, number, robots) for number in range(chance.randint(1, 5))]
-    units = CostUnits(chance.random() < 0.5, chance.choice([0, 0, 1, 3]), chance.choice([0, 7, -2]))
+    constraints = [_constraint(chance, number, robots, most) for number in range(chance.randint(1, 5))]
+    units = CostUnits(chance.random() < 0.5, chance.choice(places), chance.choice([0, 7, -2]))
     return assemble(f"costs-{seed}", variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
 
 
@@ -41,12 +45,12 @@ def _variable(chance: Random, number: int) -> Variable:
     return Variable(f"x{number}", Domain(f"D{number}", (range(chance.randint(-2, 0), chance.randint(1, 3)),)))
 
 
-def _constraint(chance: Random, number: int, robots: int) -> Constraint:
+def _constraint(chance: Random, number: int, robots: int, most: int) -> Constraint:
     scope = tuple(f"x{one}" for one in chance.sample(range(robots), 2))
     name = f"C{number}"
     match chance.choice(["relation", "predicate", "function", "unary"]):
         case "relation":
-            return Constraint(name, _relation(chance, f"R{number}"), scope, scope)
+            return Constraint(name, _relation(chance, f"R{number}", most), scope, scope)
         case "predicate":
             predicate = Predicate(f"P{number}", _PAIR, parse(chance.choice(_PREDICATES), _PAIR, Type.BOOLEAN))
             return Constraint(name, predicate, scope, scope, cost=chance.choice([INFINITE, -5, 7]))
@@ -58,9 +62,9 @@ def _constraint(chance: Random, number: int, robots: int) -> Constraint:
             return Constraint(name, function, scope[:1], scope[:1])
 
 
-def _relation(chance: Random, name: str) -> Relation:
+def _relation(chance: Random, name: str, most: int) -> Relation:
     tuples = [pair for pair in itertools.product(range(-2, 3), repeat=2) if chance.random() < 0.7]
-    costs = tuple(chance.choice([INFINITE, *range(-9, 10)]) for _ in tuples)
+    costs = tuple([chance.choice([INFINITE, *(chance.randint(-most, most) for _ in range(19))]) for _ in tuples])
     return Relation(name, 2, Semantics.SOFT, tuple(tuples), costs, chance.choice([INFINITE, -3, 0, 4]))
 
 

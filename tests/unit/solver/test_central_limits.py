@@ -140,7 +140,7 @@ def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -
 def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
     rows = tuple((a, b, (a + b) % 3) for a in range(3) for b in range(3))
     network = Network(((0, 1, 2), (0, 1, 2), (0, 1, 2)), (Table((0, 1, 2), allowed=True, rows=rows),))
-    assert warm.begin(network, costs=(2,))
+    assert warm.begin(network, costs=((2, 1),))
     assert warm.answer().solutions[0] in rows
     (part,) = weighted_components(HARD.variables.values(), list(HARD.constraints()))
     assert warm.begin(part.network, costs=part.costs)

@@ -22,7 +22,7 @@ from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import CompiledFrom, Compiler, Limits
 from robochoc.solver.domain import TooManySolutionsError
-from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.encoding import Costs, Network, Table
 from robochoc.solver.enumeration import (
     STEPS_BEFORE_ACE,
     STEPS_EACH,
@@ -71,9 +71,9 @@ def pair_of_five(body: str = "lt") -> Team:
     return complex_team({"RA": ["A1", "A2"], "RB": ["B"]}, dict.fromkeys(("A1", "A2", "B"), range(1, 6)), constraints)
 
 
-def least(network: Network, costs: Codes) -> int | None:
+def least(network: Network, costs: Costs) -> int | None:
     """The least sum of the codes at `costs`, by trying everything."""
-    return min((sum(codes[place] for place in costs) for codes in brute_force(network)), default=None)
+    return min((sum(unit * codes[place] for place, unit in costs) for codes in brute_force(network)), default=None)
 
 
 # The search
@@ -122,7 +122,7 @@ def test_the_cheapest_is_brute_forces() -> None:
                 continue
             best = minimum_solution(network, Budget(ENOUGH), part.costs)
             expected = least(network, part.costs)
-            assert (best and sum(best[place] for place in part.costs)) == expected, (network, part.costs)
+            assert (best and sum(unit * best[place] for place, unit in part.costs)) == expected, (network, part.costs)
             assert best is None or best in brute_force(network)
             seen += 1
 
@@ -133,9 +133,10 @@ def test_any_variables_may_be_costs() -> None:
         network = propagate(random_network(chance))
         if network.impossible:
             continue
-        costs = tuple(chance.sample(range(len(network.domains)), chance.randint(1, len(network.domains))))
+        places = chance.sample(range(len(network.domains)), chance.randint(1, len(network.domains)))
+        costs = tuple([(place, chance.choice([1, 1, 5, 2**27])) for place in places])
         best = minimum_solution(network, Budget(ENOUGH), costs)
-        assert (best and sum(best[place] for place in costs)) == least(network, costs), network
+        assert (best and sum(unit * best[place] for place, unit in costs)) == least(network, costs), network
 
 
 # ACE has the same
