@@ -49,7 +49,8 @@ class LocalConstraints:
         self._domain = part.domain
         self.values: tuple[Value, ...] = self._domain.values
         self.charges: tuple[Cost, ...] = self._domain.costs
-        if part.parameters.withdrawal_cost is not None:
+        # Values are distinct: a robot that shows nothing looks the same withdrawn, which is never cheaper.
+        if part.parameters.withdrawal_cost is not None and (robot.interface or not self.values):
             self.values = (*self.values, (None,) * len(robot.interface))
             self.charges = (*self.charges, part.parameters.withdrawal_cost * robot.weight)
         self.checks = 0
@@ -91,9 +92,8 @@ class LocalConstraints:
 
     def declared_count(self, robot: str) -> int:
         """Return how many values `declared` returns; nothing is allocated."""
-        domains = self._part.known.domains
-        shown = math.prod(len(domains[name]) for name in self._part.known.interfaces[robot])
-        return shown + (self._part.parameters.withdrawal_cost is not None)
+        domains, names = self._part.known.domains, self._part.known.interfaces[robot]
+        return math.prod(len(domains[name]) for name in names) + self._may_look_withdrawn(names)
 
     def declared(self, robot: str) -> list[Value]:
         """Return all values that the files declare for `robot`; the last is withdrawal where robots may withdraw.
@@ -102,7 +102,11 @@ class LocalConstraints:
         """
         names = self._part.known.interfaces[robot]
         values: list[Value] = [*itertools.product(*(self._part.known.domains[name] for name in names))]
-        return values if self._part.parameters.withdrawal_cost is None else [*values, (None,) * len(names)]
+        return [*values, (None,) * len(names)] if self._may_look_withdrawn(names) else values
+
+    def _may_look_withdrawn(self, names: Sequence[str]) -> bool:
+        """Return whether withdrawal is a value of its own for a robot that shows `names`."""
+        return self._part.parameters.withdrawal_cost is not None and bool(names)
 
     def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
         """Return each constraint whose other variables are all known, and their values. Count a check each."""

@@ -23,7 +23,7 @@ from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.ace import AceProcess
 from tests.support.agents import replies, value
 from tests.support.cost_problems import minimum_withdrawal
-from tests.support.loose_problems import loosened_cost_team, minimum_cost
+from tests.support.loose_problems import loosened, loosened_cost_team, minimum_cost
 from tests.support.problems import random_team
 from tests.support.pseudo_trees import context, placed, priced, to
 from tests.support.random_options import random_options
@@ -266,7 +266,7 @@ def test_the_least_cost_is_found(level: str, batch: int, warm: AceProcess) -> No
 def test_as_few_as_possible_withdraw(level: str, teams: int) -> None:
     chance = Random(f"withdraw bnb-adopt-fdac {level}")
     for _ in range(teams):
-        team = random_team(chance)
+        team = loosened(random_team(chance), chance)
         robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
         team = replace(team, robots=robots)
         options = random_options(team, "bnb-adopt-fdac", chance)

@@ -9,6 +9,7 @@ from random import Random
 import pytest
 
 from robochoc.model.message import Value
+from robochoc.model.orders import with_order
 from robochoc.model.problem import (
     INFINITE,
     Constraint,
@@ -24,6 +25,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.loose_problems import loosened
 from tests.support.problems import random_team, team_of
 
 EQUAL = Relation("R", 2, Semantics.SUPPORTS, ((1, 1), (2, 2)))
@@ -45,6 +47,24 @@ def test_two_constraints_with_one_robot_are_both_told() -> None:
     problem = LocalProblem(agent_problems(team_of(dict.fromkeys("AB", (1, 2)), constraints))["RB"])
     assert [key for _, key in problem.conflicts(1, {"RA": (1,)})] == ["RB<RA:C1", "RB<RA:C2"]
     assert [key for _, key in problem.conflicts(1, {"RA": (2,)})] == ["RB<RA:C2"]
+
+
+def test_values_are_distinct_whatever_is_shown() -> None:
+    """A robot that shows nothing looks the same withdrawn; one that cannot stay has to withdraw all the same."""
+    chance = Random(5)
+    for _ in range(30):
+        team = loosened(random_team(chance), chance)
+        turned = with_order(team, tuple(chance.sample(team.order, len(team.order))))
+        for part in agent_problems(turned, RunParameters(withdrawal_cost=9)).values():
+            problem = LocalProblem(part)
+            assert len(set(problem.values)) == len(problem.values) == len(problem.charges) == len(problem.behind)
+            assert ((None,) * len(part.robot.interface) in problem.values) or problem.charges[0] < 9
+            for name in turned.order:
+                declared = problem.declared(name)
+                assert len(set(declared)) == len(declared) == problem.declared_count(name)
+    alone = team_of({"A": (1, 2)}, [Constraint("C", Relation("N", 1, Semantics.SUPPORTS, ()), ("A",), ("A",))])
+    (part,) = agent_problems(alone, RunParameters(withdrawal_cost=9)).values()
+    assert LocalProblem(part).solution(0) == {}
 
 
 def test_each_known_constraint_is_a_check_and_unknown_ones_are_passed_over() -> None:
