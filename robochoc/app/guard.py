@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
@@ -25,6 +26,8 @@ _HEADERS = (
 )
 MOST_BYTES = (64 << 20) + (1 << 16)
 """Bytes that are taken of one request: the largest file that is opened, and what a form adds to it."""
+PART_S = 30.0
+"""The longest wait for the next part of a request's body, in seconds."""
 NOT_FOUND = 404
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 """POST: files that are opened, and sockets of browsers that have no better one."""
@@ -70,7 +73,7 @@ class Guard:
 
         async def sending(message: MutableMapping[str, Any]) -> None:
             nonlocal begun
-            if begun or not taken.too_much:  # else it says that it has failed, and we say why
+            if begun or not (taken.too_much or taken.is_late):  # else it says that it has failed, and we say why
                 begun = True
                 await send(message)
 
@@ -81,8 +84,8 @@ class Guard:
         except RuntimeError as error:
             if begun or not taken.gone or str(error) != _NO_ANSWER:
                 raise
-        if taken.too_much and not begun:
-            await _answer(send, 413)
+        if (taken.too_much or taken.is_late) and not begun:
+            await _answer(send, 413 if taken.too_much else 408)
 
     def _refused(self, scope: Scope) -> int | None:
         """Return the HTTP status of a request that is refused; None: it is served."""
@@ -116,17 +119,26 @@ class Guard:
 
 
 class _Taken:
-    """Receives a request; of one that is too long, whatever it says of its length, as if its sender had gone."""
+    """Receives a request; of one that is too long, or does not come on, as if its sender had gone."""
 
     def __init__(self, receive: Receive) -> None:
         self.too_much = False
+        self.is_late = False
+        """Whether the next part of its body did not come in time."""
         self.gone = False
         """Whether its sender has gone."""
         self._receive, self._left = receive, MOST_BYTES
+        self._is_complete = False
 
     async def __call__(self) -> MutableMapping[str, Any]:
-        message = await self._receive()
+        try:
+            async with asyncio.timeout(None if self._is_complete else PART_S):
+                message = await self._receive()
+        except TimeoutError:
+            self.is_late = self._is_complete = True
+            return {"type": "http.disconnect"}
         if message["type"] == "http.request":
+            self._is_complete = not message.get("more_body", False)
             self._left -= len(message.get("body", b""))
             if self._left < 0:
                 self.too_much = True

@@ -18,6 +18,7 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 
+from robochoc.app.connections import BoundedConnection
 from robochoc.app.faults import keep_faults
 from robochoc.app.guard import Guard
 from robochoc.app.jobs.job import end_all
@@ -74,6 +75,7 @@ def serve_app(
         )
         config = uvicorn.Config(
             Guard(outside, secret, here.getsockname()[1]),
+            http=BoundedConnection,
             log_config=None,
             log_level="error",
             access_log=False,

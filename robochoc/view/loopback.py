@@ -16,6 +16,7 @@ from socket import socket
 from typing import Any
 
 from tornado.httpserver import HTTPServer
+from tornado.iostream import IOStream
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketHandler
 
@@ -24,6 +25,11 @@ from robochoc.view.redirect import RedirectFile
 _HOSTS = r"(127\.0\.0\.1|localhost)$"
 _LONGEST_MESSAGE_BYTES = 1024
 """Browsers have nothing to send."""
+_LONGEST_REQUEST_BYTES = 1 << 16
+REQUEST_S = 30.0
+"""The time within which a request must have come. A connection that waits longer for one is closed."""
+MAX_CONNECTIONS = 200
+"""The number of connections beyond which further ones are closed at once."""
 
 
 def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) -> Application:
@@ -37,11 +43,27 @@ def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) 
     return made
 
 
+class _Server(HTTPServer):
+    """Closes connections that are too many."""
+
+    def handle_stream(self, stream: IOStream, address: tuple[Any, ...]) -> None:
+        if len(self._connections) >= MAX_CONNECTIONS:
+            stream.close()
+        else:
+            super().handle_stream(stream, address)
+
+
 @asynccontextmanager
 async def served(application: Application, listening: socket) -> AsyncIterator[None]:
     """Serve `application` on a socket for as long as the context lasts."""
     listening.setblocking(False)
-    server = HTTPServer(application)
+    server = _Server(
+        application,
+        idle_connection_timeout=REQUEST_S,
+        body_timeout=REQUEST_S,
+        max_header_size=_LONGEST_REQUEST_BYTES,
+        max_body_size=_LONGEST_REQUEST_BYTES,
+    )
     server.add_socket(listening)
     try:
         yield

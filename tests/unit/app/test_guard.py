@@ -55,6 +55,28 @@ def _asked(
     return answers
 
 
+def test_a_body_that_does_not_come_on_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "PART_S", 0.01)
+    answers: list[dict[str, Any]] = []
+
+    async def reads(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:  # noqa: ANN401 - ASGI's
+        await PlainTextResponse(await Request(scope, receive).body())(scope, receive, send)
+
+    async def send(message: MutableMapping[str, Any]) -> None:
+        answers.append(dict(message))
+
+    async def receive() -> MutableMapping[str, Any]:
+        if answers:
+            return {"type": "http.disconnect"}
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    named = [(name.encode(), value) for name, value in SAME.items()]
+    scope = {"type": "http", "path": "/secret/", "headers": named, "method": "POST"}
+    asyncio.run(Guard(reads, SECRET, 8000)(scope, receive, send))
+    assert answers[0]["status"] == 408
+
+
 def test_a_browser_of_this_machine_with_the_path_is_served() -> None:
     first, body = _asked("/secret/", SAME)
     assert (first["status"], body["body"]) == (200, b"inside")
