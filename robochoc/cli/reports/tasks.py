@@ -40,6 +40,7 @@ def _tasks_of(robot: Robot) -> dict[str, tuple[str, int | str]]:
         labels = [only.domain.label(value) for value in only.domain]
         if labels[:1] == [_NONE]:
             return {str(label): (only.name, label) for label in labels[1:]} or {_NONE: (only.name, 0)}
-    if all(one.name.startswith(first) and set(one.domain) == {0, 1} for one in robot.variables):
+    binary = (not one.domain.symbols and set(one.domain) == {0, 1} for one in robot.variables)
+    if all(one.name.startswith(first) for one in robot.variables) and all(binary):
         return {one.name.removeprefix(first): (one.name, 1) for one in robot.variables}
     return {}

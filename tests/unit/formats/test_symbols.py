@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.cli.reports.tasks import task_table
 from robochoc.formats import InvalidInputError, check_team, read_robot, read_team, robot_in, robot_xml, write_team
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Name
@@ -251,3 +252,31 @@ def test_a_value_that_is_no_symbol_cannot_be_added() -> None:
     team = replace(built(), scenario=(ScenarioEvent((AddValue("A", 2),)),))
     with pytest.raises(InvalidInputError, match="the value 2 of 'A' is no symbol"):
         check_team(team)
+
+
+def test_an_empty_relation_may_be_over_a_symbol_and_an_integer(tmp_path: Path) -> None:
+    for semantics, solutions in (("supports", 0), ("conflicts", 3 * 3 * 3)):
+        empty = f'<relation name="r" arity="2" semantics="{semantics}"/>'
+        text = B.replace('<relation name="r" semantics="supports">green 1|red 2</relation>', empty)
+        folder = tmp_path / semantics
+        write_files(folder, {"RA.xml": A, "RB.xml": text.replace('<agent name="RC"/>', "")})
+        team = read_team(folder)
+        (constraint,) = team["RB"].shared
+        allowed = [
+            (one, other)
+            for one in team.variables["A"].domain
+            for other in team.variables["B"].domain
+            if constraint.price({"A": one, "B": other}) == 0
+        ]
+        assert len(allowed) * 3 == solutions
+        write_team(team, tmp_path / f"{semantics}-again")
+        assert read_team(tmp_path / f"{semantics}-again")["RB"].shared == (constraint,)
+
+
+def test_two_symbols_are_not_told_as_tasks(tmp_path: Path) -> None:
+    team = read_team(files(tmp_path))
+    binary = Domain("D", (range(2),), ("red", "green"))
+    alone = replace(team["RA"], variables=(Variable("RA.A", binary),), private=(), children=())
+    assert task_table(Team("one", (alone,)), {"RA.A": "red"}) == []
+    plain = replace(alone, variables=(Variable("RA.A", Domain("D", (range(2),))),))
+    assert task_table(Team("one", (plain,)), {"RA.A": 1}) != []

@@ -91,9 +91,9 @@ class PythonFunction:
         stored = {node.id for node in names if isinstance(node.ctx, ast.Store)}
         loaded = [node.id for node in names]
         self.scope = tuple(dict.fromkeys(name for name in loaded if name in variables and name not in stored))
-        compiler = _Compiler(
-            {*variables, *stored}, {name: fixed[name] for name in fixed if name not in stored}, outside
-        )
+        # Only names that appear: a problem has as many functions as variables.
+        constants = {name: fixed[name] for name in loaded if name in fixed and name not in stored}
+        compiler = _Compiler(variables, stored, constants, outside)
         self._compiler = compiler
         self._steps = _steps_of(self.body) // _NODES_A_STEP
         self._run: _Statement = (
@@ -168,8 +168,15 @@ def _nodes(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
 class _Compiler:
     """Makes closures of trees. Each kind of node that is allowed has its line here."""
 
-    def __init__(self, known: Collection[str], fixed: Mapping[str, Value], outside: Mapping[str, Outside]) -> None:
-        self._known = known
+    def __init__(
+        self,
+        variables: Collection[str],
+        stored: Collection[str],
+        fixed: Mapping[str, Value],
+        outside: Mapping[str, Outside],
+    ) -> None:
+        self._variables = variables
+        self._stored = stored
         self._fixed = fixed
         self._outside = outside
         self._steps = MAX_STEPS
@@ -276,10 +283,10 @@ class _Compiler:
         if name in self._fixed:
             value = self._fixed[name]
             return lambda _: value
-        if name not in self._known:
+        if name not in self._variables and name not in self._stored:
             if name in FUNCTIONS:
                 raise MistakeError(f"the function '{name}' is not called", "write its arguments in parentheses")
-            hint = suggestion(name, sorted(self._known), "variables")
+            hint = suggestion(name, sorted({*self._variables, *self._stored}), "variables")
             raise MistakeError(f"the function has '{shortened(name)}', which is no variable", hint)
         return lambda names: names[name]
 

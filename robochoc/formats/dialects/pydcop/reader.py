@@ -120,6 +120,8 @@ class _Reader:
         """Return the infinity of the options, or the one that an exported file names."""
         node = self._root.get("infinity")
         if self._options.infinity is not None or node is None:
+            if node is not None:
+                node.skip()
             return self._options.infinity
         if isinstance(node.scalar, bool) or not isinstance(node.scalar, int) or node.scalar < 1:
             raise MistakeError("has an infinity that is no number", "write infinity: 10000", node.line)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import yaml
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.pydcop import python_function
+from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
@@ -276,3 +278,28 @@ def test_an_export_is_a_distribution_file_too() -> None:
     assert found["distribution"] == {"a": ["x", "y"], "b": ["z"]} == found["distribution_hints"]["must_host"]
     assert all(agent["capacity"] > 1000 for agent in found["agents"].values())
     assert len({*found["constraints"], *found["variables"]}) == len(names) + 1 + len(team.variables)
+
+
+def test_an_infinity_on_the_command_line_replaces_that_of_the_file(tmp_path: Path) -> None:
+    text = "infinity: 7\n" + constraint("5 if x == y else 0")
+    assert {note.kind for note in imported(text, tmp_path, "a.yaml").notes} >= {"infinity"}
+    assert "infinity" not in {note.kind for note in imported(text, tmp_path, "a.yaml", infinity=5).notes}
+
+
+def test_owners_that_an_option_replaces_may_stand_in_the_file(tmp_path: Path) -> None:
+    text = f"{WHOLE}distribution: {{a1: [x], a2: [y]}}\n"
+    assert imported(text, tmp_path, "a.yaml").team.owner == {"x": "a1", "y": "a2"}
+    assert set(imported(text, tmp_path, "a.yaml", owner=".").team.owner.values()) == {"x", "y"}
+
+
+def test_a_function_does_not_look_at_all_variables_of_the_problem() -> None:
+    class Counted(dict[str, None]):
+        looks = 0
+
+        def __iter__(self) -> Iterator[str]:
+            Counted.looks += 1
+            return super().__iter__()
+
+    variables = Counted.fromkeys(f"x{number}" for number in range(100))
+    assert PythonFunction("x1 + 2 * x7", variables).scope == ("x1", "x7")
+    assert Counted.looks == 0
