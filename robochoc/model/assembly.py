@@ -10,8 +10,18 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from robochoc.model.constraint import Constraint, ConstraintModel, Relation, Semantics, Variable
+from robochoc.model.constraint import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    Function,
+    Predicate,
+    Relation,
+    Semantics,
+    Variable,
+)
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.expression import Apply, Name
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import Child, Parent, ProblemKind, Robot, Team, Topic
 from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
@@ -46,7 +56,9 @@ def assemble(
 ) -> Team:
     """Return the team in which robots own `variables` and share `constraints`.
 
-    Which parameters of definitions are symbols follows from the domains.
+    Which parameters of definitions are symbols follows from the domains. A constraint without variables holds or is
+    violated whatever the robots do: its cost is added to the constant, and if it is hard and violated, the first robot
+    gets a private constraint that none of its values satisfies.
 
     Args:
         name: The team's name.
@@ -62,7 +74,8 @@ def assemble(
     """
     symbolic = {one.name: one.domain.symbols for own in variables.values() for one in own if one.domain.symbols}
     links = _Links(variables)
-    for constraint in with_marked_symbols(constraints, symbolic):
+    with_variables, costs = _without_constants(constraints, variables, costs)
+    for constraint in with_marked_symbols(with_variables, symbolic):
         links.add(constraint)
     for robot, parts in extras.parts.items():
         for part in with_marked_symbols(parts, symbolic):
@@ -87,6 +100,28 @@ def assemble(
         for number, (robot, own) in enumerate(variables.items())
     )
     return with_table_everywhere(Team(name, robots), next(iter(symbolic.values()), ()))
+
+
+def _without_constants(
+    constraints: Iterable[Constraint], variables: Mapping[str, Sequence[Variable]], costs: CostUnits
+) -> tuple[list[Constraint], CostUnits]:
+    """Return `constraints` as constraints with variables, and `costs` with the costs of those without."""
+    found = []
+    for constraint in constraints:
+        if constraint.variables:
+            found.append(constraint)
+            continue
+        price = constraint.price({})
+        if price == INFINITE:
+            first = next(own[0].name for own in variables.values() if own)
+            found.append(Constraint(constraint.name, _NEVER, (first,), (first,)))
+        elif price:
+            unit = 10**costs.places if isinstance(constraint.definition, Function) else 1
+            costs = replace(costs, constant=costs.constant + int(price) * unit)
+    return found, costs
+
+
+_NEVER = Predicate("never", ("X",), Apply("ne", (Name("X"), Name("X"))))
 
 
 class _Links:

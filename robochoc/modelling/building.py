@@ -78,9 +78,8 @@ class _Builder:
         rank = {name: place for place, name in enumerate(order or ())}
         self._robots.sort(key=lambda robot: rank.get(robot.name, 0) if order else -robot.priority)
         self._drafts = [draft for rule in model.constraints for draft in rule.drafts()]
-        costs, constant = costs_of(model.objective, model.free_prefix("cost"))
-        constant += model.constant
-        self._drafts += costs
+        self._drafts += costs_of(model.objective, model.free_prefix("cost"))
+        constant = model.constant
         self._parts = {robot.name: self._parts_of(robot) for robot in self._robots}
         self._added = {
             rule: list(rule.drafts()) for event in model.events for rule in event.steps if isinstance(rule, Rule)
@@ -105,7 +104,7 @@ class _Builder:
         found = []
         for draft in (one for rule in robot.parts for one in rule.drafts()):
             owners = {variable.owner for variable in draft.scope}
-            if owners == {robot.name}:
+            if owners <= {robot.name}:
                 self._drafts.append(draft)
             elif robot.name in owners:
                 found.append(draft)
@@ -236,6 +235,11 @@ class _Changing:
         """Return the constraints that two robots get; those of robots that join go with them."""
         found = []
         for constraint in self._builder.finished_rule(rule):
+            if not constraint.variables and not constraint.price({}):
+                continue
+            if not constraint.variables:
+                hint = "an event adds constraints between robots: add it to the model"
+                raise ModelError(f"the constraint {rule.name} is violated whatever the values are", hint, rule.place)
             *others, lowest = self._builder.owners(constraint, self._order)
             if lowest in new:
                 new[lowest].append(constraint)

@@ -20,7 +20,7 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.names import BEYOND
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.ranges import merge_ranges
-from robochoc.modelling.numbers import exact, is_number
+from robochoc.modelling.numbers import exact, is_number, is_truth
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
 
 MAX_VALUES = 100_000
@@ -43,7 +43,7 @@ BOOLEAN = Kind("a truth value")
 
 def kind_of(value: object) -> Kind:
     """Return the kind of a value."""
-    if isinstance(value, bool):
+    if is_truth(value):
         return BOOLEAN
     if is_number(value):
         return NUMBER

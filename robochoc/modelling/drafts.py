@@ -6,20 +6,21 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.model.constraint import INFINITE, Constraint, Definition, Function, Predicate, Relation, Semantics
 from robochoc.model.constraint import Term as Actual
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.magnitudes import MAX_COST
-from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.numbers import Exact, exact, places_of, shown
+from robochoc.modelling.numbers import Exact, exact, is_infinite, places_of, rounded, shown
 from robochoc.modelling.places import ModelError, Place
-from robochoc.modelling.rules import check_constant
 from robochoc.modelling.tables import Price, Row, commonest, in_short, listed_rows, prices, truths
 from robochoc.modelling.tabulated import Tabled
 from robochoc.modelling.terms import Applied, Linear, Term, Variable
 from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
+
+_FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Draft:
 
     Attributes:
         name: Its name.
-        scope: Its variables.
+        scope: Its variables. Empty: it is true, false or has a cost whatever the values (`model/assembly.py`).
         place: Where it was made.
         body: The expression of a condition or of a cost, over `X0`, `X1`, ... for the variables.
         rows: The rows of a table, where it is one.
@@ -73,7 +74,8 @@ def conditions(term: Term, name: str, place: Place) -> Iterator[Draft]:
             for other in term.arguments[:number]:
                 yield from conditions(Applied("ne", other, one), name, place)
     elif not term.variables:
-        check_constant(term, place)
+        if not truths(term, place)[0]:
+            yield Draft(name, (), place, _FALSE)
     elif draft := _condition(term, name, place):
         yield draft
 
@@ -90,49 +92,54 @@ def soft_condition(term: Term, cost: Exact, name: str, place: Place) -> Draft:
     return Draft(name, term.variables, place, rows=rows, semantics=Semantics.SOFT, default=default, is_penalty=True)
 
 
-def costs_of(parts: Iterable[tuple[Exact, Term, Place]], name: str) -> tuple[list[Draft], Exact]:
-    """Return what a weighted sum of terms costs: one draft for all terms over the same variables, and a constant."""
-    groups: dict[frozenset[str], list[tuple[Exact, Term, Place]]] = {}
-    constant: Exact = 0
-    for factor, term, place in parts:
-        if term.variables:
-            groups.setdefault(frozenset(one.name for one in term.variables), []).append((factor, term, place))
-        else:
-            constant += factor * _constant(term, place)
-    return [_sum(group, f"{name}{number}") for number, group in enumerate(groups.values(), 1)], constant
+class Part(NamedTuple):
+    """A term of a sum that is minimised or maximised.
+
+    Attributes:
+        factor: Its factor.
+        term: The term.
+        place: The line that made it.
+        places: The decimal places to which costs are rounded. None: they are exact.
+    """
+
+    factor: Exact
+    term: Term
+    place: Place
+    places: int | None = None
 
 
-def split(term: Term, place: Place) -> tuple[list[tuple[Exact, Term, Place]], Exact]:
+def costs_of(parts: Iterable[Part], name: str) -> list[Draft]:
+    """Return the costs of a sum: one draft for all terms over the same variables that are rounded alike."""
+    groups: dict[tuple[frozenset[str], int | None], list[Part]] = {}
+    for part in parts:
+        key = frozenset(one.name for one in part.term.variables), part.places
+        groups.setdefault(key, []).append(part)
+    return [_sum(group, f"{name}{number}") for number, group in enumerate(groups.values(), 1)]
+
+
+def split(term: Term, place: Place, places: int | None = None) -> tuple[list[Part], Exact]:
     """Return the terms of a sum with their factors, and its constant."""
     if isinstance(term, Linear):
-        return [(factor, one, place) for factor, one in term.parts], term.constant
-    return [(1, term, place)], 0
+        return [Part(factor, one, place, places) for factor, one in term.parts], rounded(term.constant, places)
+    return [Part(1, term, place, places)], 0
 
 
-def _constant(term: Term, place: Place) -> Exact:
-    try:
-        return exact(term.value({}))
-    except UndefinedTermError:
-        raise ModelError(f"{term!r} has no value: a division by zero", "", place) from None
-
-
-def _sum(group: Sequence[tuple[Exact, Term, Place]], name: str) -> Draft:
-    parts = [(factor, term) for factor, term, _ in group]
-    place = group[0][2]
-    whole = Linear(tuple(parts))
-    scope = whole.variables
+def _sum(group: Sequence[Part], name: str) -> Draft:
+    place, places = group[0].place, group[0].places
+    whole = Linear(tuple((part.factor, part.term) for part in group))
+    parts, scope = whole.parts, whole.variables
     if len(parts) == 1:
         factor, table = parts[0]
         if isinstance(table, Tabled) and (rows := listed_rows(table)) is not None:
-            priced = {row: _scaled(value, factor) for row, value in rows.items()}
-            return _table(name, scope, place, priced, _scaled(table.default, factor))
+            priced = {row: _scaled(value, factor, places) for row, value in rows.items()}
+            return _table(name, scope, place, priced, _scaled(table.default, factor, places))
     try:
         scaled = Translator(_formals(scope)).whole_number(whole)
     except UntranslatableError:
         scaled = None
     if scaled is not None and scaled.divisor == 1:
         return Draft(name, scope, place, scaled.expression, is_cost=True)
-    found = prices(parts, scope, place)
+    found = {row: _scaled(price, 1, places) for row, price in prices(parts, scope, place).items()}
     _check_digits(found, whole, place)
     return _table(name, scope, place, found, commonest(found))
 
@@ -151,8 +158,8 @@ def _table(name: str, scope: tuple[Variable, ...], place: Place, rows: Mapping[R
     return Draft(name, scope, place, rows=listed, semantics=Semantics.SOFT, default=default)
 
 
-def _scaled(value: object, factor: Exact) -> Price:
-    return math.inf if isinstance(value, float) and math.isinf(value) else exact(exact(value) * factor)
+def _scaled(value: object, factor: Exact, places: int | None) -> Price:
+    return math.inf if is_infinite(value) else rounded(exact(exact(value) * factor), places)
 
 
 def _condition(term: Term, name: str, place: Place) -> Draft | None:

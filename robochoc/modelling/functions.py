@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from robochoc.modelling.codes import NUMBER, kind_of
-from robochoc.modelling.numbers import exact, is_number
+from robochoc.modelling.numbers import exact, is_infinite, is_number
 from robochoc.modelling.places import ModelError, ModelTypeError, here
 from robochoc.modelling.tabulated import Called, Tabled
 from robochoc.modelling.terms import Applied, Term, Variable, all_of, condition, number, term_of
@@ -44,7 +44,7 @@ def if_then_else(test: object, then: object, otherwise: object) -> Term:
     return Applied("if", condition(test), number(then), number(otherwise))
 
 
-def element(array: Iterable[object], index: Term) -> Term:
+def element(array: Iterable[object], index: object) -> Term:
     """Return the number at `index` in `array`, whose elements are numbers or terms. The first has the index 0.
 
     A constraint in which the index is outside of the array is violated. There are no negative indices.
@@ -56,7 +56,7 @@ def element(array: Iterable[object], index: Term) -> Term:
 
 
 def cumulative(
-    starts: Sequence[Term], durations: Sequence[object], demands: Sequence[object], capacity: object
+    starts: Sequence[object], durations: Sequence[object], demands: Sequence[object], capacity: object
 ) -> Term:
     """Return the condition that tasks never need more of a resource at a time than there is.
 
@@ -183,8 +183,8 @@ def _check_value(term: Term, value: object) -> None:
 
 
 def _is_cost(value: object) -> bool:
-    return is_number(value) and not (isinstance(value, float) and math.isnan(value))
+    return is_number(value) and value == value  # noqa: PLR0124 - a number
 
 
 def _cost(value: object) -> object:
-    return value if isinstance(value, float) and math.isinf(value) else exact(value)
+    return math.inf if is_infinite(value) else exact(value)

@@ -109,3 +109,6 @@ MEANINGS: dict[str, Meaning] = {
     "different": Meaning(BOOLEAN, lambda *terms: len(set(map(_key, terms))) == len(terms), "all_different"),
     "element": Meaning(NUMBER, _element, "element"),
 }
+
+PARTIAL = frozenset(("floordiv", "mod", "pow", "element"))
+"""The operators that may have no value, however their arguments are."""

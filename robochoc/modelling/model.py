@@ -28,16 +28,16 @@ from robochoc.model.problem import Team
 from robochoc.model.wording import counted
 from robochoc.modelling.building import built, saved_order
 from robochoc.modelling.codes import Symbols
-from robochoc.modelling.drafts import split
+from robochoc.modelling.drafts import Part, split
 from robochoc.modelling.events import Event
 from robochoc.modelling.given import Given, given_by, given_variable
-from robochoc.modelling.numbers import Exact
-from robochoc.modelling.places import ModelError, Place, UnknownNameError, here
+from robochoc.modelling.numbers import Exact, check_places, whole_number
+from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.rules import Rule, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
-from robochoc.modelling.terms import Term, Variable, all_of, number
+from robochoc.modelling.terms import Variable, all_of, number
 from robochoc.system.suggestions import did_you_mean
 
 
@@ -58,7 +58,7 @@ class Model(Solvable):
         self.constraints: list[Rule] = []
         self.symbols = Symbols()
         self.events: list[Event] = []
-        self.objective: list[tuple[Exact, Term, Place]] = []
+        self.objective: list[Part] = []
         self.constant: Exact = 0
         self.maximized: bool | None = None
         self.given: Given | None = None
@@ -140,22 +140,27 @@ class Model(Solvable):
         self.add(constraints)
         return self
 
-    def minimize(self, costs: object) -> None:
+    def minimize(self, costs: object, *, places: int | None = None) -> None:
         """Minimise a sum of terms: robots pay for the terms over their variables.
 
         Terms over the same variables become one cost. Said again, the sums add up. Integers, `Decimal` and `Fraction`
         count exactly; a float counts as it is written, 0.1 as one tenth.
 
+        Args:
+            costs: The sum.
+            places: The decimal places to which each cost is rounded, 0 to 9: for distances and other real numbers.
+                None: costs are exact, and one with more than 9 places is refused.
+
         Raises:
             ModelError: if it is no number, or another sum of the model is maximised.
         """
-        self._optimize(costs, maximize=False)
+        self._optimize(costs, places, maximize=False)
 
-    def maximize(self, utilities: object) -> None:
+    def maximize(self, utilities: object, *, places: int | None = None) -> None:
         """Maximise a sum of terms. See `minimize`; costs of soft constraints count against it."""
-        self._optimize(utilities, maximize=True)
+        self._optimize(utilities, places, maximize=True)
 
-    def _optimize(self, given: object, *, maximize: bool) -> None:
+    def _optimize(self, given: object, places: int | None, *, maximize: bool) -> None:
         place = here()
         if self.maximized not in {None, maximize}:
             words = ("minimised", "maximised")
@@ -165,7 +170,7 @@ class Model(Solvable):
             )
         term = number(given)
         check_owned(term, self.variables, place)
-        parts, constant = split(term, place)
+        parts, constant = split(term, place, check_places(places))
         self.objective += parts
         self.constant += constant
         self.maximized = maximize
@@ -196,7 +201,10 @@ class Model(Solvable):
 
     def after_messages(self, count: int) -> Event:
         """Add an event: what changes after so many messages, or once the problem before it is solved."""
-        return self._event(count)
+        whole = whole_number(count)
+        if whole is None or whole < 0:
+            raise ModelTypeError(f"{count!r} is not a number of messages", "expected an integer, 0 or more")
+        return self._event(whole)
 
     def _event(self, after: int | None) -> Event:
         self.events.append(Event(self, after, here()))

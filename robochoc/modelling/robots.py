@@ -9,6 +9,7 @@ from robochoc.formats.names import MAX_NAME, MAX_WEIGHT, RESERVED, is_name
 from robochoc.model.expression import Expression
 from robochoc.model.problem import Topic
 from robochoc.modelling.codes import codes_of
+from robochoc.modelling.numbers import whole_number
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.rules import Rule
 from robochoc.modelling.terms import Variable, number
@@ -31,7 +32,7 @@ class ModelRobot:
     """
 
     def __init__(self, model: Model, name: str, priority: float, weight: int, place: Place) -> None:
-        self.name, self.priority, self.weight, self.place = name, priority, weight, place
+        self.name, self.priority, self.weight, self.place = name, priority, int(weight), place
         self.variables: dict[str, Variable] = {}
         self.joins: object = None
         self.topics: list[Topic] = []
@@ -102,7 +103,9 @@ class ModelRobot:
             )
             if list(owners) == [self.name]:
                 hint = "add it by Model.add: what is over variables of one robot, no other robot learns"
-            raise ModelError(f"the part that {self.name} knows is over variables of {' and '.join(owners)}", hint)
+            raise ModelError(
+                f"the part that {self.name} knows is over variables of {' and '.join(owners) or 'no robot'}", hint
+            )
         self.parts.append(rule)
         self._model.changed()
         return rule
@@ -153,6 +156,6 @@ def check_robot(name: object, robots: Mapping[str, ModelRobot], weight: object) 
         raise ModelError(f"{name!r} cannot be a robot's name", "a letter, then letters, digits, '.' and '_'")
     if name in robots:
         raise ModelError(f"there is a robot {name} already, made at {robots[name].place}", "give it another name")
-    if not isinstance(weight, int) or not 1 <= weight <= MAX_WEIGHT:
+    if not 1 <= (whole_number(weight) or 0) <= MAX_WEIGHT:
         raise ModelTypeError(f"{weight!r} is no weight", f"expected an integer from 1 to {MAX_WEIGHT:,}")
     return name

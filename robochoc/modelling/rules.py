@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.numbers import Exact, exact, shown
+from robochoc.modelling.numbers import Exact, exact, is_truth, shown
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
 from robochoc.modelling.terms import Term, Variable, condition
 
@@ -48,27 +47,17 @@ def conditions_in(given: object, place: Place) -> list[Term]:
     """Return the conditions that a user adds at once: one, or a list of them, which may hold lists.
 
     Raises:
-        ModelError: if one is no condition, or false whatever the values.
+        ModelError: if one is no condition, or is Python's `False`, as `x is y` is.
     """
     if isinstance(given, Iterable) and not isinstance(given, (Term, str)):
         return [term for one in given for term in conditions_in(one, place)]
-    if not isinstance(given, (Term, bool)):
+    if isinstance(given, Term):
+        return [condition(given)]
+    if not is_truth(given):
         raise ModelTypeError(f"{given!r} is no condition", "compare terms: x != y", place)
-    term = condition(given)
-    if term.variables:
-        return [term]
-    check_constant(term, place)
-    return []
-
-
-def check_constant(term: Term, place: Place) -> None:
-    """Raise `ModelError` for a condition that depends on nothing and is false."""
-    try:
-        holds = bool(term.value({}))
-    except UndefinedTermError:
-        holds = False
-    if not holds:
+    if not given:
         raise ModelError("this constraint is False whatever the values are", "compare variables of the model", place)
+    return []
 
 
 def check_owned(term: Term, known: dict[str, Variable], place: Place, event: object = None) -> None:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.numbers import Exact, exact, is_number
+from robochoc.modelling.numbers import Exact, exact, is_infinite, is_number, is_truth
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
 from robochoc.modelling.tabulated import Tabled
 from robochoc.modelling.terms import Term, Variable
@@ -85,14 +85,14 @@ def in_short(term: Term) -> str:
 
 
 def _truth(value: object, term: Term, place: Place) -> bool:
-    if isinstance(value, bool) or type(value).__name__ == "bool":  # numpy's
+    if is_truth(value):
         return bool(value)
     raise ModelTypeError(f"{term!r} gives {value!r}, no truth value", "let it return True or False", place)
 
 
 def _price(term: Term, values: Mapping[Variable, object], place: Place) -> Price:
     value = term.value(values)
-    if isinstance(value, float) and math.isinf(value):
+    if is_infinite(value):
         return math.inf
     if not is_number(value) or value != value:  # noqa: PLR0124 - not a number
         raise ModelTypeError(f"{term!r} gives {value!r}, no number", "let it return a number", place)

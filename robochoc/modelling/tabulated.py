@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from robochoc.modelling.codes import BOOLEAN, NUMBER
 from robochoc.modelling.extents import extent_of
 from robochoc.modelling.meanings import UndefinedTermError
+from robochoc.modelling.numbers import is_truth
 from robochoc.modelling.places import ModelError, Place
 from robochoc.modelling.terms import Term, Values
 
@@ -15,6 +16,7 @@ class Called(Term):
     """A function of the user's, of terms. What it returns says whether it is a condition or a number."""
 
     kind = None
+    is_partial = True
 
     def __init__(self, function: Callable[..., object], arguments: tuple[Term, ...], place: Place) -> None:
         self.function, self.arguments, self.place = function, arguments, place
@@ -41,7 +43,7 @@ class Tabled(Term):
 
     def __init__(self, arguments: tuple[Term, ...], rows: Mapping[tuple[object, ...], object], default: object) -> None:
         self.arguments, self.rows, self.default = arguments, rows, default
-        self.kind = BOOLEAN if isinstance(default, bool) else NUMBER
+        self.kind = BOOLEAN if is_truth(default) else NUMBER
         self.extent = extent_of(arguments)
 
     def value(self, values: Values) -> object:

@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from robochoc.modelling.codes import BOOLEAN, NUMBER, Codes, Kind, kind_of
 from robochoc.modelling.extents import ALONE, Extent, extent_of
-from robochoc.modelling.meanings import MEANINGS
+from robochoc.modelling.meanings import MEANINGS, PARTIAL
 from robochoc.modelling.numbers import Exact, exact, is_number, shown
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
 from robochoc.system.suggestions import did_you_mean
@@ -30,6 +30,8 @@ class Term:
     `& | ~ ^` and `implies`; where a number is expected they count as 0 or 1.
     """
 
+    __array_priority__ = -1.0
+    """NumPy's scalars (-1000000) leave operators to a term, its arrays (0) do not."""
     kind: Kind | None = NUMBER
     """What it is. None: only its values say."""
     arguments: tuple[Term, ...] = ()
@@ -39,6 +41,11 @@ class Term:
     def variables(self) -> tuple[Variable, ...]:
         """The distinct variables, in the order in which they appear."""
         return tuple(dict.fromkeys(_leaves(self)))
+
+    @cached_property
+    def is_partial(self) -> bool:
+        """Whether the term may have no value: it divides, has a power or an element, or calls a function."""
+        return any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
         """Return the term's value. Raises `UndefinedTermError` where it has none: a division by zero."""
@@ -227,11 +234,11 @@ class Linear(Term):
 
     @cached_property
     def parts(self) -> tuple[tuple[Exact, Term], ...]:
-        """The factor of each distinct term."""
+        """The factor of each distinct term; a factor of 0 only with terms that may have no value, as the sum then."""
         merged: dict[Term, Exact] = {}
         for factor, term in self.pairs:
             merged[term] = merged.get(term, 0) + factor
-        return tuple((factor, term) for term, factor in merged.items() if factor)
+        return tuple((factor, term) for term, factor in merged.items() if factor or term.is_partial)
 
     @property
     def extent(self) -> Extent:  # type: ignore[override] # a sum grows; it is asked for once
@@ -262,6 +269,11 @@ class Applied(Term):
         self.operator, self.arguments = operator, arguments
         self.kind = MEANINGS[operator].gives
         self.extent = extent_of(arguments)
+
+    @cached_property
+    def is_partial(self) -> bool:
+        """Whether it may have no value."""
+        return self.operator in PARTIAL or any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
         """Return its value."""

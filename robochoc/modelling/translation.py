@@ -125,7 +125,8 @@ class Translator:
         factors = [Fraction(factor) / number.divisor for factor, number in parts]
         divisor = math.lcm(constant.denominator, *(factor.denominator for factor in factors))
         whole = [int(factor * divisor) for factor in factors]
-        terms = [(factor, number.expression) for factor, (_, number) in zip(whole, parts, strict=True) if factor]
+        numbers = [(factor, number.expression) for factor, (_, number) in zip(whole, parts, strict=True)]
+        terms = [(factor, one) for factor, one in numbers if factor or may_be_undefined(one)]
         rest = int(constant * divisor)
         if not terms:
             return Scaled(Integer(rest), divisor)

@@ -118,7 +118,7 @@ def _drawn(chance: Random, integers: Callable[[Random], list[int]]) -> RandomPro
     sayer = _Sayer(chance, numbers, colors, switches)
     for _ in range(chance.randint(0, 2)):
         said = sayer.condition(2)
-        if isinstance(said.term, Term) and said.term.variables:
+        if isinstance(said.term, Term):
             model.add(said.term)
             problem.hard.append(said.means)
     if len(numbers) > 2 and chance.random() < 0.3:
@@ -133,7 +133,7 @@ def _add_costs(problem: RandomProblem, sayer: _Sayer, chance: Random) -> None:
     problem.maximized = chance.random() < 0.4
     parts: list[tuple[Number, Said]] = []
     for _ in range(chance.randint(1, 5)):
-        said, factor = sayer.number(2), chance.choice((1, 1, -1, 2, Decimal("0.25"), 0.1, Fraction(-3, 2), -7))
+        said, factor = sayer.number(2), chance.choice((1, 1, -1, 2, 0, Decimal("0.25"), 0.1, Fraction(-3, 2), -7))
         parts.append((factor, said))
     whole = sum(factor * said.term for factor, said in parts if isinstance(said.term, Term))
     if isinstance(whole, Term):
@@ -142,7 +142,7 @@ def _add_costs(problem: RandomProblem, sayer: _Sayer, chance: Random) -> None:
         problem.costs.append(lambda _: 3)
     if chance.random() < 0.5:
         said, cost = sayer.condition(2), chance.choice((1, Decimal("2.5"), -1, 4))
-        if isinstance(said.term, Term) and said.term.variables:
+        if isinstance(said.term, Term):
             problem.model.add(said.term, cost=cost)
             sign = -1 if problem.maximized and isinstance(whole, Term) else 1
             problem.maximized = problem.maximized and isinstance(whole, Term)
