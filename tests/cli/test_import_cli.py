@@ -370,6 +370,19 @@ def test_export_in_every_format(kind: str, four: Path) -> None:
     assert "V1.1" in done.stdout or kind == "wcsp"
 
 
+def test_export_reports_what_a_file_says_otherwise(problem: Path, four: Path, tmp_path: Path) -> None:
+    out = tmp_path / "team.xml"
+    done = robochoc_within("export", problem, "--format", "frodo", "-o", out)
+    assert "\n  scale: costs are integers, in units of 0.1:" in done.stdout
+    printed = robochoc_within("export", problem, "--format", "frodo")
+    assert printed.stdout == out.read_text()
+    assert "  scale: costs are integers, in units of 0.1:" in printed.stderr
+    kept = robochoc_within("export", four, "--format", "frodo", "--intension", "-o", out)
+    assert "constraints in intension, which only FRODO's JaCoP parser reads" in kept.stdout
+    wrong = robochoc_within("export", four, "--format", "cfn", "--intension")
+    assert (wrong.returncode, "--intension requires --format frodo" in wrong.stderr) == (2, True)
+
+
 def test_export_goes_to_a_file(problem: Path, tmp_path: Path) -> None:
     out = tmp_path / "team.dot"
     done = robochoc_within("export", problem, "--format", "dot", "-o", out)

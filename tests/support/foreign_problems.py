@@ -96,14 +96,17 @@ _TESTS: Sequence[tuple[str, Callable[..., bool]]] = (
 )
 
 
-def random_problem(chance: Random, *, plain: bool = False, parts: bool = True) -> tuple[Tables, Team]:
+def random_problem(
+    chance: Random, *, plain: bool = False, parts: bool = True, simple: bool = False
+) -> tuple[Tables, Team]:
     """A problem of 2 to 4 robots, as tables and as a team.
 
     `plain`: costs are integers of 0 or more that are minimised. `parts`: some constraints are partially known.
+    `simple`: each robot has one variable, and each constraint at most two.
     """
     places = 0 if plain else chance.choice((0, 0, 1, 3))
     maximize = not plain and chance.random() < 0.5
-    sizes = [chance.choice((1, 1, 2)) for _ in range(chance.randint(2, 4))]
+    sizes = [1 if simple else chance.choice((1, 1, 2)) for _ in range(chance.randint(2, 4))]
     owned = {f"a{robot}": [f"v{robot}.{place}" for place in range(size)] for robot, size in enumerate(sizes)}
     names = [name for own in owned.values() for name in own]
     values = {name: _random_values(chance) for name in names}
@@ -113,7 +116,7 @@ def random_problem(chance: Random, *, plain: bool = False, parts: bool = True) -
     constraints: list[Constraint] = []
     held: dict[str, list[Constraint]] = {}
     for number in range(chance.randint(2, 6)):
-        scope = tuple(chance.sample(names, min(len(names), chance.choice((1, 2, 2, 2, 3)))))
+        scope = tuple(chance.sample(names, min(len(names), chance.choice((1, 2, 2, 2, 2 if simple else 3)))))
         table, constraint = _random_constraint(chance, f"c{number}", scope, values, places, plain=plain)
         problem.factors.append((scope, table))
         if parts and len(scope) == 2 and owner[scope[0]] != owner[scope[1]] and chance.random() < 0.3:

@@ -3,6 +3,8 @@
 - ROBOCHOC_FRODO: a Java class path with FRODO's classes, libraries and agent descriptions.
 - ROBOCHOC_TOULBAR2: commands that are given a file, one or several separated by `;`. Otherwise `toulbar2` on the PATH.
 - ROBOCHOC_PYDCOP: the folder of pyDCOP's scripts.
+- ROBOCHOC_DCOPSOLVER: a command that is given a file, runs DPOP of DCOPSolver on it, and prints `COST` and the cost.
+  DCOPSolver has no command line of its own.
 - cosoco on the PATH; ACE comes with pycsp3.
 
 A cost of None: the program found out that there is no solution.
@@ -44,6 +46,8 @@ def solvers() -> Mapping[str, Mapping[str, Solver]]:
             found.setdefault(kind, {})[command] = partial(_toulbar2, shlex.split(command))
     if folder := os.environ.get("ROBOCHOC_PYDCOP"):
         found["pydcop"] = {"pyDCOP": partial(_pydcop, Path(folder))}
+    if driver := os.environ.get("ROBOCHOC_DCOPSOLVER"):
+        found["dcopsolver"] = {"DCOPSolver": partial(_dcopsolver, shlex.split(driver))}
     return found
 
 
@@ -94,3 +98,9 @@ def _pydcop(folder: Path, path: Path) -> Answer:
     cost = Fraction(str(round(result["cost"], 9)))
     infinity = re.search(r"^infinity: (\d+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
     return None if infinity and abs(cost) >= int(infinity[1]) / 2 else cost
+
+
+def _dcopsolver(command: list[str], path: Path) -> Answer:
+    cost = Fraction(_found(r"^COST (\d+)$", _run(*command, str(path))))
+    bound = int(_found(r'maximalCost="(\d+)"', path.read_text(encoding="utf-8")))
+    return None if cost >= bound else cost

@@ -28,16 +28,19 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
     """Write the problem of the team in the folder TEAM for other tools, all files merged.
 
     \b
-    xcsp3    one XCSP3-core file (tables, allDifferent; for a DisWCSP, a sum
-             of costs to minimise), for ACE, Choco and others
-    frodo    FRODO's XCSP 2.1 (relations; costs are integers)
-    xdiscsp  XDisCSP 1.0, for DisChoco and DCOPSolver
-    pydcop   pyDCOP's YAML
-    cfn      a cost function network, for toulbar2; wcsp: its older format
-    dot      the constraint graph over a pseudo-tree, for Graphviz
-    graphml  the constraint graph of the variables, for Gephi and networkx
+    xcsp3       one XCSP3-core file (tables, allDifferent; for a DisWCSP, a
+                sum of costs to minimise), for ACE, Choco and others
+    frodo       FRODO's XCSP 2.1 (relations, integer costs)
+    xdiscsp     XDisCSP 1.0, for DisChoco
+    dcopsolver  the part of XDisCSP 1.0 that DCOPSolver reads
+    pydcop      pyDCOP's YAML, a distribution file as well
+    cfn         a cost function network, for toulbar2
+    wcsp        toulbar2's older format
+    dot         the constraint graph over a pseudo-tree, for Graphviz
+    graphml     the constraint graph of the variables, for Gephi and networkx
 
-    TEAM may also be a problem in a file of another tool. What a format cannot say is refused by name.
+    TEAM may also be a problem in a file of another tool. A team that a
+    format cannot express is refused.
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.system.files import write_atomically
 

@@ -17,7 +17,7 @@ _Command = TypeVar("_Command", bound=Callable[..., object])
 
 READ = ("frodo", "xdiscsp", "pydcop", "tasks", "xcsp3", "cfn", "wcsp")
 """The dialects that are imported."""
-WRITTEN = ("xcsp3", "frodo", "xdiscsp", "pydcop", "cfn", "wcsp", "dot", "graphml")
+WRITTEN = ("xcsp3", "frodo", "xdiscsp", "dcopsolver", "pydcop", "cfn", "wcsp", "dot", "graphml")
 """The formats that are exported."""
 
 

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -41,10 +41,12 @@ class Exported:
     """The costs of some variables.
 
     Attributes:
+        name: The name of the constraint.
         scope: The variables.
-        table: The costs of tuples of their values.
+        table: The costs of tuples of their values, the same object for constraints that differ only in variables.
     """
 
+    name: str
     scope: tuple[str, ...]
     table: CostTable
 
@@ -83,7 +85,7 @@ class Tabulator:
                 self._known[key] = _listed(definition, pattern, domains, places, size)
             else:
                 self._known[key] = _evaluated(_price(definition, constraint.cost, places), pattern, domains, size)
-        return Exported(scope, replace(self._known[key], name=name or constraint.name))
+        return Exported(name or constraint.name, scope, self._known[key])
 
 
 def exported(team: Team) -> tuple[list[Exported], Fraction]:
@@ -118,6 +120,12 @@ def constant_of(team: Team) -> Fraction:
     return sum((Fraction(one.costs.constant, 10**one.costs.places) for one in team.robots), Fraction(0))
 
 
+def constant_table(team: Team, constant: Fraction) -> Exported:
+    """Return a constant cost as the cost of all values of the first variable."""
+    variable = next(iter(team.variables.values()))
+    return Exported(CONSTANT, (variable.name,), CostTable(CONSTANT, {}, constant, len(variable.domain)))
+
+
 def too_large(team: Team, constraint: Constraint) -> str:
     """Return the error text for a constraint that is too large for a table."""
     size = math.prod(len(team.variables[name].domain) for name in constraint.variables)
@@ -132,14 +140,23 @@ def maximises(team: Team) -> bool:
 
 def magnitude(tables: Sequence[Exported], constant: Fraction) -> int:
     """Return an integer that no sum of finite costs reaches, nor its negative."""
-    most = abs(constant)
-    for one in tables:
-        most += max((abs(Fraction(cost)) for cost in one.table.amounts() if cost != INFINITE), default=Fraction(0))
-    return math.floor(most) + 1
+    distinct = {id(one.table): one.table for one in tables}
+    most = {
+        key: max((abs(Fraction(cost)) for cost in table.amounts() if cost != INFINITE), default=Fraction(0))
+        for key, table in distinct.items()
+    }
+    return math.floor(sum((most[id(one.table)] for one in tables), abs(constant))) + 1
+
+
+def amounts(tables: Sequence[Exported]) -> set[Amount]:
+    """Return the costs that occur in tables."""
+    return set().union(*(table.amounts() for table in {id(one.table): one.table for one in tables}.values()))
 
 
 def decimal(amount: Amount, places: int | None = None) -> str:
     """Return a finite cost as a decimal without an exponent; with `places`, with so many of them."""
+    if isinstance(amount, int) and not places:
+        return str(amount)
     whole = Fraction(amount)
     width = places or 0
     while places is None and (whole * 10**width).denominator != 1:
@@ -192,4 +209,6 @@ def _listed(relation: Relation, pattern: _Pattern, domains: Sequence[Domain], pl
 
 
 def _amount(cost: float, places: int) -> Amount:
-    return INFINITE if cost == INFINITE else Fraction(int(cost), 10**places)
+    if cost == INFINITE:
+        return INFINITE
+    return Fraction(int(cost), 10**places) if places else int(cost)

@@ -15,7 +15,7 @@ from pathlib import Path
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, Imported, ImportOptions
 
-NAMES = ("frodo", "xdiscsp", "tasks", "pydcop", "xcsp3", "cfn", "wcsp", "dot", "graphml")
+NAMES = ("frodo", "xdiscsp", "dcopsolver", "tasks", "pydcop", "xcsp3", "cfn", "wcsp", "dot", "graphml")
 """The names of all dialects, in the order in which they are asked whether a file is in them."""
 
 _BEGINNING = 64 * 1024

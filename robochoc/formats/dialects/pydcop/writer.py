@@ -15,8 +15,16 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
 from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
-from robochoc.formats.dialects.exported import CONSTANT, Exported, decimal, exported, magnitude, maximises
-from robochoc.formats.dialects.tables import Amount, CostTable
+from robochoc.formats.dialects.exported import (
+    Exported,
+    amounts,
+    constant_table,
+    decimal,
+    exported,
+    magnitude,
+    maximises,
+)
+from robochoc.formats.dialects.tables import Amount
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import RemoveAgent, Team
 from robochoc.solver.encoding import UnsupportedError
@@ -50,7 +58,7 @@ def _problem(team: Team) -> Iterator[str]:
     tables, constant = exported(team)
     maximize = maximises(team)
     infinity = max(LEAST_INFINITY, 10 * magnitude(tables, constant))
-    forbids = any(INFINITE in one.table.amounts() for one in tables)
+    forbids = INFINITE in amounts(tables)
     yield f"name: {_quoted(team.name)}"
     yield f"objective: {'max' if maximize else 'min'}"
     if forbids:
@@ -63,8 +71,7 @@ def _problem(team: Team) -> Iterator[str]:
     for name in team.variables:
         yield f"  {_quoted(name)}: {{domain: {_quoted(f'd_{name}')}}}"
     if constant:
-        first = next(iter(team.variables))
-        tables.append(Exported((first,), CostTable(CONSTANT, {}, constant, len(team.variables[first].domain))))
+        tables.append(constant_table(team, constant))
     forbidding = str(-infinity if maximize else infinity)
     yield "constraints:" if tables else "constraints: {}"
     for one in tables:
@@ -92,7 +99,7 @@ def _constraint(one: Exported, team: Team, forbidding: str) -> Iterator[str]:
     for values, cost in one.table.rows.items():
         words = [str(domain.label(value)) for domain, value in zip(domains, values, strict=True)]
         by_cost[_cost(cost, forbidding)].append(" ".join(words))
-    yield f"  {_quoted(one.table.name)}:"
+    yield f"  {_quoted(one.name)}:"
     yield "    type: extensional"
     yield f"    variables: {_list(one.scope)}"
     if len(one.table.rows) < one.table.size:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from robochoc.formats.dialects.dialect import ExportOptions, Written
-from robochoc.formats.dialects.exported import Exported, decimal, exported, magnitude, maximises
+from robochoc.formats.dialects.exported import Exported, amounts, decimal, exported, magnitude, maximises
 from robochoc.formats.dialects.tables import Amount, Scale
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import Team
@@ -36,8 +36,8 @@ def wcsp(team: Team, options: ExportOptions) -> Written:
     """
     del options
     tables, constant = _network(team)
-    amounts = [constant, *[amount for one in tables for amount in one.table.amounts()]]
-    if maximises(team) or any(amount < 0 or (amount != INFINITE and Fraction(amount) % 1) for amount in amounts):
+    costs = {constant, *amounts(tables)}
+    if maximises(team) or any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in costs):
         raise UnsupportedError("a wcsp has integer costs of 0 or more that are minimised; a cfn can say this one")
     return Written({f"{team.name}.wcsp": ("\n".join(_wcsp(team, tables, constant)) + "\n").encode()})
 
@@ -49,7 +49,7 @@ def _network(team: Team) -> tuple[list[Exported], Fraction]:
 
 
 def _cfn(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str]:
-    places = Scale([constant, *[amount for one in tables for amount in one.table.amounts()]]).places
+    places = Scale([constant, *amounts(tables)]).places
     bound = magnitude(tables, constant)
     sign = -1 if maximises(team) else 1
     mustbe = f"{'>' if sign < 0 else '<'}{decimal(sign * bound, places)}"

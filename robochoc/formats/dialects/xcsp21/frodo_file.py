@@ -14,8 +14,8 @@ from fractions import Fraction
 from lxml import etree
 
 from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
-from robochoc.formats.dialects.exported import CONSTANT, Exported, Held, decimal, magnitude
-from robochoc.formats.dialects.tables import Amount, CostTable, Scale
+from robochoc.formats.dialects.exported import Exported, Held, amounts, constant_table, decimal, magnitude
+from robochoc.formats.dialects.tables import Amount, Scale
 from robochoc.formats.dialects.xcsp21.document import Document, cost_text
 from robochoc.formats.dialects.xcsp21.flat import FlatTeam, plain
 from robochoc.formats.dialects.xcsp21.instance import UNIT
@@ -57,11 +57,8 @@ class _Writer:
         self._contents = [(intension and self._in_intension(one)) or flat.table(one) for one in flat.held]
         tables = [content for content in self._contents if isinstance(content, Exported)]
         if flat.constant:
-            first = next(iter(flat.team.variables))
-            size = len(flat.team.variables[first].domain)
-            self._constant = Exported((first,), CostTable(CONSTANT, {}, flat.constant, size))
-            tables.append(self._constant)
-        self._places = Scale([amount for one in tables for amount in one.table.amounts()]).places
+            tables.append(constant_table(flat.team, flat.constant))
+        self._places = Scale(amounts(tables)).places
         self._check_sizes(magnitude(tables, Fraction(0)) * 10**self._places)
         self._forbidden = "-infinity" if flat.maximize else "infinity"
         presentation = {
@@ -71,6 +68,7 @@ class _Writer:
             "format": FORMAT,
         }
         self._document = Document(flat, presentation)
+        self._references: dict[int, str] = {}
 
     def content(self) -> bytes:
         flat, document = self._flat, self._document
@@ -87,7 +85,7 @@ class _Writer:
             else:
                 self._add_formula(one, content)
         if flat.constant:
-            self._add(self._constant)
+            self._add(constant_table(flat.team, flat.constant))
         return document.content()
 
     def notes(self) -> Iterator[Note]:
@@ -152,16 +150,21 @@ class _Writer:
 
     def _add(self, table: Exported) -> None:
         """Write a soft relation, the only kind that all of FRODO reads."""
+        key = id(table.table)
+        if key not in self._references:
+            self._references[key] = self._relation(table)
+        self._document.constraint(table.name, table.scope, self._references[key])
+
+    def _relation(self, table: Exported) -> str:
         by_cost: dict[Amount, list[str]] = {}
         for values, cost in table.table.rows.items():
             by_cost.setdefault(cost, []).append(" ".join(map(str, values)))
         tuples = " | ".join(f"{self._number(cost)}: {' | '.join(listed)}" for cost, listed in by_cost.items())
         attributes = {"semantics": "soft", "defaultCost": self._number(table.table.default)}
-        reference = self._document.relation(table, attributes, tuples)
-        self._document.constraint(table.table.name, table.scope, reference)
+        return self._document.relation(table, attributes, tuples)
 
     def _number(self, cost: Amount) -> str:
-        whole = cost if cost == INFINITE else Fraction(cost) * 10**self._places
+        whole = cost if cost == INFINITE else cost * 10**self._places
         return cost_text(whole, forbidden=self._forbidden)
 
 

@@ -112,7 +112,7 @@ class _Writer:
                 costs[values] = INFINITE
                 words = " ".join(self._cost(cost, " ".join(pair)) for cost in both)
                 written.append(f"{words}:{' '.join(map(str, values))}")
-            table = Exported(pair, CostTable("_".join(pair), costs, INFINITE, len(costs)))
+            table = Exported("_".join(pair), pair, CostTable("_".join(pair), costs, INFINITE, len(costs)))
             attributes = {"semantics": "soft", "defaultCost": "infinity"}
             reference = self._document.relation(table, attributes, "|".join(written))
             self._document.constraint("_".join(pair), pair, reference, model="TKC")

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+import re
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from random import Random
+from typing import Any
+
+import pytest
+from lxml import etree
 
 from robochoc.formats import check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
-from robochoc.model.problem import Team
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.examples import count
 from tests.support.foreign_problems import optimum, random_problem, written
 
@@ -32,6 +41,63 @@ def test_xdiscsp_there_and_back(rounds: int, tmp_path: Path) -> None:
         assert _there_and_back("xdiscsp", team, tmp_path) == problem.optimum() == optimum(team)
 
 
+@count("rounds", 30, 1000)
+def test_dcopsolver_there_and_back(rounds: int, tmp_path: Path) -> None:
+    chance = Random("dcopsolver")
+    for _ in range(rounds):
+        problem, team = random_problem(chance, plain=True, simple=True)
+        assert _there_and_back("dcopsolver", team, tmp_path) == problem.optimum()
+
+
+def test_dcopsolver_has_what_its_parser_requires() -> None:
+    chance = Random("form")
+    for _ in range(20):
+        _, team = random_problem(chance, plain=True, simple=True)
+        (content,) = written("dcopsolver", team).values()
+        root = etree.fromstring(content)
+        sizes = {}
+        for element in root.iterfind("variables/variable"):
+            domain = root.find(f"domains/domain[@name='{element.get('domain')}']")
+            assert domain is not None
+            assert domain.text == f"1..{domain.get('nbValues')}"
+            sizes[element.get("name")] = int(domain.get("nbValues", ""))
+        relations = {one.get("name"): one.text or "" for one in root.iterfind("relations/relation")}
+        pairs = [
+            (one.get("scope", "").split(), one.get("reference")) for one in root.iterfind("constraints/constraint")
+        ]
+        places = list(sizes)
+        assert len({tuple(pair) for pair, _ in pairs}) == len(pairs)
+        for (first, second), name in pairs:
+            assert places.index(first) < places.index(second)
+            tuples = [re.fullmatch(r"\d+:(\d+) (\d+)", one) for one in relations[name].split("|")]
+            assert {(int(one[1]), int(one[2])) for one in tuples if one} == {
+                *itertools.product(range(1, sizes[first] + 1), range(1, sizes[second] + 1))
+            }
+
+
+def test_dcopsolver_refuses_by_name_what_it_has_not() -> None:
+    bit, names = Domain("bit", (range(2),)), ("x", "y", "z")
+    apart: dict[str, list[Variable]] = {name: [Variable(name, bit)] for name in names}
+    together = {"a": [Variable("x", bit), Variable("y", bit)], "b": [Variable("z", bit)]}
+
+    def team(variables: Mapping[str, list[Variable]], scope: tuple[str, ...], cost: int, **units: Any) -> Team:  # noqa: ANN401
+        relation = Relation("r", len(scope), Semantics.SOFT, ((0,) * len(scope),), (cost,), 0)
+        constraint = Constraint("c", relation, scope, scope)
+        return assemble("t", variables, [constraint], kind=ProblemKind.DISWCSP, costs=CostUnits(**units))
+
+    for wrong, message in (
+        (team(together, ("x", "z"), 1), "one variable an agent, and a has 2"),
+        (team(apart, names, 1), "the constraint c has 3 variables"),
+        (team(apart, ("x", "y"), -1), "integer costs of 0 or more"),
+        (team(apart, ("x", "y"), 1, places=1), "integer costs of 0 or more"),
+        (team(apart, ("x", "y"), 1, maximize=True), "no utilities"),
+        (team(apart, ("x", "y"), 2**30), "too large for integers of 32 bits"),
+        (team({"a": [Variable("x", bit)]}, ("x",), 1), "requires two agents"),
+    ):
+        with pytest.raises(UnsupportedError, match=message):
+            written("dcopsolver", wrong)
+
+
 def test_names_of_values_stand_in_a_comment(tmp_path: Path) -> None:
     colours = ("red", "green", "blue--")
     domain = Domain("colours", (range(2),), colours)
@@ -48,7 +114,7 @@ def _there_and_back(name: str, team: Team, folder: Path) -> Fraction | None:
     (content,) = written(name, team).values()
     path = folder / "there.xml"
     path.write_bytes(content)
-    assert recognise(path) is dialect_called(name)
+    assert recognise(path) is dialect_called("xdiscsp" if name == "dcopsolver" else name)
     back = read_foreign([path], ImportOptions())
     check_team(back.team)
     assert back.names == {}

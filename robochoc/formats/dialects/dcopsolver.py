@@ -1,0 +1,184 @@
+"""DCOPSolver's part of XDisCSP 1.0, which other readers of XDisCSP read, too.
+
+Its parser (czy920/DCOPSolverOld) reads one variable an agent, domains from 1 to n, and one relation of two variables
+for each pair of neighbours, in which each tuple has an integer cost. It has no infinity, and its protocols require a
+connected graph. So costs of one variable are added to those of a pair, and forbidden tuples cost more than everything
+else together, as the attribute `maximalCost` of XCSP 2.1 says.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from pathlib import Path
+
+from lxml import etree
+
+from robochoc.formats.dialects import xdiscsp
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Note, Written
+from robochoc.formats.dialects.exported import Exported, amounts, exported, held, magnitude, maximises
+from robochoc.formats.dialects.tables import Amount
+from robochoc.formats.dialects.xcsp21.xdiscsp_file import FORMAT
+from robochoc.model.constraint import INFINITE
+from robochoc.model.problem import Team
+from robochoc.solver.encoding import UnsupportedError
+
+NAME = "dcopsolver"
+TITLE = "DCOPSolver's XDisCSP"
+LIMIT = 2**31 - 1
+"""The integer that DCOPSolver takes for infinity."""
+
+_PAIR = 2
+_Pair = tuple[str, str]
+
+
+def _write(team: Team, options: ExportOptions) -> Written:
+    """Return the file.
+
+    Raises:
+        UnsupportedError: if the team has what DCOPSolver has not.
+    """
+    del options
+    _check(team)
+    tables, constant = exported(team)
+    if any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in {constant, *amounts(tables)}):
+        raise UnsupportedError(f"{TITLE} has integer costs of 0 or more: an XCSP3 file or FRODO's may have others")
+    bound = magnitude(tables, constant)
+    by_pair = _by_pair(team, tables)
+    if bound * len(by_pair) >= LIMIT:
+        raise UnsupportedError(f"{TITLE}: costs of up to {bound:,} are too large for integers of 32 bits")
+    costs = {pair: _costs(team, pair, parts) for pair, parts in by_pair.items()}
+    first = next(iter(costs))
+    costs[first] = {values: cost + int(constant) for values, cost in costs[first].items()}
+    return Written({f"{team.name}.xml": _document(team, costs, bound)}, tuple(_notes(team)))
+
+
+def _check(team: Team) -> None:
+    if team.dynamic:
+        raise UnsupportedError(f"{TITLE} has no problems that change over time: leave scenario.xml out")
+    if maximises(team):
+        raise UnsupportedError(f"{TITLE} has no utilities: costs are minimised")
+    for robot in team.robots:
+        if len(robot.variables) > 1:
+            raise UnsupportedError(f"{TITLE} has one variable an agent, and {robot.name} has {len(robot.variables)}")
+    if len(team.variables) < _PAIR:
+        raise UnsupportedError(f"{TITLE} requires two agents or more")
+
+
+def _by_pair(team: Team, tables: list[Exported]) -> dict[_Pair, list[Exported]]:
+    """Return the tables of each pair of variables in the order of the agents; all variables are connected by pairs."""
+    place = {name: number for number, name in enumerate(team.variables)}
+    pairs: dict[_Pair, list[Exported]] = defaultdict(list)
+    unary = []
+    for one in tables:
+        if len(one.scope) > _PAIR:
+            what = f"the constraint {one.name} has {len(one.scope)} variables"
+            raise UnsupportedError(f"{TITLE} has constraints of two variables, and {what}")
+        if len(one.scope) == _PAIR:
+            first, second = sorted(one.scope, key=place.__getitem__)
+            pairs[first, second].append(one)
+        else:
+            unary.append(one)
+    for pair in _missing_links(team, pairs):
+        pairs[pair] = []
+    for one in unary:
+        pair = next(pair for pair in pairs if one.scope[0] in pair)
+        pairs[pair].append(one)
+    return pairs
+
+
+def _missing_links(team: Team, pairs: Mapping[_Pair, object]) -> Iterator[_Pair]:
+    """Yield pairs of the first variable and one of each part of the graph that is not connected with it."""
+    near: dict[str, list[str]] = defaultdict(list)
+    for one, other in pairs:
+        near[one].append(other)
+        near[other].append(one)
+    first, *others = team.variables
+    seen: set[str] = set()
+    for start in (first, *others):
+        if start in seen:
+            continue
+        if start != first:
+            yield first, start
+        waiting = [start]
+        while waiting:
+            name = waiting.pop()
+            if name not in seen:
+                seen.add(name)
+                waiting += near[name]
+
+
+def _costs(team: Team, pair: _Pair, parts: list[Exported]) -> dict[tuple[int, int], Amount]:
+    found: dict[tuple[int, int], Amount] = {}
+    domains = [team.variables[name].domain for name in pair]
+    for one, other in itertools.product(*(enumerate(domain, 1) for domain in domains)):
+        values = {pair[0]: one[1], pair[1]: other[1]}
+        found[one[0], other[0]] = sum(
+            part.table.rows.get(tuple([values[name] for name in part.scope]), part.table.default) for part in parts
+        )
+    return found
+
+
+def _document(team: Team, costs: Mapping[_Pair, Mapping[tuple[int, int], Amount]], bound: int) -> bytes:
+    root = etree.Element("instance")
+    stated = {
+        "name": team.name,
+        "type": "DCOP",
+        "benchmark": "RandomDCOP",  # the parser requires a name here, and accepts this one for any problem
+        "model": "Simple",
+        "constraintModel": "TKC",
+        "maxConstraintArity": "2",
+        "format": FORMAT,
+    }
+    etree.SubElement(root, "presentation", stated)
+    sections = {name: etree.SubElement(root, name) for name in ("agents", "domains", "variables", "relations")}
+    constraints = etree.SubElement(root, "constraints", initialCost="0", maximalCost=str(bound))
+    for number, robot in enumerate(team.robots, 1):
+        (variable,) = robot.variables
+        etree.SubElement(sections["agents"], "agent", name=robot.name, id=str(number), description=robot.name)
+        size = len(variable.domain)
+        if _is_renamed(team, variable.name):
+            told = ", ".join(
+                f"{place} is {variable.domain.label(value)}" for place, value in enumerate(variable.domain, 1)
+            )
+            sections["domains"].append(etree.Comment(f" {variable.name}: {told} ".replace("--", "- -")))
+        domain = etree.SubElement(sections["domains"], "domain", name=f"D{number}", nbValues=str(size))
+        domain.text = f"1..{size}"
+        stated = {"agent": robot.name, "name": variable.name, "id": "1", "domain": f"D{number}"}
+        etree.SubElement(sections["variables"], "variable", {**stated, "description": variable.name})
+    for number, (pair, table) in enumerate(costs.items()):
+        stated = {"name": f"R{number}", "arity": "2", "nbTuples": str(len(table)), "semantics": "soft"}
+        relation = etree.SubElement(sections["relations"], "relation", {**stated, "defaultCost": "infinity"})
+        relation.text = "|".join(
+            f"{bound if cost == INFINITE else cost}:{one} {other}" for (one, other), cost in table.items()
+        )
+        stated = {"name": f"C{number}", "model": "TKC", "arity": "2", "scope": " ".join(pair)}
+        etree.SubElement(constraints, "constraint", {**stated, "reference": f"R{number}"})
+    for name, section in (*sections.items(), ("constraints", constraints)):
+        section.set(f"nb{name.capitalize()}", str(len(section.findall("*"))))
+    body = etree.tostring(root, pretty_print=True, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
+
+
+def _is_renamed(team: Team, name: str) -> bool:
+    domain = team.variables[name].domain
+    return bool(domain.symbols) or list(domain) != [*range(1, len(domain) + 1)]
+
+
+def _notes(team: Team) -> Iterator[Note]:
+    if renamed := [name for name in team.variables if _is_renamed(team, name)]:
+        text = f"the values of {len(renamed)} variables are numbered from 1 on; comments in the file name them"
+        yield Note("values", text)
+    if any(one.private_part for one in held(team)):
+        yield Note("known to more", "both agents of a constraint know it: DCOPSolver has no partially known (PKC) ones")
+
+
+def _recognises(path: Path, beginning: bytes) -> bool:
+    """Return False: such a file is recognised as XDisCSP."""
+    del path, beginning
+    return False
+
+
+DIALECT = Dialect(NAME, TITLE, _recognises, xdiscsp.DIALECT.read, _write)
