@@ -21,7 +21,16 @@ from robochoc.formats.rules import (
 )
 from robochoc.formats.symbols import check_kinds
 from robochoc.formats.xml import attribute, line
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, CostUnits, Definition, ProblemKind, Term
+from robochoc.model.problem import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    CostUnits,
+    Definition,
+    ProblemKind,
+    Term,
+    WhenAbsent,
+)
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,17 @@ def _read(element: etree._Element, context: Context, model: ConstraintModel | No
         return None
     cost = attribute(element, "cost")
     price = read_cost(cost, context.units) if cost else INFINITE
-    constraint = Constraint(attribute(element, "name"), definition, scope, parameters, model, price, line(element))
+    when_absent = attribute(element, "when_absent")
+    constraint = Constraint(
+        attribute(element, "name"),
+        definition,
+        scope,
+        parameters,
+        model,
+        price,
+        line(element),
+        when_absent=WhenAbsent(when_absent) if when_absent else None,
+    )
     check_constraint(constraint, context.kind, context.units)
     check_kinds(constraint, context.symbolic)
     _check_arity(attribute(element, "arity"), constraint)

@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 from robochoc.formats.definitions import shown
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.names import check_cost, check_integer, is_name
+from robochoc.model.absence import can_be_restated
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Apply, Expression
 from robochoc.model.problem import (
@@ -28,6 +29,7 @@ from robochoc.model.problem import (
     ProblemKind,
     Relation,
     Term,
+    WhenAbsent,
 )
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
@@ -51,6 +53,9 @@ def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits
     if not constraint.variables:
         raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
     _check_application(constraint.definition, constraint.scope, constraint.parameters)
+    if constraint.when_absent is WhenAbsent.RESTATE and not can_be_restated(constraint):
+        message = "the constraint cannot be restated for fewer robots (when_absent)"
+        raise MistakeError(message, "only sum, count, and, or, min, max of alike terms, compared with numbers, can be")
     if constraint.cost == INFINITE:
         return
     if kind != ProblemKind.DISWCSP:

@@ -164,6 +164,8 @@ def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint]
         element.set("scope", _terms(constraint.scope))
         if constraint.cost != INFINITE:
             element.set("cost", cost_text(constraint.cost, units))
+        if constraint.when_absent:
+            element.set("when_absent", constraint.when_absent)
         if isinstance(constraint.definition, GlobalPredicate):
             parameters = etree.SubElement(element, "parameters")
             write_global(parameters, constraint.definition, constraint.parameters)

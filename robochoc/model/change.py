@@ -37,6 +37,7 @@ from robochoc.model.team_edits import (
     replace_robot,
     robot_named,
     shortened,
+    with_constraint_held,
     without_robots,
 )
 
@@ -197,17 +198,7 @@ def _check_parents(team: Team, robot: Robot, constraint: Constraint) -> None:
 
 def _with_constraint(team: Team, agent: str, parent: str, constraint: Constraint) -> Team:
     check_holder(team, agent, parent, constraint)
-    rank = {name: place for place, name in enumerate(team.order)}
-    owners = {team.owner[name] for name in constraint.variables}
-    for owner in sorted(owners - {agent}, key=rank.__getitem__):
-        theirs = tuple(name for name in constraint.variables if team.owner[name] == owner)
-        team = link(team, agent, owner, theirs)
-    holder = team[agent]
-    parents = (
-        replace(one, constraints=(*one.constraints, constraint)) if one.name == parent else one
-        for one in holder.parents
-    )
-    return replace_robot(team, replace(holder, parents=tuple(parents)))
+    return with_constraint_held(team, constraint)
 
 
 def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:

@@ -35,6 +35,17 @@ class ConstraintModel(StrEnum):
     PKC = "PKC"
 
 
+class WhenAbsent(StrEnum):
+    """The meaning of a constraint when a robot is absent, where its author has chosen one (`model/absence.py`).
+
+    It is restated for the robots that stay, it is dropped, or it counts as broken.
+    """
+
+    RESTATE = "restate"
+    DROP = "drop"
+    FAIL = "fail"
+
+
 class Semantics(StrEnum):
     """The meaning of a relation's tuples: they are allowed (supports), forbidden (conflicts), or have a cost (soft)."""
 
@@ -200,6 +211,9 @@ class Constraint:
         cost: The cost of violating a predicate, in a DisWCSP. `INFINITE`: a hard constraint.
         line: The line of the file that it was read from.
         offset: What was taken out of each of its costs, so that none is negative (`model/costs.py`).
+        when_absent: Its meaning when a robot is absent. None: as its form implies.
+        original: Of a constraint that was restated for the robots that stay: what it was before.
+        absent: Of the same: the variables of `original` whose robots are absent.
     """
 
     name: str
@@ -210,6 +224,9 @@ class Constraint:
     cost: float = INFINITE
     line: int = field(default=0, compare=False)
     offset: int = 0
+    when_absent: WhenAbsent | None = None
+    original: Constraint | None = field(default=None, compare=False, repr=False)
+    absent: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @cached_property
     def variables(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
+from robochoc.model.absence import can_be_restated
 from robochoc.model.constraint import (
     INFINITE,
     Constraint,
@@ -275,6 +276,9 @@ def _with_function(constraint: Constraint, function: Function, factor: int, doma
 def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...], domains: Domains) -> tuple[int, int]:
     """Return the least and the greatest cost of a function, or bounds of them."""
     names = constraint.variables
+    if len(names) > 1 and can_be_restated(constraint):  # for fewer robots it may cost what it does not cost for all
+        low, high = bounds(body, defaultdict(lambda: ANY_INTEGER))
+        return int(low), int(high)
     size = math.prod(len(domains[name]) if name in domains else MAX_TRIED + 1 for name in names)
     if size <= MAX_TRIED:
         tried = replace(constraint, definition=Function("", parameters, body))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
+from robochoc.model.absence import DroppedConstraint
 from robochoc.model.constraint import (
     INFINITE,
     Assignment,
@@ -30,6 +31,7 @@ from robochoc.model.constraint import (
     Semantics,
     Term,
     Variable,
+    WhenAbsent,
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits, common_units
 from robochoc.model.expression import Expression
@@ -64,6 +66,7 @@ __all__ = [
     "Term",
     "Topic",
     "Variable",
+    "WhenAbsent",
 ]
 
 
@@ -181,7 +184,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class RemoveAgent:
-    """The robot leaves, with its variables and every constraint it shares."""
+    """The robot leaves, with its variables. Its shared constraints are restated or dropped (`model/absence.py`)."""
 
     name: str
 
@@ -252,11 +255,13 @@ class Team:
         name: The team's name.
         robots: The robots.
         scenario: How the problem changes over time. With events it is a DDisCSP, and this is its function delta.
+        dropped: Constraints that were dropped as robots left (`model/absence.py`).
     """
 
     name: str
     robots: tuple[Robot, ...]
     scenario: tuple[ScenarioEvent, ...] = ()
+    dropped: tuple[DroppedConstraint, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"<team {self.name}: {counted(len(self.robots), 'robot')}>"

@@ -5,10 +5,11 @@ Nothing is changed in place: every function returns another team.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
-from robochoc.model.problem import Child, Constraint, Parent, Robot, Team
+from robochoc.model.absence import DroppedConstraint, broken, restated
+from robochoc.model.problem import Child, Constraint, Parent, Robot, Team, WhenAbsent
 from robochoc.system.errors import TransferableError
 
 MAX_SHOWN = 60
@@ -34,20 +35,107 @@ class ChangeError(TransferableError, ValueError):
 
 
 def without_robots(team: Team, names: Iterable[str]) -> Team:
-    """Return `team` without the robots `names`, their variables, and every constraint that they share."""
-    gone = set(names)
-    lost = {variable.name for name in gone for variable in team[name].variables}
+    """Return `team` without the robots `names` and their variables.
 
-    def kept(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
-        return tuple(constraint for constraint in constraints if lost.isdisjoint(constraint.variables))
-
+    Constraints that they share are restated for the robots that stay, or dropped and listed in `Team.dropped`.
+    """
+    gone = {name for name in names if name in team}
+    if not gone:
+        return team
+    absence = Absence(team, gone)
     robots = []
     for robot in team.robots:
         if robot.name not in gone:
-            parents = [replace(one, constraints=kept(one.constraints)) for one in robot.parents if one.name not in gone]
-            below = [replace(one, constraints=kept(one.constraints)) for one in robot.children if one.name not in gone]
+            parents = [
+                replace(one, constraints=absence.untouched(one.constraints))
+                for one in robot.parents
+                if one.name not in gone
+            ]
+            below = [
+                replace(one, constraints=absence.untouched(one.constraints), copies=absence.untouched(one.copies))
+                for one in robot.children
+                if one.name not in gone
+            ]
             robots.append(replace(robot, parents=tuple(parents), children=tuple(below)))
-    return keep_needed_interfaces(replace(team, robots=tuple(robots)))
+    left = replace(team, robots=tuple(robots), dropped=(*team.dropped, *absence.dropped))
+    if left.robots:
+        for constraint in absence.restated:
+            left = with_constraint_held(left, constraint)
+    return keep_needed_interfaces(left)
+
+
+class Absence:
+    """The constraints of `team` when the robots `absent` are not there.
+
+    Attributes:
+        restated: Those that were restated for the robots that stay.
+        dropped: Those that were dropped, but for the private constraints of the absent robots.
+    """
+
+    def __init__(self, team: Team, absent: Collection[str]) -> None:
+        self._gone = {variable.name for name in absent if name in team for variable in team[name].variables}
+        self.restated: list[Constraint] = []
+        self.dropped: list[DroppedConstraint] = []
+        rank = {name: place for place, name in enumerate(team.order)}
+        for robot in team.robots:
+            for constraint in robot.private if robot.name in absent else ():
+                if constraint.when_absent is WhenAbsent.FAIL:
+                    self._add(constraint)
+            for constraint in (*robot.shared, *(part for child in robot.children for part in child.constraints)):
+                if not self._gone.isdisjoint(constraint.variables) and not self._add(constraint):
+                    owners = {team.owner[name] for name in constraint.variables if name in team.owner}
+                    robots = tuple(sorted(owners, key=rank.__getitem__))
+                    self.dropped.append(DroppedConstraint(constraint.name, robots))
+
+    def _add(self, constraint: Constraint) -> bool:
+        """Add what is left of `constraint`. Return whether something is."""
+        left = restated(constraint, self._gone)
+        if left is not None:
+            self.restated.append(left)
+        return left is not None
+
+    def untouched(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+        """Return those of `constraints` that mention no absent robot."""
+        return tuple([one for one in constraints if self._gone.isdisjoint(one.variables)])
+
+    def in_force(self, constraints: Iterable[Constraint]) -> list[Constraint]:
+        """Return the `constraints` that mention no absent robot, and all that were restated."""
+        return [*self.untouched(constraints), *self.restated]
+
+
+def constraints_in_force(team: Team, absent: Collection[str]) -> list[Constraint]:
+    """Return the constraints of `team` that hold when the robots `absent` are not there."""
+    return Absence(team, absent).in_force(team.constraints()) if absent else list(team.constraints())
+
+
+def dropped_constraints(team: Team, absent: Collection[str]) -> tuple[DroppedConstraint, ...]:
+    """Return the constraints that are dropped as robots of their scopes have left `team`, or are in `absent`."""
+    before = (one for one in team.dropped if any(name not in team for name in one.robots))
+    return (*before, *Absence(team, absent).dropped)
+
+
+def with_constraint_held(team: Team, constraint: Constraint) -> Team:
+    """Return `team` with `constraint`: held by the lowest robot of its scope, or private where it has one robot.
+
+    Robots of the scope that are not linked with the lowest one are linked. A constraint that no robot is left of is
+    private to the first robot.
+    """
+    owners = [name for name in team.order if name in {team.owner[name] for name in constraint.variables}]
+    if len(owners) <= 1:
+        robot = team[owners[0]] if owners else team.robots[0]
+        if not owners:
+            constraint = broken(constraint, (robot.variables[0].name,))
+        return replace_robot(team, replace(robot, private=(*robot.private, replace(constraint, model=None))))
+    *_, parent, agent = owners
+    for owner in owners[:-1]:
+        theirs = tuple(name for name in constraint.variables if team.owner[name] == owner)
+        team = link(team, agent, owner, theirs)
+    holder = team[agent]
+    parents = (
+        replace(one, constraints=(*one.constraints, constraint)) if one.name == parent else one
+        for one in holder.parents
+    )
+    return replace_robot(team, replace(holder, parents=tuple(parents)))
 
 
 def keep_interfaces(team: Team, before: Team) -> Team:

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
 from robochoc.formats.definitions import PREDEFINED
-from robochoc.model.constraint import INFINITE, Constraint, Definition, Function, Predicate, Relation, Semantics
+from robochoc.model.absence import can_be_restated
+from robochoc.model.constraint import (
+    INFINITE,
+    Constraint,
+    Definition,
+    Function,
+    Predicate,
+    Relation,
+    Semantics,
+    WhenAbsent,
+)
 from robochoc.model.constraint import Term as Actual
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.magnitudes import MAX_COST
@@ -39,6 +49,7 @@ class Draft:
         default: What rows of a soft table cost that it does not list.
         is_penalty: Whether the costs of a soft table are what breaking a condition costs: they count against a sum
             that is maximised.
+        when_absent: Its meaning when a robot is absent. None: as its form implies.
     """
 
     name: str
@@ -51,6 +62,20 @@ class Draft:
     cost: Exact | None = None
     default: Price = 0
     is_penalty: bool = False
+    when_absent: WhenAbsent | None = None
+
+    def when_absent_is(self, when_absent: WhenAbsent | None) -> Draft:
+        """Return this draft with the meaning `when_absent`. Raises `ModelError` if it cannot be restated."""
+        if when_absent is WhenAbsent.RESTATE:
+            names = tuple(variable.name for variable in self.scope)
+            formals = tuple(f"X{number}" for number in range(len(names)))
+            body = None if self.body is None else Predicate("", formals, self.body)
+            if body is None or not can_be_restated(Constraint(self.name, body, names, names)):
+                hint = (
+                    "it is not a sum, count, all_of, any_of, minimum or maximum of alike terms, compared with a number"
+                )
+                raise ModelError(f"{self.name} cannot be restated for fewer robots", hint, self.place)
+        return replace(self, when_absent=when_absent) if when_absent else self
 
     @property
     def soft(self) -> bool:
@@ -64,12 +89,15 @@ class Draft:
         return max(places_of(one, self.place) for one in found) if self.soft else 0
 
 
-def conditions(term: Term, name: str, place: Place) -> Iterator[Draft]:
-    """Yield what says that `term` holds: for a conjunction each of its parts, for `all_different` each pair."""
+def conditions(term: Term, name: str, place: Place, *, in_pairs: bool = True) -> Iterator[Draft]:
+    """Yield what says that `term` holds: for a conjunction each of its parts, for `all_different` each pair.
+
+    Without `in_pairs`, `all_different` is one constraint.
+    """
     if isinstance(term, Applied) and term.operator == "and":
         for part in term.arguments:
-            yield from conditions(part, name, place)
-    elif isinstance(term, Applied) and term.operator == "different":
+            yield from conditions(part, name, place, in_pairs=in_pairs)
+    elif isinstance(term, Applied) and term.operator == "different" and in_pairs:
         for number, one in enumerate(term.arguments):
             for other in term.arguments[:number]:
                 yield from conditions(Applied("ne", other, one), name, place)
@@ -218,6 +246,11 @@ class Definitions:
         self._numbers = {"P": 0, "F": 0, "R": 0}
 
     def constraint(self, draft: Draft, places: int, sign: int) -> Constraint:
+        """Return the constraint of a draft, as `_constraint` does, with its meaning when a robot is absent."""
+        made = self._constraint(draft, places, sign)
+        return replace(made, when_absent=draft.when_absent) if draft.when_absent else made
+
+    def _constraint(self, draft: Draft, places: int, sign: int) -> Constraint:
         """Return the constraint of a draft, with costs in units of `places` decimal places.
 
         Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
-from robochoc.model.problem import AddValue, RemoveAgent, RemoveValue
+from robochoc.model.problem import AddValue, RemoveAgent, RemoveValue, WhenAbsent
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.rules import Rule
@@ -39,7 +39,7 @@ class Event:
         return f"<event with {len(self.steps)} change{'s' * (len(self.steps) != 1)}>"
 
     def remove_robot(self, robot: ModelRobot | str) -> None:
-        """Remove a robot, with its variables and every constraint that it shares."""
+        """Remove a robot with its variables. Constraints that it shares are restated or dropped."""
         name = robot.name if isinstance(robot, ModelRobot) else robot
         if name not in self._model.robots:
             raise UnknownNameError(f"there is no robot {name!r}", did_you_mean(name, self._model.robots))
@@ -64,9 +64,15 @@ class Event:
         variable.codes, code = variable.codes.with_value(value, self._model.symbols)
         self._add(AddValue(variable.name, code))
 
-    def add(self, *constraints: object, cost: object = None, name: str | None = None) -> Rule:
+    def add(
+        self,
+        *constraints: object,
+        cost: object = None,
+        name: str | None = None,
+        when_absent: WhenAbsent | str | None = None,
+    ) -> Rule:
         """Add constraints, each between variables of several robots. See `Model.add`."""
-        rule = self._model.rule(constraints, cost, name, event=self)
+        rule = self._model.rule(constraints, cost, name, self, when_absent)
         self._add(rule)
         return rule
 

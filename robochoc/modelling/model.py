@@ -22,6 +22,7 @@ from typing import Self
 
 from robochoc.formats import InvalidInputError, encodable, read_team, write_team
 from robochoc.formats.diagnostics import Diagnostic
+from robochoc.model.constraint import WhenAbsent
 from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
@@ -34,7 +35,7 @@ from robochoc.modelling.given import Given, given_by, given_variable
 from robochoc.modelling.numbers import Exact, check_places, whole_number
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
-from robochoc.modelling.rules import Rule, check_owned, conditions_in, exact_or_none
+from robochoc.modelling.rules import Rule, absence_or_none, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.modelling.terms import Variable, all_of, number
@@ -115,7 +116,13 @@ class Model(Solvable):
             raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
         return self.variables[name]
 
-    def add(self, *constraints: object, cost: object = None, name: str | None = None) -> Rule:
+    def add(
+        self,
+        *constraints: object,
+        cost: object = None,
+        name: str | None = None,
+        when_absent: WhenAbsent | str | None = None,
+    ) -> Rule:
         """Add constraints. Those over variables of one robot are private: no other robot learns them.
 
         Args:
@@ -123,14 +130,16 @@ class Model(Solvable):
             cost: What it costs if they do not all hold. It counts against a sum that is
                 maximised. None: they must hold.
             name: A name, by which an event can remove them.
+            when_absent: Their meaning when a robot of their scopes withdraws, is lost or leaves: `restate` them for the
+                others, `drop` them, or `fail`. None: as their form implies (docs/reference/absence.md).
 
         Returns:
             The constraint, under one name.
 
         Raises:
-            ModelError: if they are no conditions over variables of this model.
+            ModelError: if they are no conditions over variables of this model, or cannot be restated.
         """
-        rule = self.rule(constraints, cost, name)
+        rule = self.rule(constraints, cost, name, when_absent=when_absent)
         self.constraints.append(rule)
         self.changed()
         return rule
@@ -176,12 +185,23 @@ class Model(Solvable):
         self.maximized = maximize
         self.changed()
 
-    def rule(self, constraints: object, cost: object, name: str | None, event: object = None) -> Rule:
+    def rule(
+        self,
+        constraints: object,
+        cost: object,
+        name: str | None,
+        event: object = None,
+        when_absent: WhenAbsent | str | None = None,
+    ) -> Rule:
         """Return a constraint, which is not added yet."""
         place = here()
         term = all_of(conditions_in(constraints, place))
         check_owned(term, self.variables, place, event)
-        return Rule(name or self._free_name(), term, exact_or_none(cost), place)
+        absence = absence_or_none(when_absent, place)
+        rule = Rule(name or self._free_name(), term, exact_or_none(cost), place, absence)
+        if absence is WhenAbsent.RESTATE:
+            list(rule.drafts())
+        return rule
 
     def free_prefix(self, prefix: str) -> str:
         """Return `prefix`, or something like it, with which no name of a constraint begins."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from robochoc.model.constraint import WhenAbsent
 from robochoc.modelling.numbers import Exact, exact, is_truth, shown
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
 from robochoc.modelling.terms import Term, Variable, condition
@@ -23,24 +24,29 @@ class Rule:
         term: The condition.
         cost: What it costs to break it. None: it must hold.
         place: The line that added it.
+        when_absent: Its meaning when a robot of its scope is absent. None: as its form implies.
     """
 
     name: str
     term: Term
     cost: Exact | None
     place: Place
+    when_absent: WhenAbsent | None = None
 
     def __repr__(self) -> str:
         return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {shown(self.cost)}'}>"
 
     def drafts(self) -> Iterator[Draft]:
-        """Yield what it becomes."""
+        """Yield what it becomes. Raises `ModelError` if it is to be restated for fewer robots and cannot be."""
         from robochoc.modelling.drafts import conditions, soft_condition  # noqa: PLC0415 - they need the formats
 
         if self.cost is None:
-            yield from conditions(self.term, self.name, self.place)
+            in_pairs = self.when_absent is not WhenAbsent.DROP  # otherwise pairs of robots that stay would remain
+            drafts = conditions(self.term, self.name, self.place, in_pairs=in_pairs)
         else:
-            yield soft_condition(self.term, self.cost, self.name, self.place)
+            drafts = iter([soft_condition(self.term, self.cost, self.name, self.place)])
+        for draft in drafts:
+            yield draft.when_absent_is(self.when_absent)
 
 
 def conditions_in(given: object, place: Place) -> list[Term]:
@@ -75,3 +81,12 @@ def check_owned(term: Term, known: dict[str, Variable], place: Place, event: obj
 def exact_or_none(cost: object) -> Exact | None:
     """Return the cost of breaking a constraint; None: it must hold."""
     return None if cost is None else exact(cost)
+
+
+def absence_or_none(when_absent: WhenAbsent | str | None, place: Place) -> WhenAbsent | None:
+    """Return the meaning of a constraint when a robot is absent; None: as its form implies. Raises `ModelError`."""
+    try:
+        return None if when_absent is None else WhenAbsent(when_absent)
+    except ValueError:
+        known = ", ".join(WhenAbsent)
+        raise ModelError(f"when_absent is {when_absent!r}", f"expected one of {known}", place) from None

@@ -13,11 +13,10 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check_assignment
-from robochoc.run.incumbent import robots_without_values
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, TeamSolver
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import assignment_cost
+from robochoc.verification.checker import assignment_cost, robots_without_values
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import total_cost
 

@@ -25,12 +25,18 @@ from robochoc.model.outcome import (
     Verdict,
 )
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree, robots_without_values
+from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.listed_optima import put_together
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
-from robochoc.verification.checker import RefutedError, assignment_cost, needlessly_withdrawn, violations
+from robochoc.verification.checker import (
+    RefutedError,
+    assignment_cost,
+    needlessly_withdrawn,
+    robots_without_values,
+    violations,
+)
 
 
 class CheckedAssignment(NamedTuple):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import PseudoTreeNode
-from robochoc.model.problem import INFINITE, Team
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import Objective
@@ -82,11 +82,6 @@ def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
 def merged_values(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
     """Return the values of all variables, from the values by robot."""
     return {name: value for values in own.values() for name, value in values.items()}
-
-
-def robots_without_values(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
-    """Return the robots without values: they withdraw."""
-    return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
 
 _Own = dict[str, dict[str, int]]

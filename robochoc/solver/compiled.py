@@ -61,7 +61,7 @@ class LocalProblem(LocalConstraints):
     is shared: they have to hear of the own value too. `checks` counts constraint checks so far.
 
     `charges[i]` is the private cost of the i-th value. Where robots may withdraw, the last value means withdrawal: all
-    its parts are None, and all constraints with it hold.
+    its parts are None, and constraints with it are restated or dropped (`model/absence.py`).
     """
 
     @property
@@ -215,6 +215,10 @@ class LocalProblem(LocalConstraints):
         Broken parts are infinite. As in `lower_bounds`, it is 0 where robots may withdraw, or have too many values.
         """
         return self._at_least(self._parts.get(robot, ()))
+
+    def width(self, robot: str) -> int:
+        """Return how many parts a value of `robot` has."""
+        return len(self._part.known.interfaces[robot])
 
     def refuse_value(self, robot: str, value: Value) -> None:
         """Raise `ValueError` for a `value` that `robot`, as its files declare it, cannot have: others say anything."""

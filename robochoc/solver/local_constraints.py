@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
-from robochoc.model.problem import ConstraintModel
+from robochoc.model.problem import INFINITE, ConstraintModel, WhenAbsent
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
@@ -52,7 +52,9 @@ class LocalConstraints:
         # Values are distinct: a robot that shows nothing looks the same withdrawn, which is never cheaper.
         if part.parameters.withdrawal_cost is not None and (robot.interface or not self.values):
             self.values = (*self.values, (None,) * len(robot.interface))
-            self.charges = (*self.charges, part.parameters.withdrawal_cost * robot.weight)
+            must_stay = any(one.when_absent is WhenAbsent.FAIL for one in robot.private)
+            aside = INFINITE if must_stay else part.parameters.withdrawal_cost * robot.weight
+            self.charges = (*self.charges, aside)
         self.checks = 0
         self._places: dict[Value, int] | None = None
         self._rank = rank
@@ -72,6 +74,9 @@ class LocalConstraints:
         copies = [ready(known) for known in part.copies]
         below = [ready(known) for _, known in held_below(robot)]
         shared = [*(constraint for _, constraint in above), *copies, *below]
+        if part.parameters.withdrawal_cost is not None:
+            for constraint in shared:
+                constraint.allow_absence()
         self._constraints = sorted_by_lowest_agent(shared, rank)
         self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
@@ -89,6 +94,11 @@ class LocalConstraints:
         """From now on evaluate constraints for whatever values others have: some may have lost a value since."""
         for constraint in self._constraints:
             constraint.allow_undeclared()
+
+    def allow_absence(self) -> None:
+        """From now on a value all of whose parts are None means that its robot is withdrawn."""
+        for constraint in self._constraints:
+            constraint.allow_absence()
 
     def declared_count(self, robot: str) -> int:
         """Return how many values `declared` returns; nothing is allocated."""

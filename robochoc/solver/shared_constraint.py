@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from robochoc.model.absence import can_be_restated, restated
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Constraint, Domain
+from robochoc.model.problem import INFINITE, Constraint, Domain, WhenAbsent
 from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import (
     MAX_TUPLES,
@@ -24,10 +25,10 @@ Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
 
 UNKNOWN = -1
-"""No mask: a value that a constraint looks at is unknown, or a robot is withdrawn."""
+"""No mask: a value that a constraint looks at is unknown, or it is dropped as a robot is withdrawn."""
 
-OtherValues = tuple[int, ...]
-"""The values of other robots' variables in a constraint, in its order."""
+OtherValues = tuple[int | None, ...]
+"""The values of other robots' variables in a constraint, in its order. None: the robot is withdrawn."""
 
 
 class Gap(NamedTuple):
@@ -106,6 +107,16 @@ class SharedConstraint:
         self._costs_by: dict[int, list[Cost]] = {}
         """Where it sees one variable of others: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
+        self._bears_absence = False
+        self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
+        """What it costs when the owners of these variables are absent; None: it is dropped."""
+
+    def allow_absence(self) -> None:
+        """From now on values that are None mean that a robot is withdrawn: see `model/absence.py`."""
+        absent = self._constraint.when_absent
+        self._bears_absence = absent is WhenAbsent.FAIL or (
+            absent is not WhenAbsent.DROP and can_be_restated(self._constraint) and len(self._seen) > 0
+        )
 
     def compile(self, own: OwnValues) -> None:
         """Get ready for the own compiled domain."""
@@ -113,17 +124,18 @@ class SharedConstraint:
         self._places, names = own.seen(self._scope)
         self._test = allows_function(self._constraint, [*self._names, *names])
         self._price = cost_function(self._constraint, [*self._names, *names])
+        self._all_names = [*self._names, *names]
         self.codes, self._distinct = own.codes(self._places)
 
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
-        """Return what the constraint sees in `view`; None: a value is unknown, or a robot is withdrawn."""
+        """Return what the constraint sees in `view`; None: a value is unknown, or it is dropped as a robot withdrew."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
             return None
         except IndexError:
             raise self._refusal_of_width(view) from None
-        return None if None in seen else tuple(seen)  # type: ignore[arg-type]
+        return None if None in seen and not self._bears_absence else tuple(seen)
 
     def combined(self, sets: Mapping[str, Sequence[Value]]) -> Iterator[OtherValues]:
         """Yield all that the constraint may see where each other robot has any of its values in `sets`.
@@ -136,7 +148,7 @@ class SharedConstraint:
             shown = dict.fromkeys(tuple([value[place] for place in places]) for value in sets.get(agent, ()))
             columns.append([part for part in shown if None not in part])
         for parts in itertools.product(*columns):
-            yield tuple(itertools.chain.from_iterable(parts))  # type: ignore[arg-type]  # no part is None
+            yield tuple(itertools.chain.from_iterable(parts))
 
     def allow_undeclared(self) -> None:
         """From now on evaluate whatever values others have."""
@@ -150,7 +162,7 @@ class SharedConstraint:
         if self._domains is None:
             return
         for place, domain in enumerate(self._domains):
-            if others[place] not in domain:
+            if others[place] is not None and others[place] not in domain:
                 raise ValueError(f"{self._names[place]} of {self._seen[place][0]} cannot be {others[place]}")
 
     def _refusal_of_width(self, view: Mapping[str, Value]) -> ValueError:
@@ -164,8 +176,25 @@ class SharedConstraint:
         return [self._holds((*others, *own)) for own in self._distinct]
 
     def _holds(self, values: Sequence[int | None]) -> bool:
-        """Return whether the constraint holds on `values`; it always holds if one robot is withdrawn (None)."""
-        return None in values or self._test(values)  # type: ignore[arg-type]
+        """Return whether the constraint holds on `values`, some of which may be None: robots are withdrawn."""
+        return self._cost_for_some(values) < INFINITE if None in values else self._test(values)  # type: ignore[arg-type]
+
+    def _cost(self, values: Sequence[int | None]) -> Cost:
+        """Return what the constraint costs on `values`, some of which may be None: robots are withdrawn."""
+        return self._cost_for_some(values) if None in values else self._price(values)  # type: ignore[arg-type]
+
+    def _cost_for_some(self, values: Sequence[int | None]) -> Cost:
+        """Return what the constraint costs when robots are withdrawn; 0 if it is dropped."""
+        if not self._bears_absence:
+            return 0
+        paired = list(zip(self._all_names, values, strict=True))
+        absent = tuple([name for name, value in paired if value is None])
+        if absent not in self._restated:
+            left = restated(self._constraint, absent)
+            present = [name for name, value in paired if value is not None]
+            self._restated[absent] = None if left is None else cost_function(left, present)
+        price = self._restated[absent]
+        return 0 if price is None else price([value for value in values if value is not None])
 
     @property
     def definition(self) -> object:
@@ -182,23 +211,25 @@ class SharedConstraint:
         prices = self._costs.get(others)
         if prices is None:
             self._refuse_undeclared(others)
-            paid: list[Cost] = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
+            paid: list[Cost] = [self._cost((*others, *own)) for own in self._distinct]
             prices = self._costs[others] = [paid[code] for code in self.codes]
         return prices
 
     def costs_in(self, view: Mapping[str, Value]) -> list[Cost] | None:
-        """Return what each own value pays in `view`; None: a value is unknown, or a robot is withdrawn."""
+        """Return what each own value pays in `view`; None: a value is unknown, or it is dropped as a robot withdrew."""
         if self._only is None:
             others = self.other_values(view)
             return None if others is None else self.costs(others)
         agent, place = self._only
         value = view.get(agent)
+        if value is None:
+            return None
         try:
-            part = None if value is None else value[place]
+            part = value[place]
         except IndexError:
             raise self._refusal_of_width(view) from None
         if part is None:
-            return None
+            return self.costs((part,)) if self._bears_absence else None
         prices = self._costs_by.get(part)
         if prices is None:
             prices = self._costs_by[part] = self.costs((part,))
@@ -239,7 +270,7 @@ class SharedConstraint:
     ) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
         """Yield the places of the others' values in `domains`, for each combination, and what the constraint sees.
 
-        Combinations in which a robot has withdrawn are left out; `size` is the number of own values.
+        Combinations for which it is dropped are left out; `size` is the number of own values.
 
         Raises:
             UnsupportedError: when there are too many.
@@ -292,7 +323,7 @@ class SharedConstraint:
         except IndexError:
             raise self._refusal_of_width(view) from None
         if part is None:
-            return UNKNOWN
+            return self.mask((part,)) if self._bears_absence else UNKNOWN
         mask = self._looks.get(part)
         if mask is None:
             mask = self._looks[part] = self.mask((part,))

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from robochoc.model.absence import can_be_restated, restated
 from robochoc.model.cost_units import cost_shown
-from robochoc.model.problem import INFINITE, Constraint, Team, Variable
+from robochoc.model.problem import INFINITE, Constraint, Team, Variable, WhenAbsent
 from robochoc.solver.encoding import (
     Codes,
     Component,
+    Cost,
     Costs,
     Network,
     Table,
@@ -183,8 +185,11 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
     """
     constraints = list(team.constraints())
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
+    shared = [one for robot in team.robots for one in robot.shared]
+    bearing = [one for one in shared if _bears_absence(one)]
     own = {robot.name: tuple(variable.name for variable in robot.variables) for robot in team.robots}
-    parts = components(team.variables.values(), constraints, [*own.values(), *(one.variables for one in soft)])
+    scopes = [*own.values(), *(one.variables for one in (*soft, *bearing))]
+    parts = components(team.variables.values(), constraints, scopes)
     found = []
     for part in parts:
         place = {name: index for index, name in enumerate(part.names)}
@@ -194,8 +199,10 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
             tuple((*domain, absent) for domain in part.network.domains),
             tuple(_unless_absent(table, part.network.domains, absent) for table in part.network.tables),
         )
+        forbidden = [_forbidden_by_absence(part, network, one) for one in bearing if one.variables[0] in place]
+        network = replace(network, tables=(*network.tables, *(table for table in forbidden if table.rows)))
         charges = {
-            scope: _free_if_absent(_prices(part, part.network, scope, held), scope, network, absent)
+            scope: {**_prices(part, part.network, scope, held), **_prices_in_absence(part, network, scope, held)}
             for scope, held in together.items()
         }
         robots = [robot for robot in team.robots if own[robot.name][0] in place]
@@ -204,6 +211,9 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
             network = replace(network, tables=(*network.tables, *_all_or_none(network, first, others, absent)))
             prices = charges.setdefault((first,), {(code,): 0 for code in network.domains[first]})
             prices[absent,] += robot.weight * withdrawal_cost
+            if any(one.when_absent == WhenAbsent.FAIL for one in robot.private):
+                stays = network.domains[first][:-1]
+                network = replace(network, domains=(*network.domains[:first], stays, *network.domains[first + 1 :]))
         found.append(with_cost_variables(part, network, charges))
     return found
 
@@ -215,9 +225,39 @@ def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
 
 
-def _free_if_absent(prices: CostRows, scope: Codes, network: Network, absent: int) -> CostRows:
-    domains = [network.domains[place][:-1] for place in scope]
-    return {**prices, **dict.fromkeys(_absences(domains, absent), 0)}
+def _bears_absence(constraint: Constraint) -> bool:
+    """Return whether `constraint` may forbid something when robots are absent."""
+    if constraint.when_absent == WhenAbsent.FAIL:
+        return True
+    return constraint.when_absent != WhenAbsent.DROP and not is_soft(constraint) and can_be_restated(constraint)
+
+
+def _forbidden_by_absence(part: Component, network: Network, constraint: Constraint) -> Table:
+    """Return the rows that a hard constraint forbids when robots are absent (`model/absence.py`)."""
+    scope = tuple(sorted(part.names.index(name) for name in constraint.variables))
+    prices = _prices_in_absence(part, network, scope, [constraint])
+    allowed = set(prices)
+    rows = _absences([network.domains[place][:-1] for place in scope], len(part.values))
+    return Table(scope, allowed=False, rows=tuple(sorted(row for row in rows if row not in allowed)))
+
+
+def _prices_in_absence(part: Component, network: Network, scope: Codes, charging: Sequence[Constraint]) -> CostRows:
+    """Return what constraints cost in each row in which a robot is absent. Rows that they forbid are left out."""
+    absent = len(part.values)
+    names = [part.names[place] for place in scope]
+    known: dict[tuple[str, ...], list[Callable[[Sequence[int]], Cost]]] = {}
+    found: CostRows = {}
+    for row in _absences([network.domains[place][:-1] for place in scope], absent):
+        gone = tuple([name for name, code in zip(names, row, strict=True) if code == absent])
+        if gone not in known:
+            left = [restated(constraint, gone) for constraint in charging]
+            present = [name for name in names if name not in gone]
+            known[gone] = [cost_function(constraint, present) for constraint in left if constraint is not None]
+        values = [part.values[code] for code in row if code != absent]
+        cost = sum(price(values) for price in known[gone])
+        if cost < INFINITE:
+            found[row] = cost
+    return found
 
 
 def _absences(domains: Sequence[Codes], absent: int) -> Iterable[Codes]:

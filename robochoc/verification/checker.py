@@ -11,6 +11,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
 
+from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import (
@@ -25,6 +26,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.model.team_edits import constraints_in_force
 
 MAX_TRIES = 20_000
 """The maximum number of values that are tried for the variables of a withdrawn robot."""
@@ -37,7 +39,7 @@ class RefutedError(Exception):
 def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
     """Yield why `assignment` is no solution for the robots of `team` that are not withdrawn. Nothing: it is one.
 
-    Every variable of a flying robot has a value of its domain and every constraint among flying robots holds.
+    Every variable of a flying robot has a value of its domain and every constraint that is in force holds.
     """
     flying = {name: variable for name, variable in team.variables.items() if team.owner[name] not in withdrawn}
     for name, variable in flying.items():
@@ -46,19 +48,24 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
         elif assignment[name] not in variable.domain:
             yield f"{name} = {assignment[name]} is not in its domain"
     yield from (f"{name} is no variable of a robot that flies" for name in assignment if name not in flying)
-    for constraint in team.constraints():
+    for constraint in constraints_in_force(team, withdrawn):
         if (
             all(name in assignment for name in constraint.variables)
             and constraint_cost(constraint, assignment) == INFINITE
         ):
             values = ", ".join(f"{name} = {assignment[name]}" for name in constraint.variables)
-            yield f"constraint {constraint.name} is broken by {values}"
+            yield f"constraint {constraint.name} is broken by {values or 'the absence of a robot'}"
 
 
 def assignment_cost(team: Team, assignment: Assignment) -> float:
-    """Return the cost of `assignment`: of all constraints whose variables have values."""
-    met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
-    return sum(constraint_cost(constraint, assignment) for constraint in met)
+    """Return the cost of `assignment`: of all constraints in force when robots without values are absent."""
+    in_force = constraints_in_force(team, robots_without_values(team, assignment))
+    return sum(constraint_cost(constraint, assignment) for constraint in in_force)
+
+
+def robots_without_values(team: Team, assignment: Assignment) -> tuple[str, ...]:
+    """Return the robots without values: they withdraw."""
+    return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
 
 def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, without: Collection[str] = ()) -> None:
@@ -77,14 +84,15 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
         return
     places = max(robot.costs.places for robot in team.robots)
     total = Fraction(0)
+    absent = {name for name in team.variables if team.owner[name] in without}
     for robot in team.robots:
         unit = Fraction(1, 10**robot.costs.places)
         total += robot.costs.constant * unit
         for constraint in robot.constraints():
-            if any(team.owner[name] in without for name in constraint.variables):
-                continue
-            paid = int(constraint_cost(constraint, assignment))
-            total += paid if isinstance(constraint.definition, Function) else paid * unit
+            in_force = restated(constraint, absent)
+            if in_force is not None:
+                paid = int(constraint_cost(in_force, assignment))
+                total += paid if isinstance(constraint.definition, Function) else paid * unit
     if Fraction(cost) != total:
         exact = Decimal(int(total * 10**places)).scaleb(-places)
         raise RefutedError(
@@ -97,11 +105,19 @@ def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collecti
 
     For each robot at most `MAX_TRIES` values are tried.
     """
-    constraints = list(team.constraints())
+    on: dict[str, list[Constraint]] = {name: [] for name in team.variables}
+    for constraint in team.constraints():
+        for variable in constraint.variables:
+            on[variable].append(constraint)
+    absent = {name for name in team.variables if team.owner[name] in withdrawn}
     for name in withdrawn:
-        names = [variable.name for variable in team[name].variables]
-        own = [c for c in constraints if {*assignment, *names}.issuperset(c.variables) and set(names) & {*c.variables}]
-        if _has_a_place(team[name].variables, assignment, own, [MAX_TRIES]):
+        names = {variable.name for variable in team[name].variables}
+        met = [restated(constraint, absent - names) for variable in names for constraint in on[variable]]
+        in_force = [constraint for constraint in met if constraint is not None]
+        others = (constraint for constraint in in_force if names.isdisjoint(constraint.variables))
+        if all(constraint_cost(one, assignment) < INFINITE for one in others) and _has_a_place(
+            team[name].variables, assignment, in_force, [MAX_TRIES]
+        ):
             yield name
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Team
+from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.solver.encoding import cost_function, max_cost
+
+Price = Callable[[Sequence[int]], float]
+"""The cost of a constraint, by the values of its variables."""
 
 
 class Objective:
@@ -29,18 +33,20 @@ class Objective:
         self.in_step = in_step
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._withdrawal_cost = withdrawal_cost
-        self._constraints = [(c.variables, cost_function(c, c.variables)) for c in team.constraints()]
+        self._constraints = list(team.constraints())
+        self._prices: list[Price] = [cost_function(one, one.variables) for one in self._constraints]
+        self._restated: dict[tuple[int, tuple[str, ...]], Constraint | None] = {}
         self._paid: list[float] = [0] * len(self._constraints)
         self._sum: float = 0
         self._broken = 0
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
         self.interfaces = {robot.name: robot.interface for robot in team.robots}
         self._variables = {robot.name: [variable.name for variable in robot.variables] for robot in team.robots}
-        for number, (names, price) in enumerate(self._constraints):
-            for name in names:
+        for number, constraint in enumerate(self._constraints):
+            for name in constraint.variables:
                 self._on[name].append(number)
-            if not names:
-                self._pay(number, price(()))
+            if not constraint.variables:
+                self._pay(number, self._prices[number](()))
         self._values: dict[str, int] = {}
         self._absent = set(self._weights)
         self._weight = sum(self._weights.values())
@@ -57,9 +63,21 @@ class Objective:
                 self._weight += -self._weights[robot] if values else self._weights[robot]
                 self._absent ^= {robot}
         for number in touched:
-            names, price = self._constraints[number]
+            names = self._constraints[number].variables
             known = all(name in self._values for name in names)
-            self._pay(number, price([self._values[name] for name in names]) if known else 0)
+            if known:
+                self._pay(number, self._prices[number]([self._values[name] for name in names]))
+            else:
+                self._pay(number, self._price_for_some(number) if self._withdrawal_cost is not None else 0)
+
+    def _price_for_some(self, number: int) -> float:
+        """Return what a constraint costs when robots of its scope are absent."""
+        constraint = self._constraints[number]
+        absent = tuple([name for name in constraint.variables if name not in self._values])
+        if (number, absent) not in self._restated:
+            self._restated[number, absent] = restated(constraint, absent)
+        in_force = self._restated[number, absent]
+        return 0 if in_force is None else in_force.price(self._values)
 
     def _pay(self, number: int, cost: float) -> None:
         """Set what a constraint costs. The sum goes along: costs are integers, and infinite ones are counted."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.formats.diagnostics import shortened
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.global_constraints import read_form
 from robochoc.formats.names import is_name
 from robochoc.model.expression import Expression, ExpressionError, Type, parse, text
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
@@ -17,10 +18,12 @@ from robochoc.model.problem import (
     ConstraintModel,
     Definition,
     Function,
+    GlobalPredicate,
     Predicate,
     Relation,
     Semantics,
     Term,
+    WhenAbsent,
 )
 from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint
@@ -45,11 +48,12 @@ class RelationRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
 
 
 class PredicateRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
-    """A predicate; `body` is a functional expression."""
+    """A predicate; `body` is a functional expression. Of a global constraint it has the `form` instead."""
 
     name: str
     parameters: tuple[str, ...]
     body: str
+    form: str = ""
 
 
 class FunctionRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -73,12 +77,14 @@ class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
     parameters: tuple[Term, ...]
     model: ConstraintModel | None
     cost: Cost
+    when_absent: WhenAbsent | None = None
 
 
 def record_of(known: KeyedConstraint) -> SharedRecord:
     """`known` as it travels."""
     one = known.constraint
-    return SharedRecord(known.key, one.name, _defined(one.definition), one.scope, one.parameters, one.model, one.cost)
+    defined = _defined(one.definition)
+    return SharedRecord(known.key, one.name, defined, one.scope, one.parameters, one.model, one.cost, one.when_absent)
 
 
 def known_of(record: SharedRecord) -> KeyedConstraint:
@@ -96,11 +102,21 @@ def known_of(record: SharedRecord) -> KeyedConstraint:
         )
     return KeyedConstraint(
         record.key,
-        Constraint(record.name, definition, record.scope, record.parameters, record.model, record.cost),
+        Constraint(
+            record.name,
+            definition,
+            record.scope,
+            record.parameters,
+            record.model,
+            record.cost,
+            when_absent=record.when_absent,
+        ),
     )
 
 
 def _defined(definition: Definition) -> Record:
+    if isinstance(definition, GlobalPredicate):
+        return PredicateRecord(definition.name, definition.parameters, "", definition.form)
     if isinstance(definition, Predicate):
         return PredicateRecord(definition.name, definition.parameters, text(definition.body))
     if isinstance(definition, Function):
@@ -128,10 +144,22 @@ def _definition(record: Record) -> Definition:
     return Relation(record.name, record.arity, record.semantics, record.tuples, record.costs, record.default_cost)
 
 
+def _global(record: PredicateRecord) -> GlobalPredicate:
+    try:
+        made = read_form(record.name, record.form)
+    except MistakeError as bad:
+        raise SharedConstraintError(f"{shortened(record.name)!r}: {bad.message}") from None
+    if made.parameters != record.parameters:
+        raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
+    return made
+
+
 def _in_intension(record: PredicateRecord | FunctionRecord) -> Predicate | Function:
     names = record.parameters
     if len(names) > MOST_TERMS or len(set(names)) < len(names):
         raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
+    if isinstance(record, PredicateRecord) and record.form:
+        return _global(record)
     if isinstance(record, PredicateRecord):
         return Predicate(record.name, names, _body(record, Type.BOOLEAN))
     function = Function(record.name, names, _body(record, Type.INTEGER))

@@ -59,11 +59,12 @@ from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.encoding import Cost
+from robochoc.solver.shared_constraint import OtherValues
 
 Raised = tuple[int, int]
 """Two counts of raised modifiers: where the constraint was broken, and where it just cost something."""
 
-Key = tuple[int | None, tuple[int, ...] | None]
+Key = tuple[int | None, OtherValues | None]
 """The entries of a table that are raised together: those of one code of own values, of what the others say, or all."""
 
 MOST = 1 << 62
@@ -167,7 +168,7 @@ class GDBA(Gainers):
         least, most = self._ranges[number]
         return cost > least if self.settings.violation == "NM" else cost == most
 
-    def _key(self, code: int, others: tuple[int, ...]) -> Key:
+    def _key(self, code: int, others: OtherValues) -> Key:
         """Return the entries that are raised with the one of an own value's `code` and what the `others` say."""
         scope = self.settings.scope
         return code if scope in "EC" else None, others if scope in "ER" else None

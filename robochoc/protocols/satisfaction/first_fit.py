@@ -34,7 +34,7 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FirstFit(Protocol):
-    """One robot. `view` holds the values of the parents that fly, `awaited` the parents without a message yet."""
+    """One robot. `view` holds the values of the parents, `awaited` the parents without a message yet."""
 
     messages: ClassVar[Any] = Placed
     traits: ClassVar[Traits] = Traits(
@@ -45,6 +45,7 @@ class FirstFit(Protocol):
         super().__init__(problem, order)
         self.view: dict[str, Value] = {}
         self.awaited = set(problem.parents)
+        problem.allow_absence()
 
     def start(self) -> None:
         """Decide at once if there are no parents."""
@@ -54,8 +55,7 @@ class FirstFit(Protocol):
         """Store a parent's decision."""
         value = cast("Placed", message).value
         self.awaited.discard(sender)
-        if value is not None:
-            self.view[sender] = value
+        self.view[sender] = (None,) * self.problem.width(sender) if value is None else value
 
     def settle(self) -> None:
         """Decide and send the decision once all parents have decided; each robot does so exactly once."""

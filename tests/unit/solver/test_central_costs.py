@@ -22,13 +22,12 @@ from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Se
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.incumbent import robots_without_values
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import Solved
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError
-from robochoc.verification.checker import RefutedError, violations
+from robochoc.verification.checker import RefutedError, robots_without_values, violations
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import contradiction
 from tests.support.brute_force import least_cost

@@ -17,7 +17,6 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.run import Options, solve
-from robochoc.run.incumbent import robots_without_values
 from robochoc.solver import central
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import BEST
@@ -25,7 +24,7 @@ from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import Network, Table
 from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.weighted import weighted_components
-from robochoc.verification.checker import assignment_cost, violations
+from robochoc.verification.checker import assignment_cost, robots_without_values, violations
 from tests.support.cost_problems import with_costs
 from tests.support.limits import HANG_S, wait_until
 from tests.support.moved_clock import MovedClock

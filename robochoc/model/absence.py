@@ -1,0 +1,403 @@
+"""What a constraint means when a robot is absent: it has withdrawn, was lost, or was removed by an event.
+
+The definition, with examples: docs/reference/absence.md. An aggregate of alike terms that is compared with numbers
+loses the terms of the absent robots and stays in force. Every other constraint that mentions an absent robot is
+dropped. The author of a constraint may say otherwise (`WhenAbsent`). Searches, checker, central solvers and changes of
+a team all use `restated`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import zlib
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from robochoc.model.constraint import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    Function,
+    GlobalPredicate,
+    Predicate,
+    Relation,
+    Variable,
+    WhenAbsent,
+)
+from robochoc.model.expression import Apply, Constant, Expression, Name, names, text
+from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
+
+AGGREGATES = frozenset({"add", "min", "max", "and", "or"})
+"""The operators whose arguments are terms of an aggregate."""
+_COMPARING = AGGREGATES | {"eq", "ne", "lt", "le", "gt", "ge", "in", "not", "sub", "neg", "mul", "if"}
+"""The operators that may compare an aggregate with numbers, or add numbers to it before."""
+_NUMBERS = frozenset({"add", "min", "max"})
+"""Aggregates of numbers: the numbers in their terms may differ from robot to robot."""
+_ALL_DIFFERENT, _CUMULATIVE = "global:allDifferent", "global:cumulative"
+_GROUP = re.compile(r"\{[^}]*\}")
+_FALSE = Predicate("absent", (), Apply("eq", (Constant(0), Constant(1))))
+_NEVER = Predicate("absent", ("X",), Apply("ne", (Name("X"), Name("X"))))
+_TWO = 2
+
+
+class DroppedConstraint(NamedTuple):
+    """A constraint that is not in force because a robot is absent.
+
+    Attributes:
+        name: Its name.
+        robots: The robots in its scope, absent ones included, in priority order.
+    """
+
+    name: str
+    robots: tuple[str, ...]
+
+
+class NotAnAggregateError(Exception):
+    """The expression is not an aggregate of alike terms that is compared with numbers."""
+
+
+def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | None:
+    """Return `constraint` as it holds for the robots that stay; None: it is dropped.
+
+    A constraint that was restated before is restated from its original form, so the order of departures does not
+    matter.
+
+    Args:
+        constraint: The constraint.
+        absent: All variables of the absent robots.
+    """
+    gone = tuple([name for name in constraint.variables if name in absent])
+    if not gone:
+        return constraint
+    if constraint.when_absent is WhenAbsent.FAIL:
+        stay = tuple([name for name in constraint.variables if name not in gone])
+        return replace(broken(constraint, stay[:1]), original=constraint, absent=gone)
+    original = constraint.original or constraint
+    gone += constraint.absent
+    try:
+        found = _remaining(original, gone)
+    except NotAnAggregateError:
+        return None
+    return found and replace(found, original=original, absent=gone)
+
+
+def can_be_restated(constraint: Constraint) -> bool:
+    """Return whether `constraint` can stay in force for fewer robots, in whichever way it is written.
+
+    `x != y` counts as all different over two variables: without one of them nothing is left of it.
+    """
+    if constraint.model is ConstraintModel.PKC or isinstance(constraint.definition, Relation):
+        return False
+    if _is_difference(constraint):
+        return True
+    try:
+        for name in constraint.variables:
+            _remaining(replace(constraint, when_absent=None), {name})
+    except NotAnAggregateError:
+        return False
+    return True
+
+
+def is_absence_proof(constraint: Constraint, variables: Mapping[str, Variable]) -> bool:
+    """Return whether no absence can break `constraint`: fewer terms only make it easier to satisfy.
+
+    Constraints that are dropped are. "At least" is not. False where it is not known.
+
+    Args:
+        constraint: The constraint.
+        variables: The variables whose domains are known.
+    """
+    if constraint.when_absent is WhenAbsent.FAIL:
+        return False
+    if constraint.when_absent is WhenAbsent.DROP or not can_be_restated(constraint):
+        return True
+    definition = constraint.definition
+    if isinstance(definition, Relation) or definition.name in {_ALL_DIFFERENT, _CUMULATIVE}:
+        return True
+    if _is_difference(constraint) or constraint.cost < INFINITE or isinstance(definition, Function):
+        return True
+    formals = _formals(constraint)
+    limits = {name: _interval(variables.get(str(term))) for name, term in formals.items()}
+    direction = _direction(_with_constants(definition.body, formals), limits)
+    return direction is not None and direction >= 0
+
+
+def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | None:
+    """Return what is left of a constraint without the variables `gone`. Raises `NotAnAggregateError`."""
+    definition = constraint.definition
+    if (
+        constraint.when_absent is WhenAbsent.DROP
+        or constraint.model is ConstraintModel.PKC
+        or isinstance(definition, Relation)
+        or (isinstance(definition, Function) and not _is_choice(definition.body))
+    ):
+        raise NotAnAggregateError
+    formals = _formals(constraint)
+    lost = frozenset(formal for formal, term in formals.items() if term in gone)
+    left: Predicate | Function | None
+    if isinstance(definition, GlobalPredicate):
+        left = _remaining_global(definition, lost)
+        terms = [formals[name] for name in left.parameters] if left else []
+    else:
+        body = without_terms(_with_constants(definition.body, formals), lost)
+        kept = names(body) if body else ()
+        symbolic = tuple(name for name in definition.symbolic if name in kept)
+        if body is None:
+            return None
+        name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # several may be left of one definition
+        left = replace(definition, name=name, parameters=kept, body=body, symbolic=symbolic)
+        terms = [formals[name] for name in kept]
+    if left is None:
+        return None
+    scope = tuple(term for term in constraint.scope if term in terms)
+    return replace(constraint, definition=left, scope=scope, parameters=tuple(terms))
+
+
+def without_terms(expression: Expression, lost: Collection[str]) -> Expression | None:
+    """Return an aggregate, compared with numbers, without the terms of the names `lost`.
+
+    Returns:
+        What is left; None: no term.
+
+    Raises:
+        NotAnAggregateError: if it is something else.
+    """
+    mentioned = names(expression)
+    if not any(name in lost for name in mentioned):
+        return expression
+    if not isinstance(expression, Apply):
+        return None
+    terms = [one for one in _flat(expression) if names(one)]
+    if len(terms) >= _TWO:
+        if expression.operator not in AGGREGATES or not _alike(expression.operator, terms):
+            raise NotAnAggregateError
+        kept = [left for one in _flat(expression) if (left := _term(one, lost)) is not None]
+        if not any(names(one) for one in kept):
+            return None
+        return kept[0] if len(kept) == 1 else Apply(expression.operator, tuple(kept))
+    if expression.operator not in _COMPARING:
+        raise NotAnAggregateError
+    (term,) = terms
+    left = without_terms(term, lost)
+    if left is None:
+        return None
+    return Apply(expression.operator, tuple(left if one is term else one for one in _flat(expression)))
+
+
+def _term(term: Expression, lost: Collection[str]) -> Expression | None:
+    """Return what is left of a term of an aggregate; None: it is lost.
+
+    A term that mentions several robots is restated if it is an aggregate of its own and mentions two that stay.
+    """
+    if not any(name in lost for name in names(term)):
+        return term
+    try:
+        left = without_terms(term, lost)
+    except NotAnAggregateError:
+        return None
+    return left if left is not None and len(names(left)) >= _TWO else None
+
+
+def _flat(expression: Apply) -> Sequence[Expression]:
+    """Return the arguments; those of an aggregate within one of its kind are terms of the outer one."""
+    if expression.operator not in AGGREGATES:
+        return expression.arguments
+    found: list[Expression] = []
+    for one in expression.arguments:
+        same = isinstance(one, Apply) and one.operator == expression.operator
+        found += _flat(one) if same and isinstance(one, Apply) else [one]
+    return found
+
+
+def _alike(operator: str, terms: Iterable[Expression]) -> bool:
+    """Return whether terms are equal up to their names; in an aggregate of numbers, up to numbers too."""
+    return len({_shape(term, loose=operator in _NUMBERS) for term in terms}) == 1
+
+
+def _shape(expression: Expression, *, loose: bool) -> Hashable:
+    """Return the form of a term without names; with `loose`, without numbers but for the signs of factors."""
+    match expression:
+        case Name():
+            return "name"
+        case Constant(value):
+            return "number" if loose else value
+        case Apply("neg", (part,)) if loose:
+            return _signed(-1, _shape(part, loose=True))
+        case Apply("mul", arguments) if loose and any(isinstance(one, Constant) for one in arguments):
+            sign, others = 1, []
+            for one in arguments:
+                if isinstance(one, Constant):
+                    sign = sign if one.value >= 0 else -sign
+                else:
+                    others.append(_shape(one, loose=True))
+            return _signed(sign, others[0] if len(others) == 1 else ("mul", *others))
+        case Apply("if", (test, Constant(then), Constant(otherwise))) if loose:
+            return "if", _shape(test, loose=True), _sign(then), _sign(otherwise)
+        case Apply(operator, _):
+            parts = [_shape(one, loose=loose) for one in _flat(expression)]
+            return parts[0] if operator in {"and", "or"} and len({*parts}) == 1 else (operator, *parts)
+
+
+def _signed(sign: int, shape: Hashable) -> Hashable:
+    if sign > 0:
+        return shape
+    return shape[1] if isinstance(shape, tuple) and shape[0] == "minus" else ("minus", shape)
+
+
+def _sign(value: int) -> int:
+    return (value > 0) - (value < 0)
+
+
+def _direction(expression: Expression, limits: Mapping[str, Interval]) -> int | None:
+    """Return how the value of an aggregate moves when it loses terms: 1 up, -1 down, 0 not at all; None: unknown."""
+    if not isinstance(expression, Apply):
+        return 0
+    arguments = _flat(expression)
+    terms = [one for one in arguments if names(one)]
+    if len(terms) >= _TWO:
+        return _direction_of_aggregate(expression.operator, terms, limits)
+    inner = _direction(terms[0], limits) if terms else 0
+    return inner and _carried(expression.operator, arguments, inner)
+
+
+def _direction_of_aggregate(operator: str, terms: Sequence[Expression], limits: Mapping[str, Interval]) -> int | None:
+    if any(len(names(term)) > _TWO for term in terms):  # they may lose terms themselves
+        return None
+    if operator == "add":
+        ranges = [bounds(term, limits) for term in terms]
+        return -1 if all(one.low >= 0 for one in ranges) else 1 if all(one.high <= 0 for one in ranges) else None
+    return {"and": 1, "min": 1, "or": -1, "max": -1}.get(operator)
+
+
+def _carried(operator: str, arguments: Sequence[Expression], inner: int) -> int | None:
+    """Return how the value of `operator` moves when its only argument with names moves as `inner` says."""
+    sign = _SIGNS.get(operator)
+    if sign is not None:
+        return inner * (-sign if not names(arguments[0]) and operator not in AGGREGATES else sign)
+    numbers = [one.value for one in arguments if isinstance(one, Constant)]
+    if len(numbers) < len(arguments) - 1:
+        return None
+    match operator:
+        case "mul":
+            return inner * _sign(math.prod(numbers))
+        case "if" if names(arguments[0]):
+            return inner * _sign(numbers[0] - numbers[1])
+        case _:
+            return None
+
+
+_SIGNS = {"le": -1, "lt": -1, "ge": 1, "gt": 1, "not": -1, "neg": -1, "sub": 1, **dict.fromkeys(AGGREGATES, 1)}
+"""The direction of operators' values as their first argument grows; as the second one grows it is the opposite."""
+
+
+def _interval(variable: Variable | None) -> Interval:
+    if variable is None or not variable.domain.ranges:
+        return ANY_INTEGER
+    return Interval(min(part.start for part in variable.domain.ranges), math.inf)
+
+
+def _formals(constraint: Constraint) -> dict[str, str | int]:
+    """Return the actual parameter of each formal one."""
+    definition = constraint.definition
+    parameters = () if isinstance(definition, Relation) else definition.parameters
+    return dict(zip(parameters, constraint.parameters, strict=True))
+
+
+def _with_constants(expression: Expression, formals: Mapping[str, str | int]) -> Expression:
+    """Return `expression` with the numbers that formal parameters stand for."""
+    match expression:
+        case Name(name):
+            actual = formals[name]
+            return Constant(actual) if isinstance(actual, int) else expression
+        case Apply(operator, arguments) if any(isinstance(formals[name], int) for name in names(expression)):
+            return Apply(operator, tuple(_with_constants(one, formals) for one in arguments))
+        case _:
+            return expression
+
+
+def _is_difference(constraint: Constraint) -> bool:
+    """Return whether `constraint` says that two variables differ: `all_different` is stated by such pairs."""
+    definition = constraint.definition
+    if not isinstance(definition, Predicate) or not isinstance(definition.body, Apply):
+        return False
+    operator, arguments = definition.body.operator, definition.body.arguments
+    return operator == "ne" and all(isinstance(one, Name) for one in arguments)
+
+
+def _is_choice(body: Expression) -> bool:
+    """Return whether `body` is one of two numbers, by a condition that mentions all of its names.
+
+    What it costs is then bounded by the numbers, however many terms the condition has lost.
+    """
+    while isinstance(body, Apply):
+        open_arguments = [one for one in body.arguments if names(one)]
+        if len(open_arguments) != 1:
+            return False
+        if body.operator == "if":
+            return body.arguments[0] is open_arguments[0]
+        (body,) = open_arguments
+    return False
+
+
+def broken(constraint: Constraint, scope: tuple[str, ...]) -> Constraint:
+    """Return a hard constraint of the same name over `scope`, one variable or none, that nothing satisfies."""
+    never = _NEVER if scope else _FALSE
+    return replace(constraint, definition=never, scope=scope, parameters=scope, model=None, cost=INFINITE)
+
+
+def _remaining_global(definition: GlobalPredicate, lost: Collection[str]) -> GlobalPredicate | None:
+    """Return a global constraint without the formal parameters `lost`. Raises `NotAnAggregateError`."""
+    body: Expression | None
+    match definition.name:
+        case "global:allDifferent":
+            words = [word for word in definition.form.split() if word not in lost]
+            if len(words) < len(("[", "one", "other", "]")):
+                return None
+            body, form = _conjunction(definition.body, lost), " ".join(words)
+        case "global:weightedSum":
+            body, form = without_terms(definition.body, lost), _without_groups(definition.form, lost)
+        case "global:cumulative":
+            tasks = [not lost.isdisjoint(group.split()) for group in _GROUP.findall(definition.form)]  # type: ignore[attr-defined]
+            body, form = _cumulative(definition.body, lost, tasks), _without_groups(definition.form, lost)
+        case _:
+            raise NotAnAggregateError
+    if body is None:
+        return None
+    words = form.split()
+    parameters = tuple(dict.fromkeys(word for word in words if word in definition.parameters))
+    symbolic = tuple(name for name in definition.symbolic if name in parameters)
+    return GlobalPredicate(definition.name, parameters, body, symbolic, form=form)
+
+
+def _without_groups(form: str, lost: Collection[str]) -> str:
+    """Return the form of a global constraint without the groups in braces that mention one of `lost`."""
+    left = _GROUP.sub(lambda group: "" if any(word in lost for word in group[0].split()) else group[0], form)
+    return " ".join(left.split())
+
+
+def _conjunction(body: Expression, lost: Collection[str]) -> Expression | None:
+    """Return the conjuncts of `body` that mention none of `lost`."""
+    parts = body.arguments if isinstance(body, Apply) and body.operator == "and" else (body,)
+    kept = tuple(one for one in parts if not any(name in lost for name in names(one)))
+    return Apply("and", kept) if len(kept) > 1 else kept[0] if kept else None
+
+
+def _cumulative(body: Expression, lost: Collection[str], tasks: Sequence[bool]) -> Expression | None:
+    """Return the body of a cumulative constraint without the lost `tasks`; its last conjuncts are one peak a task."""
+    if all(tasks):
+        return None
+    if not isinstance(body, Apply) or body.operator != "and":
+        raise NotAnAggregateError
+    conditions, peaks = body.arguments[: -len(tasks)], body.arguments[-len(tasks) :]
+    kept = [one for one in conditions if not any(name in lost for name in names(one))]
+    for is_lost, peak in zip(tasks, peaks, strict=True):
+        if not is_lost:
+            load, limit = peak.arguments if isinstance(peak, Apply) else ()
+            loads = load.arguments if isinstance(load, Apply) and load.operator == "add" else (load,)
+            others = tuple(one for one in loads if not any(name in lost for name in names(one)))
+            kept.append(Apply("le", (Apply("add", others) if len(others) > 1 else others[0], limit)))
+    if any(name in lost for one in kept for name in names(one)):
+        raise NotAnAggregateError
+    return Apply("and", tuple(kept)) if len(kept) > 1 else kept[0]
