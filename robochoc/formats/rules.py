@@ -53,7 +53,7 @@ def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits
     if not constraint.variables:
         raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
     _check_application(constraint.definition, constraint.scope, constraint.parameters)
-    if constraint.when_absent is WhenAbsent.RESTATE and not can_be_restated(constraint):
+    if constraint.when_absent == WhenAbsent.RESTATE and not can_be_restated(constraint):
         message = "the constraint cannot be restated for fewer robots (when_absent)"
         raise MistakeError(message, "only sum, count, and, or, min, max of alike terms, compared with numbers, can be")
     if constraint.cost == INFINITE:

@@ -19,11 +19,11 @@ from robochoc.model.constraint import (
     INFINITE,
     Constraint,
     ConstraintModel,
+    Domain,
     Function,
     GlobalPredicate,
     Predicate,
     Relation,
-    Variable,
     WhenAbsent,
 )
 from robochoc.model.expression import Apply, Constant, Expression, Name, names, text
@@ -71,7 +71,7 @@ def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | No
     gone = tuple([name for name in constraint.variables if name in absent])
     if not gone:
         return constraint
-    if constraint.when_absent is WhenAbsent.FAIL:
+    if constraint.when_absent == WhenAbsent.FAIL:
         stay = tuple([name for name in constraint.variables if name not in gone])
         return replace(broken(constraint, stay[:1]), original=constraint, absent=gone)
     original = constraint.original or constraint
@@ -88,7 +88,7 @@ def can_be_restated(constraint: Constraint) -> bool:
 
     `x != y` counts as all different over two variables: without one of them nothing is left of it.
     """
-    if constraint.model is ConstraintModel.PKC or isinstance(constraint.definition, Relation):
+    if constraint.model == ConstraintModel.PKC or isinstance(constraint.definition, Relation):
         return False
     if _is_difference(constraint):
         return True
@@ -100,18 +100,18 @@ def can_be_restated(constraint: Constraint) -> bool:
     return True
 
 
-def is_absence_proof(constraint: Constraint, variables: Mapping[str, Variable]) -> bool:
+def is_absence_proof(constraint: Constraint, domains: Mapping[str, Domain]) -> bool:
     """Return whether no absence can break `constraint`: fewer terms only make it easier to satisfy.
 
     Constraints that are dropped are. "At least" is not. False where it is not known.
 
     Args:
         constraint: The constraint.
-        variables: The variables whose domains are known.
+        domains: The domains of variables, as far as they are known.
     """
-    if constraint.when_absent is WhenAbsent.FAIL:
+    if constraint.when_absent == WhenAbsent.FAIL:
         return False
-    if constraint.when_absent is WhenAbsent.DROP or not can_be_restated(constraint):
+    if constraint.when_absent == WhenAbsent.DROP or not can_be_restated(constraint):
         return True
     definition = constraint.definition
     if isinstance(definition, Relation) or definition.name in {_ALL_DIFFERENT, _CUMULATIVE}:
@@ -119,7 +119,7 @@ def is_absence_proof(constraint: Constraint, variables: Mapping[str, Variable]) 
     if _is_difference(constraint) or constraint.cost < INFINITE or isinstance(definition, Function):
         return True
     formals = _formals(constraint)
-    limits = {name: _interval(variables.get(str(term))) for name, term in formals.items()}
+    limits = {name: _interval(domains.get(str(term))) for name, term in formals.items()}
     direction = _direction(_with_constants(definition.body, formals), limits)
     return direction is not None and direction >= 0
 
@@ -128,8 +128,8 @@ def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | No
     """Return what is left of a constraint without the variables `gone`. Raises `NotAnAggregateError`."""
     definition = constraint.definition
     if (
-        constraint.when_absent is WhenAbsent.DROP
-        or constraint.model is ConstraintModel.PKC
+        constraint.when_absent == WhenAbsent.DROP
+        or constraint.model == ConstraintModel.PKC
         or isinstance(definition, Relation)
         or (isinstance(definition, Function) and not _is_choice(definition.body))
     ):
@@ -292,10 +292,10 @@ _SIGNS = {"le": -1, "lt": -1, "ge": 1, "gt": 1, "not": -1, "neg": -1, "sub": 1, 
 """The direction of operators' values as their first argument grows; as the second one grows it is the opposite."""
 
 
-def _interval(variable: Variable | None) -> Interval:
-    if variable is None or not variable.domain.ranges:
+def _interval(domain: Domain | None) -> Interval:
+    if domain is None or not domain.ranges:
         return ANY_INTEGER
-    return Interval(min(part.start for part in variable.domain.ranges), math.inf)
+    return Interval(min(part.start for part in domain.ranges), math.inf)
 
 
 def _formals(constraint: Constraint) -> dict[str, str | int]:

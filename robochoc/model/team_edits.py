@@ -79,7 +79,7 @@ class Absence:
         rank = {name: place for place, name in enumerate(team.order)}
         for robot in team.robots:
             for constraint in robot.private if robot.name in absent else ():
-                if constraint.when_absent is WhenAbsent.FAIL:
+                if constraint.when_absent == WhenAbsent.FAIL:
                     self._add(constraint)
             for constraint in (*robot.shared, *(part for child in robot.children for part in child.constraints)):
                 if not self._gone.isdisjoint(constraint.variables) and not self._add(constraint):

@@ -66,7 +66,7 @@ class Draft:
 
     def when_absent_is(self, when_absent: WhenAbsent | None) -> Draft:
         """Return this draft with the meaning `when_absent`. Raises `ModelError` if it cannot be restated."""
-        if when_absent is WhenAbsent.RESTATE:
+        if when_absent == WhenAbsent.RESTATE:
             names = tuple(variable.name for variable in self.scope)
             formals = tuple(f"X{number}" for number in range(len(names)))
             body = None if self.body is None else Predicate("", formals, self.body)

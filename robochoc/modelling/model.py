@@ -199,7 +199,7 @@ class Model(Solvable):
         check_owned(term, self.variables, place, event)
         absence = absence_or_none(when_absent, place)
         rule = Rule(name or self._free_name(), term, exact_or_none(cost), place, absence)
-        if absence is WhenAbsent.RESTATE:
+        if absence == WhenAbsent.RESTATE:
             list(rule.drafts())
         return rule
 

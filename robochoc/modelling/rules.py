@@ -41,7 +41,7 @@ class Rule:
         from robochoc.modelling.drafts import conditions, soft_condition  # noqa: PLC0415 - they need the formats
 
         if self.cost is None:
-            in_pairs = self.when_absent is not WhenAbsent.DROP  # otherwise pairs of robots that stay would remain
+            in_pairs = self.when_absent != WhenAbsent.DROP  # otherwise pairs of robots that stay would remain
             drafts = conditions(self.term, self.name, self.place, in_pairs=in_pairs)
         else:
             drafts = iter([soft_condition(self.term, self.cost, self.name, self.place)])

@@ -48,6 +48,8 @@ class Traits:
         allocates: It takes task allocations only: teams that share nothing but that some things are done by one robot
             at most, and in which each robot can do without (`solver/exclusions.py`).
         congestion: Of those it also takes such in which several robots may do a task, each pair of them at a cost.
+        absence_proof_only: It takes only constraints that no absent robot can break (`model/absence.py`): its robots
+            withdraw one after the other, and none comes back.
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
     """
@@ -74,6 +76,7 @@ class Traits:
     bears_loss: bool = False
     allocates: bool = False
     congestion: bool = False
+    absence_proof_only: bool = False
     privacy: str = ""
     use_when: str = ""
 

@@ -52,7 +52,7 @@ class LocalConstraints:
         # Values are distinct: a robot that shows nothing looks the same withdrawn, which is never cheaper.
         if part.parameters.withdrawal_cost is not None and (robot.interface or not self.values):
             self.values = (*self.values, (None,) * len(robot.interface))
-            must_stay = any(one.when_absent is WhenAbsent.FAIL for one in robot.private)
+            must_stay = any(one.when_absent == WhenAbsent.FAIL for one in robot.private)
             aside = INFINITE if must_stay else part.parameters.withdrawal_cost * robot.weight
             self.charges = (*self.charges, aside)
         self.checks = 0

@@ -114,8 +114,8 @@ class SharedConstraint:
     def allow_absence(self) -> None:
         """From now on values that are None mean that a robot is withdrawn: see `model/absence.py`."""
         absent = self._constraint.when_absent
-        self._bears_absence = absent is WhenAbsent.FAIL or (
-            absent is not WhenAbsent.DROP and can_be_restated(self._constraint) and len(self._seen) > 0
+        self._bears_absence = absent == WhenAbsent.FAIL or (
+            absent != WhenAbsent.DROP and can_be_restated(self._constraint) and len(self._seen) > 0
         )
 
     def compile(self, own: OwnValues) -> None:

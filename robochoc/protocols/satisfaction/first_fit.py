@@ -38,7 +38,11 @@ class FirstFit(Protocol):
 
     messages: ClassVar[Any] = Placed
     traits: ClassVar[Traits] = Traits(
-        concludes=(), paper="paper, Section 5.2", complete=False, writes_to_non_neighbours=False
+        concludes=(),
+        paper="paper, Section 5.2",
+        complete=False,
+        writes_to_non_neighbours=False,
+        absence_proof_only=True,
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -203,8 +203,9 @@ def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
 
 def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
     """Raise `UnfitProtocolError` for constraints that the one called `name` cannot take."""
+    domains = {name: variable.domain for name, variable in team.variables.items()} if traits.absence_proof_only else {}
     for robot in team.robots:
-        unmet = unmet_requirement(robot, traits, team.owner)
+        unmet = unmet_requirement(robot, traits, team.owner, domains)
         if unmet:
             raise UnfitProtocolError(f"{unmet}, which {name} does not support")
     if traits.allocates and (fault := allocation_fault(team, congestion=traits.congestion)):
