@@ -23,8 +23,8 @@ class _Watched(list[Cost]):
     def __init__(
         self,
         prices: list[Cost],
-        pairs: list[frozenset[tuple[str, int]]],
-        seen: set[frozenset[tuple[str, int]]],
+        pairs: list[frozenset[tuple[str, int | None]]],
+        seen: set[frozenset[tuple[str, int | None]]],
         *,
         singly: bool,
     ) -> None:
@@ -64,7 +64,7 @@ def _before(team: Team) -> Above:
 
 
 def _watched(team: Team, monkeypatch: pytest.MonkeyPatch, singly: Collection[tuple[str, str, str]]) -> Asked:
-    asked = defaultdict[tuple[str, str], set[frozenset[tuple[str, int]]]](set)
+    asked = defaultdict[tuple[str, str], set[frozenset[tuple[str, int | None]]]](set)
     parts = {}
     for holder, other, name in pkc_parts(team):
         parts[f"{holder}<{other}:{name}"] = parts[f"{holder}>{other}:{name}"] = (holder, other, name)

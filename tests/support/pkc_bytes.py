@@ -24,7 +24,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 from tests.support.pkc_problems import allowed, as_predicate, as_table, pkc_parts, rows, with_constraints
 
-Asked = Mapping[tuple[str, str], set[frozenset[tuple[str, int]]]]
+Asked = Mapping[tuple[str, str], set[frozenset[tuple[str, int | None]]]]
 """Of each holder's constraint, by name, the pairs that were looked up: values by variable."""
 
 Free = Callable[[Mapping[str, int]], bool]
@@ -81,7 +81,7 @@ def nothing_hidden(protocol: type[Protocol], envelopes: Iterable[Envelope]) -> N
 
 def watched(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
     """From now on every look at a part of a PKC is noted. For robots of one variable."""
-    asked = defaultdict[tuple[str, str], set[frozenset[tuple[str, int]]]](set)
+    asked = defaultdict[tuple[str, str], set[frozenset[tuple[str, int | None]]]](set)
     below = {f"{holder}<{other}:{name}": (holder, other, name) for holder, other, name in pkc_parts(team)}
     above = {f"{holder}>{other}:{name}": (holder, other, name) for holder, other, name in pkc_parts(team)}
     parts = {**below, **above}
