@@ -24,6 +24,9 @@ from robochoc.model.outcome import (
 )
 from robochoc.system.decode_errors import describe_decode_error
 
+Value = int | float | Decimal | str
+"""A value in a JSON result: a number, or a text for any other value."""
+
 
 class ResultError(ValueError):
     """The text is no JSON result."""
@@ -129,6 +132,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     deadline: float | None = None
     improvements: tuple[_ImprovementForm, ...] = ()
     places: dict[str, tuple[float, ...]] = {}
+    values: dict[str, Any] = {}
     witness: str | None = None
     confirmed_by: tuple[str, ...] = ()
     symbols: tuple[str, ...] = ()
@@ -144,6 +148,7 @@ def result_json(
     outcome: Outcome,
     names: Mapping[str, str] = MappingProxyType({}),
     places: Mapping[str, tuple[float, ...]] = MappingProxyType({}),
+    values: Mapping[str, Value] = MappingProxyType({}),
 ) -> bytes:
     """Return `outcome` as one line of JSON, without the line's end.
 
@@ -151,6 +156,7 @@ def result_json(
         outcome: The outcome.
         names: What robots and variables are called elsewhere, by the names in `outcome`.
         places: Where on a map the values of variables are, in metres.
+        values: The user's values of variables whose integers in the assignment mean something else.
     """
     told = outcome.optima
     form = _Form(
@@ -169,6 +175,7 @@ def result_json(
         },
         names=dict(names),
         places=dict(places),
+        values=dict(values),
     )
     return _ENCODER.encode(form)
 

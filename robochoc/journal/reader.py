@@ -76,7 +76,7 @@ def read_journal(content: bytes) -> Journal:
         if not isinstance(first, Header):  # the follower has seen to it
             raise JournalError("it has no header")
         outcome = last.whole if isinstance(last, Ended) else None
-        events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
+        events = cast("list[AnyEvent]", lines[1:-1] if outcome is not None else lines[1:])  # so has it here
         return Journal(first, tuple(sorted_by_time(events)), outcome, damage, truncated)
 
 
@@ -97,7 +97,7 @@ def lines_of(journal: Journal) -> Iterator[bytes]:
     yield encode(journal.header) + b"\n"
     for event in journal.events:
         yield encode(event) + b"\n"
-    if journal.outcome:
+    if journal.outcome is not None:
         yield encode(Ended.of(journal.outcome)) + b"\n"
 
 

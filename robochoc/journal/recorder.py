@@ -88,7 +88,7 @@ class JournalRecorder:
             self._close_block()  # also what was staged when an interrupt came
             if self._weighed:
                 self._pending, self._weighed = [*self._improved(self._weighed, self._given)], None
-            if self.outcome:
+            if self.outcome is not None:
                 self._pending.append(Ended.of(self.outcome))
             self._close_block()
             self._closed = True

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, ValuesView
 from dataclasses import dataclass, field, fields
+from decimal import Decimal
+from fractions import Fraction
 from functools import cached_property
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from robochoc.formats.result import result_json
 from robochoc.model.headline import describe_outcome
-from robochoc.model.outcome import Outcome
+from robochoc.model.outcome import EpochOutcome, Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.places import UnknownNameError
+from robochoc.modelling.places import ModelTypeError, UnknownNameError
 from robochoc.modelling.terms import Term, Variable
 from robochoc.system.suggestions import did_you_mean
 
@@ -21,50 +24,110 @@ if TYPE_CHECKING:
     from robochoc.modelling.notebook.scenes import ScenePage
 
 
-@dataclass(frozen=True, repr=False)
-class Solution(Outcome):
-    """An outcome, whose values are those that the user wrote.
+class NamedValues(dict[str, object]):
+    """Values by the names of variables. A call gives the values alone: what other mappings call `values()`."""
 
-    `solution[variable]` is the value of a variable, of a term of variables, or of the variable of that name.
+    def __call__(self) -> ValuesView[object]:
+        """Return the values without names."""
+        return super().values()
+
+
+@dataclass(frozen=True)
+class SolutionEpoch(EpochOutcome):
+    """The outcome of an epoch, with the user's values.
 
     Attributes:
+        values: The values of all variables of the robots that are not withdrawn, by name.
+    """
+
+    values: Mapping[str, object] = field(default_factory=dict, compare=False)
+
+
+@dataclass(frozen=True, repr=False)
+class Solution(Outcome, Mapping[str, object]):
+    """An outcome, whose values are those that the user wrote.
+
+    It is a mapping from the names of variables to their values, and true if there is an assignment.
+    `solution[variable]` is the value of a variable, of a term of variables, or of the variable of that name.
+
+    `assignment`, of the outcome, its `epochs` and its `optima`, holds the integers that robots compute with: codes of
+    symbols, multiples of a common unit of numbers. `values` holds the user's values.
+
+    Attributes:
+        epochs: The epochs, if there were several, each with its `values`.
         variables: The variables of the model, by name; empty for a problem from files.
         problem: The team that has solved it. None: it is not known.
     """
 
+    epochs: tuple[SolutionEpoch, ...] = ()
     variables: Mapping[str, Variable] = field(default_factory=dict, compare=False)
     problem: Team | None = field(default=None, compare=False)
 
     @classmethod
     def of(cls, outcome: Outcome, team: Team, variables: Mapping[str, Variable] | None = None) -> Solution:
         """Return an outcome of `team` as a solution."""
-        same: dict[str, Any] = {one.name: getattr(outcome, one.name) for one in fields(Outcome)}
-        return cls(**same, variables=variables or {}, problem=team)
+        same = _fields(outcome, Outcome)
+        values = _Values(variables or {}, team)
+        epochs = [
+            SolutionEpoch(**_fields(epoch, EpochOutcome), values=values(epoch.assignment)) for epoch in outcome.epochs
+        ]
+        return cls(**same | {"epochs": tuple(epochs)}, variables=variables or {}, problem=team)
 
     @cached_property
-    def values(self) -> dict[str, object]:
+    def values(self) -> NamedValues:  # a method of other mappings: it can be called
         """The values of all variables of the robots that are not withdrawn, by name."""
-        return {name: self._told(name, value) for name, value in self.assignment.items()}
+        return self.values_of(self.assignment)
+
+    @cached_property
+    def listed(self) -> tuple[NamedValues, ...]:
+        """The optima, or solutions, that a protocol such as `list-dpop` has listed: the values of each."""
+        return tuple(map(self.values_of, self.optima.assignments)) if self.optima else ()
+
+    def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
+        """Return the user's values for the integers of an assignment, such as that of an event."""
+        return _Values(self.variables, self.problem)(assignment)
+
+    def __bool__(self) -> bool:
+        """Return whether there is an assignment."""
+        return bool(self.assignment)
+
+    def __len__(self) -> int:
+        """Return the number of variables that have values."""
+        return len(self.assignment)
 
     def __getitem__(self, what: Term | str) -> object:
         """Return the value of a variable or a term, or of the variable that is called so.
 
+        Variables of a copy of the model, such as one that another process has solved, count as those of this solution.
+
         Raises:
             UnknownNameError: if it has none: there is no solution, or its robot is withdrawn.
+            ModelTypeError: if it is neither a term nor a name.
         """
-        name = what if isinstance(what, str) else what.name if isinstance(what, Variable) else None
-        if isinstance(what, Term) and name is None:
+        if isinstance(what, Variable):
+            return self._value(what.name, what)
+        if isinstance(what, Term):
             try:
                 return what.value({variable: self[variable] for variable in what.variables})
             except UndefinedTermError:
                 raise UnknownNameError(f"{what!r} has no value: a division by zero") from None
-        if name in self.values and not (isinstance(what, Variable) and self._is_foreign(what)):
-            return self.values[str(name)]
-        raise UnknownNameError(f"{name!r} has no value", self._why(str(name)))
+        if not isinstance(what, str):
+            raise ModelTypeError(f"{what!r} has no value", "expected a variable, a term of variables, or a name")
+        return self._value(what)
+
+    def _value(self, name: str, variable: Variable | None = None) -> object:
+        if name not in self.values:
+            raise UnknownNameError(f"{name!r} has no value", self._why(name))
+        if variable is not None and self._is_foreign(variable):
+            raise UnknownNameError(f"{name!r} is a variable of another model", "its robot or its domain is another")
+        return self.values[name]
 
     def __contains__(self, what: object) -> bool:
-        """Return whether a variable, or the variable of that name, has a value."""
-        return (what.name if isinstance(what, Variable) else what) in self.assignment
+        """Return whether a variable, a term, or the variable of that name, has a value."""
+        try:
+            return isinstance(what, Term | str) and (self[what], True)[1]
+        except UnknownNameError:
+            return False
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the variables that have values."""
@@ -72,7 +135,9 @@ class Solution(Outcome):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON result as a dictionary (docs/reference/result.md)."""
-        told: dict[str, Any] = json.loads(result_json(self))
+        numbers = {name: one for name, one in self.values.items() if isinstance(one, Real | Decimal)}
+        told_otherwise = {name: _in_json(one) for name, one in numbers.items() if one != self.assignment[name]}
+        told: dict[str, Any] = json.loads(result_json(self, values=told_otherwise))
         return told
 
     def __repr__(self) -> str:
@@ -95,13 +160,10 @@ class Solution(Outcome):
         return solution_html(self)
 
     def _is_foreign(self, variable: Variable) -> bool:
-        return bool(self.variables) and self.variables.get(variable.name) is not variable
-
-    def _told(self, name: str, value: int) -> object:
-        if name in self.variables:
-            return self.variables[name].codes.value(value)
-        known = self.problem.variables.get(name) if self.problem else None
-        return known.domain.label(value) if known else value
+        own = self.variables.get(variable.name)
+        if own is None or own is variable:
+            return own is None and bool(self.variables)
+        return own.owner != variable.owner or (own.codes != variable.codes and set(own.domain) != set(variable.domain))
 
     def _why(self, name: str) -> str:
         if not self.assignment:
@@ -110,3 +172,29 @@ class Solution(Outcome):
         if owner in self.withdrawn:
             return f"{owner} is withdrawn"
         return did_you_mean(name, self.assignment, "it is no variable of this problem")
+
+
+class _Values:
+    """The user's values for the integers of assignments: by the variables of a model, or the domains of a team."""
+
+    def __init__(self, variables: Mapping[str, Variable], team: Team | None) -> None:
+        self._variables = variables
+        self._known = team.variables if team else {}
+
+    def __call__(self, assignment: Mapping[str, int]) -> NamedValues:
+        return NamedValues((name, self._value(name, code)) for name, code in assignment.items())
+
+    def _value(self, name: str, code: int) -> object:
+        if name in self._variables:
+            return self._variables[name].codes.value(code)
+        known = self._known.get(name)
+        return known.domain.label(code) if known else code
+
+
+def _in_json(number: Real | Decimal) -> float | Decimal | str:
+    return number if isinstance(number, Decimal) else str(number) if isinstance(number, Fraction) else float(number)
+
+
+def _fields(source: object, kind: type) -> dict[str, Any]:
+    """Return the values of the fields of the dataclass `kind` in `source`, by name."""
+    return {one.name: getattr(source, one.name) for one in fields(kind)}

@@ -102,7 +102,7 @@ class PageData:
                 "robots": [{"name": name, "variables": self.names.variables(name)} for name in trace.robots],
                 "kinds": [self._kind(name) for name in trace.kinds],
                 "runs": [_run(run) for run in trace.runs],
-                "outcome": msgspec.Raw(result_json(trace.outcome)) if trace.outcome else None,
+                "outcome": msgspec.Raw(result_json(trace.outcome)) if trace.outcome is not None else None,
                 "notes": [_note_of(note) for note in _told(trace.notes)],
                 "replay": self.cannot_replay(),
                 "chosen": self._chosen,
