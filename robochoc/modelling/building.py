@@ -204,14 +204,29 @@ class _Builder:
         owners = {self._model.variables[name].owner for name in constraint.variables}
         return [name for name in order if name in owners]
 
+    @property
+    def rules(self) -> list[Rule]:
+        """The constraints that there are before the first event."""
+        return [*self._model.constraints, *(part for robot in self._robots for part in robot.parts)]
+
+    def shared_by(self, rule: Rule, order: Sequence[str]) -> set[tuple[str, str, str]]:
+        """Return the name of `rule` with the two robots that hold it, for each constraint that it becomes."""
+        scopes = [{variable.owner for variable in draft.scope} for draft in rule.drafts()]
+        robots = [[name for name in order if name in scope] for scope in scopes]
+        return {(rule.name, names[-1], names[-2]) for names in robots if len(names) > 1}
+
 
 class _Changing:
-    """The robots and the constraints between them, while events happen."""
+    """The robots and the constraints between them, while events happen.
+
+    `held`: the name of each constraint with the two robots that hold it.
+    """
 
     def __init__(self, builder: _Builder, order: list[str], held: set[tuple[str, str, str]]) -> None:
         self._builder = builder
         self._order = order
         self._held = held
+        self._rules = builder.rules
 
     def changes(self, event: Event) -> Iterable[Change]:
         """Yield the changes of an event."""
@@ -225,6 +240,8 @@ class _Changing:
                 before = self._order[: self._order.index(step.name)]
                 yield AddAgent(self._builder.joining(step, before, new[step.name]))
             elif isinstance(step, Rule):
+                self._held |= self._builder.shared_by(step, self._order)
+                self._rules.append(step)
                 yield from added[step]
             elif isinstance(step, Removal):
                 yield from self._removed(step)
@@ -248,14 +265,22 @@ class _Changing:
                 raise ModelError(f"the constraint {rule.name} is over variables of {lowest} alone", hint, rule.place)
             else:
                 found.append(AddConstraint(lowest, others[-1], constraint))
-            self._held |= {(rule.name, lowest, above) for above in others[-1:]}
         return found
 
     def _removed(self, removal: Removal) -> Iterable[RemoveConstraint]:
-        found = sorted(one for one in self._held if one[0] == removal.name)
+        found = {one for one in self._held if one[0] == removal.name}
+        there = [one for one in self._rules if one.name == removal.name]
+        if isinstance(removal.removed, Rule):
+            found &= self._builder.shared_by(removal.removed, self._order)
+            for other in (one for one in there if one is not removal.removed):
+                if self._builder.shared_by(other, self._order) & found:
+                    hint = "give it another name: an event removes a constraint by its name and robots"
+                    raise ModelError(f"{removal.removed!r} has the name and robots of {other!r}", hint, removal.place)
+            there = [removal.removed]
         if not found:
             hint = did_you_mean(removal.name, {one[0] for one in self._held}, "an event removes those between robots")
             raise ModelError(f"robots share no constraint {removal.name!r} at that time", hint, removal.place)
-        self._held.difference_update(found)
-        for name, agent, parent in found:
+        self._held -= found
+        self._rules = [one for one in self._rules if not any(one is removed for removed in there)]
+        for name, agent, parent in sorted(found):
             yield RemoveConstraint(agent, parent, name)

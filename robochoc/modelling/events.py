@@ -17,10 +17,15 @@ if TYPE_CHECKING:
 
 
 class Removal:
-    """The removal of a constraint, by its name, in a line of the user's."""
+    """The removal of one constraint, or of all that have a name, in a line of the user's."""
 
-    def __init__(self, name: str, place: Place) -> None:
-        self.name, self.place = name, place
+    def __init__(self, removed: Rule | str, place: Place) -> None:
+        self.removed, self.place = removed, place
+
+    @property
+    def name(self) -> str:
+        """The name of what is removed."""
+        return self.removed if isinstance(self.removed, str) else self.removed.name
 
 
 Step = RemoveAgent | RemoveValue | AddValue | ModelRobot | Rule | Removal
@@ -77,10 +82,20 @@ class Event:
         return rule
 
     def remove_constraint(self, constraint: Rule | str) -> None:
-        """Remove a constraint between robots: what `add` returned, or its name."""
+        """Remove a constraint between robots.
+
+        Args:
+            constraint: What `add` returned: this constraint is removed, and others of its name stay. Or a name: all
+                constraints between robots that have it are removed.
+
+        Raises:
+            ModelError: if the model has no such constraint.
+        """
         if not isinstance(constraint, (Rule, str)):
             raise ModelTypeError(f"{constraint!r} is no constraint that was added", "give what add() returned")
-        self._add(Removal(constraint.name if isinstance(constraint, Rule) else constraint, here()))
+        if isinstance(constraint, Rule) and not any(one is constraint for one in self._model.rules):
+            raise ModelError(f"{constraint!r} is not a constraint of {self._model!r}", "give what add() returned")
+        self._add(Removal(constraint, here()))
 
     def _add(self, step: Step) -> None:
         self.steps.append(step)

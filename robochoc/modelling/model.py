@@ -17,7 +17,9 @@ from __future__ import annotations
 
 import copy
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Self
 
 from robochoc.formats import InvalidInputError, encodable, read_team, write_team
@@ -36,30 +38,23 @@ from robochoc.modelling.numbers import Exact, check_places, whole_number
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.rules import Rule, absence_or_none, check_owned, conditions_in, exact_or_none
-from robochoc.modelling.solution import Solution
+from robochoc.modelling.solution import NamedValues, Solution, UserValues
 from robochoc.modelling.solving import Solvable
 from robochoc.modelling.terms import Variable, all_of, number
 from robochoc.system.suggestions import did_you_mean
 
 
 class Model(Solvable):
-    """A problem that is made in Python: robots with variables, constraints, costs, and what changes over time.
-
-    Attributes:
-        name: Its name, that of its team.
-        robots: The robots, by name.
-        variables: The variables of all robots, by their names in the team.
-        constraints: What was added, in order.
-    """
+    """A problem that is made in Python: robots with variables, constraints, costs, and what changes over time."""
 
     def __init__(self, name: str = "model") -> None:
-        self.name = name
-        self.robots: dict[str, ModelRobot] = {}
-        self.variables: dict[str, Variable] = {}
-        self.constraints: list[Rule] = []
+        self._name = name
+        self._robots: dict[str, ModelRobot] = {}
+        self._variables: dict[str, Variable] = {}
+        self._constraints: list[Rule] = []
         self.symbols = Symbols()
-        self.events: list[Event] = []
-        self.objective: list[Part] = []
+        self._events: list[Event] = []
+        self._objective: list[Part] = []
         self.constant: Exact = 0
         self.maximized: bool | None = None
         self.given: Given | None = None
@@ -88,8 +83,45 @@ class Model(Solvable):
             added.topics += robot.topics
             for variable in robot.variables:
                 made = given_variable(variable, robot.name, model.symbols, place)
-                added.variables[variable.name] = model.variables[variable.name] = made
+                added.add_variable(variable.name, made)
         return model
+
+    # Views: a change of one would not reach the team, so they are read-only.
+
+    @property
+    def name(self) -> str:
+        """The name of the model and of its team."""
+        return self._name
+
+    @name.setter
+    def name(self, name: str) -> None:
+        self._name = name
+        self.changed()
+
+    @property
+    def robots(self) -> Mapping[str, ModelRobot]:
+        """The robots, by name."""
+        return MappingProxyType(self._robots)
+
+    @property
+    def variables(self) -> Mapping[str, Variable]:
+        """The variables of all robots, by their names in the team."""
+        return MappingProxyType(self._variables)
+
+    @property
+    def constraints(self) -> tuple[Rule, ...]:
+        """The constraints that were added and not removed, in order."""
+        return tuple(self._constraints)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events, in order."""
+        return tuple(self._events)
+
+    @property
+    def objective(self) -> tuple[Part, ...]:
+        """The terms of the sum that is minimised or maximised: factor, term, and the line that added it."""
+        return tuple(self._objective)
 
     def robot(self, name: str, *, priority: float = 0, weight: int = 1) -> ModelRobot:
         """Add a robot.
@@ -106,9 +138,14 @@ class Model(Solvable):
 
     def add_robot(self, name: str, priority: float, weight: int, place: Place) -> ModelRobot:
         """Add a robot of a name that is free. See `robot`."""
-        self.robots[name] = ModelRobot(self, name, priority, weight, place)
+        self._robots[name] = ModelRobot(self, name, priority, weight, place)
         self.changed()
-        return self.robots[name]
+        return self._robots[name]
+
+    def add_variable(self, variable: Variable) -> None:
+        """Add a variable of a name that is free. See `ModelRobot.variable`."""
+        self._variables[variable.name] = variable
+        self.changed()
 
     def __getitem__(self, name: str) -> Variable:
         """Return the variable that is called `name` in the team, such as `drone3.slot`."""
@@ -140,9 +177,22 @@ class Model(Solvable):
             ModelError: if they are no conditions over variables of this model, or cannot be restated.
         """
         rule = self.rule(constraints, cost, name, when_absent=when_absent)
-        self.constraints.append(rule)
+        self._constraints.append(rule)
         self.changed()
         return rule
+
+    def remove(self, constraint: Rule) -> None:
+        """Remove a constraint: what `add`, or a robot's `knows`, returned. Others of its name stay.
+
+        Raises:
+            ModelError: if the model does not have it, or only an event adds it.
+        """
+        for kept in (self._constraints, *(robot.parts for robot in self._robots.values())):
+            if any(one is constraint for one in kept):
+                kept.remove(constraint)
+                self.changed()
+                return
+        raise ModelError(f"{constraint!r} is not a constraint of {self!r}", "give what add() returned")
 
     def __iadd__(self, constraints: object) -> Self:
         """Add constraints, as `add` does."""
@@ -180,7 +230,7 @@ class Model(Solvable):
         term = number(given)
         check_owned(term, self.variables, place)
         parts, constant = split(term, place, check_places(places))
-        self.objective += parts
+        self._objective += parts
         self.constant += constant
         self.maximized = maximize
         self.changed()
@@ -202,6 +252,13 @@ class Model(Solvable):
         if absence == WhenAbsent.RESTATE:
             list(rule.drafts())
         return rule
+
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """All constraints: those of the model, the parts that robots know, and those that events add."""
+        parts = [part for robot in self._robots.values() for part in robot.parts]
+        later = [step for event in self._events for step in event.steps if isinstance(step, Rule)]
+        return (*self._constraints, *parts, *later)
 
     def free_prefix(self, prefix: str) -> str:
         """Return `prefix`, or something like it, with which no name of a constraint begins."""
@@ -227,9 +284,9 @@ class Model(Solvable):
         return self._event(whole)
 
     def _event(self, after: int | None) -> Event:
-        self.events.append(Event(self, after, here()))
+        self._events.append(Event(self, after, here()))
         self.changed()
-        return self.events[-1]
+        return self._events[-1]
 
     def changed(self) -> None:
         """Forget the team: the model has changed."""
@@ -241,6 +298,10 @@ class Model(Solvable):
         if self._team is None:
             self._team = built(self)
         return self._team
+
+    def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
+        """Return the user's values for the integers of an assignment, such as that of an event or an epoch."""
+        return UserValues(self._variables, None)(assignment)
 
     def save(self, folder: Path | str, *, replace: bool = False) -> None:
         """Write the robots' files, and `scenario.xml` if something changes over time: all of them, or none.

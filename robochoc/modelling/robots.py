@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from robochoc.formats.names import MAX_NAME, MAX_WEIGHT, RESERVED, is_name
@@ -24,20 +25,41 @@ class ModelRobot:
     """A robot of a model. `Model.robot` makes it.
 
     Attributes:
-        name: Its name.
-        priority: Robots with a higher one come first; of equal ones, those that were made first.
-        weight: How much its withdrawal counts.
-        variables: Its variables, by the names that they were given.
         place: The line that made it.
     """
 
     def __init__(self, model: Model, name: str, priority: float, weight: int, place: Place) -> None:
-        self.name, self.priority, self.weight, self.place = name, priority, int(weight), place
-        self.variables: dict[str, Variable] = {}
+        self._name, self._priority, self._weight, self.place = name, priority, int(weight), place
+        self._variables: dict[str, Variable] = {}
         self.joins: object = None
         self.topics: list[Topic] = []
         self.parts: list[Rule] = []
         self._model = model
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._name
+
+    @property
+    def priority(self) -> float:
+        """Its priority: robots with a higher one come first; of equal ones, those that were made first."""
+        return self._priority
+
+    @property
+    def weight(self) -> int:
+        """How much its withdrawal counts."""
+        return self._weight
+
+    @property
+    def variables(self) -> Mapping[str, Variable]:
+        """Its variables, by the names that they were given."""
+        return MappingProxyType(self._variables)
+
+    def add_variable(self, name: str, variable: Variable) -> None:
+        """Add a variable of a name that is free. See `variable`."""
+        self._variables[name] = variable
+        self._model.add_variable(variable)
 
     def __repr__(self) -> str:
         return f"<robot {self.name}: {', '.join(map(repr, self.variables.values())) or 'no variables yet'}>"
@@ -74,8 +96,7 @@ class ModelRobot:
             raise ModelError(f"there is a variable {there!r} already, made at {there.place}", "give it another name")
         codes = codes_of(domain, self._model.symbols, place)
         made = Variable(whole, codes, self.name, place, self.joins)
-        self.variables[name] = self._model.variables[whole] = made
-        self._model.changed()
+        self.add_variable(name, made)
         return made
 
     def boolean(self, name: str) -> Variable:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -66,7 +66,7 @@ def conditions_in(given: object, place: Place) -> list[Term]:
     return []
 
 
-def check_owned(term: Term, known: dict[str, Variable], place: Place, event: object = None) -> None:
+def check_owned(term: Term, known: Mapping[str, Variable], place: Place, event: object = None) -> None:
     """Raise `ModelError` unless the variables of `term` are in this model, and there at that time."""
     for variable in term.variables:
         if known.get(variable.name) is not variable:

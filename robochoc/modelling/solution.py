@@ -67,7 +67,7 @@ class Solution(Outcome, Mapping[str, object]):
     def of(cls, outcome: Outcome, team: Team, variables: Mapping[str, Variable] | None = None) -> Solution:
         """Return an outcome of `team` as a solution."""
         same = _fields(outcome, Outcome)
-        values = _Values(variables or {}, team)
+        values = UserValues(variables or {}, team)
         epochs = [
             SolutionEpoch(**_fields(epoch, EpochOutcome), values=values(epoch.assignment)) for epoch in outcome.epochs
         ]
@@ -85,7 +85,7 @@ class Solution(Outcome, Mapping[str, object]):
 
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
         """Return the user's values for the integers of an assignment, such as that of an event."""
-        return _Values(self.variables, self.problem)(assignment)
+        return UserValues(self.variables, self.problem)(assignment)
 
     def __bool__(self) -> bool:
         """Return whether there is an assignment."""
@@ -174,7 +174,7 @@ class Solution(Outcome, Mapping[str, object]):
         return did_you_mean(name, self.assignment, "it is no variable of this problem")
 
 
-class _Values:
+class UserValues:
     """The user's values for the integers of assignments: by the variables of a model, or the domains of a team."""
 
     def __init__(self, variables: Mapping[str, Variable], team: Team | None) -> None:
@@ -182,6 +182,7 @@ class _Values:
         self._known = team.variables if team else {}
 
     def __call__(self, assignment: Mapping[str, int]) -> NamedValues:
+        """Return the values by the names of the variables."""
         return NamedValues((name, self._value(name, code)) for name, code in assignment.items())
 
     def _value(self, name: str, code: int) -> object:

@@ -183,7 +183,7 @@ def test_all_different_becomes_pairs_with_one_name_and_a_soft_one_is_whole() -> 
     assert all(isinstance(one.definition, Predicate) for one in model.team.constraints())
     assert repr(rule) == "<apart: all_different(r0.c, r1.c, r2.c)>"
     assert only(model).verdict is Verdict.NO_SOLUTION
-    model.constraints.clear()
+    model.remove(rule)
     model.add(robochoc.all_different(colors), cost=2)
     assert only(model).cost == 2
 

@@ -110,6 +110,7 @@ def test_listed_solutions_and_epochs_have_values() -> None:
     assert found.listed[0] == found.values
     assert found.optima is not None
     assert found.values_of(found.optima.assignments[1]) == found.listed[1]
+    assert model.values_of(found.optima.assignments[1]) == found.listed[1]
     model.after_solution().remove_value(x, Colour.RED)
     changed = model.solve("dynabt", runtime="simulator")
     assert [epoch.values for epoch in changed.epochs][1] == changed.values == {"r0.x": Colour.GREEN, "r1.x": Colour.RED}
