@@ -27,6 +27,7 @@ from robochoc.model.expression import (
 from robochoc.model.expression.bounds import Excess, Interval, bounds, excess
 from robochoc.model.expression.tree import BOUND
 from robochoc.model.team_edits import shortened
+from robochoc.system.errors import TransferableError
 
 MAX_COST = 10**18 - 1
 """The largest cost, in the team's unit."""
@@ -35,7 +36,7 @@ MAX_TRIED = 4096
 _MAX_DIGITS = 25
 
 
-class MagnitudeError(ValueError):
+class MagnitudeError(TransferableError, ValueError):
     """A constraint computes numbers that are too large.
 
     Attributes:
