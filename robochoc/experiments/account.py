@@ -14,8 +14,10 @@ SIGNIFICANT = 0.05
 MOST_TESTED = 2
 """Pairs are compared by no more metrics."""
 PAIRS_TOLD = (
-    "On problems that both have solved: how often each needs less (in the median of its runs), the median of the"
-    " ratio, and Wilcoxon's signed-rank test, corrected for the number of pairs (Holm)."
+    "On problems that both have solved: how often each is better (in the median of its runs), the median of the"
+    " ratio first / second and of the difference first - second, and Wilcoxon's signed-rank test, corrected for the"
+    " number of pairs (Holm). A ratio of 0 to 0 is 1. There is no median ratio (-) of negative values, and where half"
+    " of the ratios or more are to 0."
 )
 _OF_MACHINES = {"wall_s", "total_s", "cpu_s", "memory"}
 """Metrics that differ from machine to machine."""
@@ -35,12 +37,13 @@ class Account:
 
     def __init__(self, results: Results, over: str | None) -> None:
         self.name, self.title, self.text, self.stopped, self.planned, rows = results
+        self._all = rows
         if not rows:
             raise invalid_input(self.name, "has no results yet", "robochoc experiment run goes on with the study")
         wishes = study_wishes(self.text)
         self.introduction, self.width = wishes.text, wishes.width
         try:
-            self.over, self.rows = summary.prepared(rows, over or wishes.over, wishes.names)
+            self.over, self.rows, self._remarks = summary.prepared(rows, over or wishes.over, wishes.names)
             self.metrics = summary.metrics_to_show(self.rows, wishes.metrics, self.over)
             self.parts = summary.parts(self.rows, wishes.each)
         except summary.NoSuchColumnError as wrong:
@@ -53,9 +56,9 @@ class Account:
 
     def measured(self) -> Iterator[str]:
         """Yield what was measured, and where, a sentence or two at a time."""
-        count, rows = self.planned, self.rows
+        count, rows = self.planned, self._all
         there = f"{len(rows):,} of {count:,} runs are there" if len(rows) < count else f"{count:,} runs"
-        problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(rows))
+        problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(self.rows))
         yield f"{there}: {problems:,} problems, {ways} ways to run."
         runtimes = {row["runtime"] for row in rows}
         simulated = runtimes <= {"simulator", "arrays"}
@@ -73,9 +76,10 @@ class Account:
             yield f"{told}. The study was stopped: {why}"
         else:
             yield f"{told}, and no two answers to a problem contradict each other."
+        yield from self._remarks
 
     def answers(self) -> list[str]:
-        """Return who needs least, and who does the same as who, a sentence each."""
+        """Return the best ways to run, and those that do the same, a sentence each."""
         return ranking.answers(self.rows, self.metrics)
 
     def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:
@@ -93,7 +97,7 @@ class Account:
                     yield headed(summary.METRICS[metric], part), self._table_of(shown)
 
     def _table_of(self, pairs: Sequence[statistics.Comparison]) -> Table:
-        heads = ["", "problems", "first needs less", "second needs less", "median ratio", "p"]
+        heads = ["", "problems", "first better", "second better", "median ratio", "median difference", "p"]
         lines = [_compared(one) for one in pairs]
         if all(one.at is None for one in pairs):
             return heads, lines
@@ -108,4 +112,6 @@ def headed(what: str, part: str) -> str:
 def _compared(one: statistics.Comparison) -> list[str]:
     p = "-" if one.p is None else f"{one.p:.2g}{' *' if one.p < SIGNIFICANT else ''}"
     ratio = "-" if one.ratio is None else f"{one.ratio:.2f}"
-    return [f"{one.one} / {one.other}", f"{one.pairs:,}", f"{one.one_better:,}", f"{one.other_better:,}", ratio, p]
+    better = [f"{one.one_better:,}", f"{one.other_better:,}"]
+    difference = "-" if one.difference is None else summary.number(one.difference)
+    return [f"{one.one} / {one.other}", f"{one.pairs:,}", *better, ratio, difference, p]

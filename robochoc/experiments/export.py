@@ -37,7 +37,7 @@ def exported(results: Results, form: str) -> bytes:
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
             wishes = study_wishes(results.text)
-            over, shown = summary.prepared(rows, wishes.over, wishes.names) if rows else ("", rows)
+            over, shown = summary.prepared(rows, wishes.over, wishes.names)[:2] if rows else ("", rows)
             return latex_table(shown, results.title, over, wishes.metrics).encode()
         case _:
             return _parquet(rows)

@@ -1,4 +1,4 @@
-"""Who needs least: a sentence for each metric, for people who look for the answer first."""
+"""The best ways to run, a sentence for each metric, for readers who look for the answer first."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from robochoc.experiments.statistics import by_problem, case_of
+from robochoc.experiments.statistics import by_problem, case_of, maximised
 from robochoc.experiments.summary import METRICS, Rows, labels
 
 MOST_TOLD = 3
@@ -16,40 +16,42 @@ _SEARCHED = ("messages", "ncccs", "bytes", "cost")
 
 
 def answers(rows: Rows, metrics: Sequence[str]) -> list[str]:
-    """Return sentences that say which ways to run need least, and which do the same.
+    """Return sentences about the ways to run that need least, and those that do the same.
 
     Args:
         rows: The results of several ways to run.
-        metrics: The metrics to tell of.
+        metrics: The metrics that are reported.
     """
     told = [line for metric in metrics if (line := _least(rows, metric))]
     return [*told, *_twins(rows)] if len(labels(rows)) > 1 else []
 
 
 def _least(rows: Rows, metric: str) -> str:
-    """Return in how many cases each way needs least; empty where all need the same.
+    """Return in how many cases each way is the best, or as good as the best; empty where all do the same in all cases.
 
     A case is a problem, and a value of the parameter of runs; it counts with the median of its runs. Higher utilities
-    are better.
+    are better. A case that no way has solved is open.
     """
     ways = labels(rows)
     needs = {way: by_problem(rows, way, metric) for way in ways}
-    upwards = {row["digest"] for row in rows if metric == "cost" and row["maximises"]}
+    upwards = maximised(rows, metric)
     wins: Counter[str] = Counter()
     cases = list(dict.fromkeys(case for values in needs.values() for case in values))
     for case in cases:
         values = {way: found[case] for way, found in needs.items() if case in found}
         best = (max if case[0] in upwards else min)(values.values())
-        winners = [way for way, value in values.items() if value == best]
-        if len(winners) < len(ways):
-            wins.update(winners)
-    if not wins:
+        wins.update(way for way, value in values.items() if value == best)
+    if not cases or wins.total() == len(ways) * len(cases):
         return ""
     named = [f"{way} in {count:,}" for way, count in wins.most_common(MOST_TOLD)]
     others = len(wins) - len(named)
-    rest = f", {others} other{'s' * (others > 1)} in fewer" if others else ""
+    rest = f", {others} other{'s' * (others > 1)} in no more" if others else ""
+    tied = wins.total() - len(cases)
+    ties = ", ties counted for each" if tied else ""
+    without = len(set(map(case_of, rows))) - len(cases)
+    left = f"; {without:,} open" if without else ""
     how = "Best" if metric == "cost" else "Least"
-    return f"{how} {METRICS[metric]}: {', '.join(named)} of {len(cases):,} cases{rest}."
+    return f"{how} {METRICS[metric]}: {', '.join(named)} of {len(cases):,} cases{rest}{ties}{left}."
 
 
 def _run(row: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -76,9 +76,10 @@ class Comparison:
         one: The label of the first.
         other: The label of the second.
         pairs: The number of problems that both have solved.
-        one_better: In how many of them the first needs less: the median of its runs of the problem.
-        other_better: In how many of them the second needs less.
-        ratio: The median of what the first needs for one of what the second needs. None: there is none.
+        one_better: In how many of them the first is better, by the median of its runs of the problem.
+        other_better: In how many of them the second is better.
+        ratio: The median ratio of the first to the second. None: it does not exist.
+        difference: The median difference of the first and the second. None: there are no pairs.
         p: The probability of such a difference if there were none, corrected for the number of tests. None: too few
             pairs.
         at: The value of the parameter of runs at which they are compared. None: tables are over none.
@@ -90,6 +91,7 @@ class Comparison:
     one_better: int
     other_better: int
     ratio: float | None
+    difference: float | None
     p: float | None
     at: Any = None
 
@@ -106,9 +108,15 @@ def comparisons(rows: Rows, metric: str) -> list[Comparison]:
     for at in dict.fromkeys(row.get("case") for row in rows):
         own = [row for row in rows if row.get("case") == at]
         values = {way: by_problem(own, way, metric) for way in labels(own)}
+        upwards = maximised(own, metric)
         pairs = itertools.combinations(values, 2)
-        found += [replace(_comparison(one, other, values), at=at) for one, other in pairs]
+        found += [replace(_comparison(one, other, values, upwards), at=at) for one, other in pairs]
     return _corrected(found)
+
+
+def maximised(rows: Rows, metric: str) -> set[str]:
+    """Return the problems of which more of a metric is better: those with utilities."""
+    return {row["digest"] for row in rows if row["maximises"]} if metric == "cost" else set()
 
 
 Case = tuple[str, Any]
@@ -117,13 +125,15 @@ Case = tuple[str, Any]
 
 def by_problem(rows: Rows, way: str, metric: str) -> dict[Case, float]:
     """Return the median of a metric over a way's runs of each problem, where more than half have a verdict."""
+    upwards = maximised(rows, metric)
     runs: dict[Case, list[float]] = {}
     for row in rows:
         if row["label"] == way:
             known = row["status"] == Status.DONE and row[metric] is not None
-            runs.setdefault(case_of(row), []).append(float(row[metric]) if known else math.inf)
+            worst = -math.inf if row["digest"] in upwards else math.inf
+            runs.setdefault(case_of(row), []).append(float(row[metric]) if known else worst)
     medians = {case: statistics.median(values) for case, values in runs.items()}
-    return {case: median for case, median in medians.items() if median < math.inf}
+    return {case: median for case, median in medians.items() if math.isfinite(median)}
 
 
 def case_of(row: Mapping[str, Any]) -> Case:
@@ -131,19 +141,34 @@ def case_of(row: Mapping[str, Any]) -> Case:
     return row["digest"], row.get("case")
 
 
-def _comparison(one: str, other: str, values: Mapping[str, Mapping[Case, float]]) -> Comparison:
+def _comparison(
+    one: str, other: str, values: Mapping[str, Mapping[Case, float]], upwards: Collection[str]
+) -> Comparison:
     both = [case for case in values[one] if case in values[other]]
     pairs = [(values[one][case], values[other][case]) for case in both]
-    ratios = [a / b for a, b in pairs if b]
+    differences = [a - b for a, b in pairs]
+    gains = [-gap if case[0] in upwards else gap for case, gap in zip(both, differences, strict=True)]
     return Comparison(
         one,
         other,
         len(pairs),
-        sum(a < b for a, b in pairs),
-        sum(b < a for a, b in pairs),
-        float(np.median(ratios)) if ratios else None,
-        _wilcoxon([a - b for a, b in pairs]),
+        sum(gain < 0 for gain in gains),
+        sum(gain > 0 for gain in gains),
+        median_ratio(pairs),
+        statistics.median(differences) if differences else None,
+        _wilcoxon(differences),
     )
+
+
+def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
+    """Return the median of the ratios of all `pairs`; None where it does not exist.
+
+    The ratio of 0 to 0 is 1, that of more to 0 is higher than all others. There is none of negative numbers.
+    """
+    if not pairs or min(map(min, pairs)) < 0:
+        return None
+    median = statistics.median([a / b if b else math.inf if a else 1.0 for a, b in pairs])
+    return median if math.isfinite(median) else None
 
 
 def _wilcoxon(differences: Sequence[float]) -> float | None:

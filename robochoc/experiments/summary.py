@@ -8,8 +8,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
+from robochoc.experiments.duplicates import SEEDS, without_duplicates
 from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
 from robochoc.model.priorities import natural_key
@@ -37,7 +38,6 @@ CENSORED = ("messages", "ncccs", "bytes", "checks", "cycles", "simulated_s", "wa
 """Metrics that would have gone on growing where a limit has ended a run."""
 OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
 """Parameters of runs, over which results can be shown, too."""
-_SEEDS = ("seed", "problem_seed", "scenario_seed")
 SINGLE = ("instance", "team")
 """What single problems are called by: parameters that are no number or choice."""
 MOST_TEAMS = 12
@@ -100,13 +100,15 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
     """
     of_problems = parameters(rows)
     known = [*of_problems, "problems", "team", *OF_RUNS, *_settings(rows)]
+    if wanted == "name" and wanted not in known:
+        return "problems"
     if wanted is not None:
         if wanted not in known:
             raise NoSuchColumnError(f"there is no parameter {wanted!r}; there are {', '.join(known)}")
         return wanted
     for name in of_problems:
         several = len({row.get(name) for row in rows})
-        if name not in _SEEDS and all(name in row for row in rows) and 1 < several <= _MOST.get(name, several):
+        if name not in SEEDS and all(name in row for row in rows) and 1 < several <= _MOST.get(name, several):
             return name
     if len({row["digest"] for row in rows}) == 1:
         return next((name for name in OF_RUNS if _parts_labels(rows, name)), "team")
@@ -118,7 +120,7 @@ def _parts_labels(rows: Rows, name: str) -> bool:
     ways: dict[str, set[Any]] = {}
     for row in rows:
         ways.setdefault(_without(row["label"], name, row[name]), set()).add(row[name])
-    return name not in _SEEDS and len(ways) < len(labels(rows)) and all(len(values) > 1 for values in ways.values())
+    return name not in SEEDS and len(ways) < len(labels(rows)) and all(len(values) > 1 for values in ways.values())
 
 
 def by_parameter(rows: Rows, over: str) -> Rows:
@@ -143,8 +145,22 @@ def by_parameter(rows: Rows, over: str) -> Rows:
     ]
 
 
-def prepared(rows: Rows, over: str | None, names: Mapping[str, str]) -> tuple[str, Rows]:
-    """Return the parameter that tables and figures are over, and the results as they show them.
+class Prepared(NamedTuple):
+    """The results as tables and figures show them.
+
+    Attributes:
+        over: The parameter that tables and figures are over.
+        rows: The results. Problems without a parameter have their name in its place.
+        remarks: Sentences about results that were left out.
+    """
+
+    over: str
+    rows: Rows
+    remarks: list[str]
+
+
+def prepared(rows: Rows, over: str | None, names: Mapping[str, str]) -> Prepared:
+    """Return the results as tables and figures show them.
 
     Args:
         rows: The results.
@@ -154,8 +170,11 @@ def prepared(rows: Rows, over: str | None, names: Mapping[str, str]) -> tuple[st
     Raises:
         NoSuchColumnError: as these two.
     """
-    over = parameter_to_draw_over(rows, over)
-    return over, named(by_parameter(rows, over), names)
+    kept, remarks = without_duplicates(rows, parameters(rows))
+    over = parameter_to_draw_over(kept, over)
+    columns = dict.fromkeys(parameters(kept))
+    whole = [{**{name: row.get(name, row["problems"]) for name in columns}, **row} for row in kept]
+    return Prepared(over, named(by_parameter(whole, over), names), remarks)
 
 
 def _way(row: Mapping[str, Any], over: str) -> str:
@@ -234,8 +253,8 @@ def values_of(rows: Rows, name: str) -> list[Any]:
     found = list(dict.fromkeys(row.get(name) for row in rows))
     if name in SINGLE:
         return sorted(found, key=lambda value: natural_key(str(value)))
-    numbers = all(isinstance(value, (int, float)) for value in found)
-    return sorted(found) if numbers else found
+    numbers = [value for value in found if isinstance(value, (int, float))]
+    return [*sorted(numbers), *(value for value in found if not isinstance(value, (int, float)))]
 
 
 def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]:

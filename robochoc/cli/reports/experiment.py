@@ -116,7 +116,7 @@ def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> 
 
     wishes = study_wishes(results.text)
     try:
-        over, rows = summary.prepared(results.rows, over or wishes.over, wishes.names)
+        over, rows, remarks = summary.prepared(results.rows, over or wishes.over, wishes.names)
         shown = summary.metrics_to_show(rows, metrics or wishes.metrics, over)
         parts = summary.parts(rows, wishes.each)
     except summary.NoSuchColumnError as wrong:
@@ -127,6 +127,8 @@ def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> 
         _print_table(*summary.medians(own, metric, over))
     _print_endings(rows)
     _print_answers(rows, shown)
+    for remark in remarks:
+        click.echo(on_one_line(remark))
 
 
 def _print_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> None:

@@ -19,7 +19,7 @@ def test_who_needs_least_in_how_many_cases() -> None:
     given = [row("a", 1, 5), row("b", 1, 9), row("a", 2, 5), row("b", 2, 4), row("a", 3, None), row("b", 3, 99)]
     assert answers(given, ["messages", "ncccs"]) == [
         "Least messages: b in 2, a in 1 of 3 cases.",
-        "Least NCCCs: b in 1 of 3 cases.",
+        "Least NCCCs: b in 3, a in 2 of 3 cases, ties counted for each.",
     ]
     assert answers(given[::2], ["messages"]) == []
 
@@ -27,7 +27,7 @@ def test_who_needs_least_in_how_many_cases() -> None:
 def test_a_tie_is_a_win_of_both_and_what_all_need_is_not_told() -> None:
     given = [row(way, 1, 3) for way in "ab"] + [row("c", 1, 4)]
     assert answers(given, ["messages"]) == [
-        "Least messages: a in 1, b in 1 of 1 cases.",
+        "Least messages: a in 1, b in 1 of 1 cases, ties counted for each.",
         "a and b are the same in all runs.",
     ]
     assert answers(given[:2], ["messages"]) == ["a and b are the same in all runs."]
@@ -44,4 +44,4 @@ def test_higher_utilities_are_better() -> None:
 
 def test_others_are_counted() -> None:
     given = [row(way, problem, 1 + (way != "abcde"[problem])) for way in "abcde" for problem in range(5)]
-    assert answers(given, ["messages"])[0].endswith("of 5 cases, 2 others in fewer.")
+    assert answers(given, ["messages"])[0].endswith("of 5 cases, 2 others in no more.")
