@@ -108,12 +108,15 @@ def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximi
 
 
 def split(expression: Expression) -> list[Expression]:
-    """Return terms whose sum is `expression`, one for each set of variables that stand together in its terms."""
+    """Return terms whose sum is `expression`, one for each set of variables that stand together in its terms.
+
+    The terms without variables are one of them, and the last.
+    """
     by_scope: dict[frozenset[str], list[Expression]] = {}
     for factor, term in _terms(as_integer(expression), 1):
         by_scope.setdefault(frozenset(names(term)), []).append(times(Constant(factor), term))
-    fixed = sum(part.value for part in by_scope.pop(frozenset(), []) if isinstance(part, Constant))
-    return [*map(_added, by_scope.values()), *([Constant(fixed)] if fixed else [])]
+    fixed = by_scope.pop(frozenset(), [])
+    return [*map(_added, by_scope.values()), *([_added(fixed)] if fixed else [])]
 
 
 def _added(parts: Sequence[Expression]) -> Expression:

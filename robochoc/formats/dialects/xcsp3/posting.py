@@ -24,7 +24,17 @@ from robochoc.formats.dialects.xcsp3.terms import (
     resolved,
 )
 from robochoc.formats.dialects.xcsp3.variables import MAX_VARIABLES, Variables
-from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, evaluate, names
+from robochoc.model.expression import (
+    Apply,
+    Constant,
+    ExcessiveValueError,
+    Expression,
+    Name,
+    UndefinedValueError,
+    evaluate,
+    names,
+)
+from robochoc.model.expression import text as expression_text
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.problem import Constraint, Definition, Function, Predicate, Relation, Semantics
 
@@ -237,7 +247,11 @@ class Posting:
         self._check_size(expression)
         scope = names(expression)
         if not scope:
-            self.constant += evaluate(expression, {})
+            value = _constant(expression)
+            if value is None:
+                self.post(FALSE)
+            else:
+                self.constant += value
             return
         if self.size(scope) > MAX_COST_TRIED:
             message = f"the cost of {len(scope)} variables together has {in_words(self.size(scope))} combinations"
@@ -247,11 +261,7 @@ class Posting:
         self.costs.append(Constraint(self.title, function, scope, scope, line=self.line))
 
     def _post_constant(self, part: Expression) -> None:
-        try:
-            holds = bool(evaluate(part, {}))
-        except UndefinedValueError:
-            holds = False
-        if not holds:
+        if not _constant(part):
             self.post(_never(next(iter(self._original))))
 
     def _general(self, expression: Expression, scope: Sequence[str]) -> tuple[tuple[str, ...], Expression]:
@@ -287,6 +297,17 @@ class Posting:
         self.work += work
         if self.work > MAX_WORK:
             raise MistakeError(f"the problem has more than {MAX_WORK:,} operators and values", "import a smaller one")
+
+
+def _constant(expression: Expression) -> int | None:
+    """Return the value of an expression without variables; None: it has none. Raises `MistakeError` beyond 64 bits."""
+    try:
+        return evaluate(expression, {})
+    except ExcessiveValueError:
+        message = f"the constant '{shortened(expression_text(expression))}' lies beyond the limit of 2^63"
+        raise MistakeError(message, "use smaller numbers") from None
+    except UndefinedValueError:
+        return None
 
 
 def in_words(number: int) -> str:
