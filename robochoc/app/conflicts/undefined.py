@@ -7,11 +7,7 @@ from collections.abc import Mapping
 from robochoc.model.constraint import Constraint, Relation
 from robochoc.model.expression import Apply, Expression
 from robochoc.model.expression.bounds import Interval, bounds
-from robochoc.model.expression.tree import BOUND
 from robochoc.model.problem import Team
-
-_FOLDED = frozenset({"add", "sub", "mul"})
-"""Operators that are computed from the left: each part of the way is bounded, too."""
 
 
 def limits_of(team: Team) -> dict[str, Interval]:
@@ -43,9 +39,4 @@ def _can_be(expression: Expression, limits: Mapping[str, Interval]) -> bool:
     if operator in {"div", "mod"}:
         divisor = bounds(arguments[1], limits)
         return divisor.low <= 0 <= divisor.high
-    ends = range(2, len(arguments) + 1) if operator in _FOLDED else [len(arguments)]
-    return not all(_fits(bounds(Apply(operator, arguments[:end]), limits)) for end in ends)
-
-
-def _fits(interval: Interval) -> bool:
-    return interval.low >= -BOUND and interval.high <= BOUND
+    return False  # results beyond 64 bits are refused when a team is read (`model/magnitudes.py`)

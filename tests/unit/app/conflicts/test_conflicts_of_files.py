@@ -54,7 +54,7 @@ TEAMS = {
     "only costs": _of_two(_costs("add(X,Y)"), _must("ne(X,X)"), kind=ProblemKind.DISWCSP),
     "negated": _of_two(_must("not(eq(div(X,Y),1))"), _must("eq(Y,0)", "Q")),
     "signs": _of_two(_must("eq(div(X,2),-1)"), _must("eq(mod(X,2),-1)", "Q"), _must("gt(X,-3)", "S"), low=-4, high=3),
-    "large": _of_two(_must("eq(mul(X,461168601842738790,10,Y),7)"), _must("eq(X,Y)", "Q")),
+    "large": _of_two(_must("eq(mul(X,461168601842738790,10),add(7,Y))"), _must("eq(X,Y)", "Q")),
     "triangle": triangle(2),
     "two": graph_team(["AB", "BC", "AC", "CD", "DE", "CE"]),
     "solvable": triangle(3),
@@ -138,8 +138,6 @@ def test_that_our_own_solver_looks_where_cpmpy_fails(
         ("mod(X,sub(X,Y))", True),
         ("pow(X,2)", True),
         ("mul(X,X,X)", False),
-        ("mul(X,461168601842738790,10,Y)", True),
-        ("sub(mul(X,461168601842738790,10,4),1)", True),
         ("if(eq(Y,0),0,div(X,Y))", True),
     ],
 )
