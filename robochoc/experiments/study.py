@@ -25,12 +25,11 @@ import msgspec
 from robochoc.experiments.problem_table import PROBLEM_KEYS, problems_of
 from robochoc.experiments.run_table import RUN_KEYS, distinct, setups_of
 from robochoc.experiments.summary import METRICS, OF_RUNS
-from robochoc.experiments.table import MAX_INTEGER, Place
+from robochoc.experiments.table import HINT, MAX_INTEGER, Place
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
-from robochoc.formats.diagnostics import invalid_input, shortened, suggestion
-from robochoc.formats.toml import toml_tables
+from robochoc.formats.diagnostics import MistakeError, invalid_input, shortened, suggestion
+from robochoc.formats.toml import convert, toml_tables
 from robochoc.run.options import Runtime
-from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**20
 """A study's file has no more bytes."""
@@ -170,12 +169,10 @@ def _tables(tables: Mapping[str, Any], name: str, place: Place) -> Iterator[tupl
 
 
 def _convert(table: object, kind: Any, place: Place) -> Any:  # noqa: ANN401 - of `kind`
-    if isinstance(table, dict):
-        place.check_keys(table, kind.__struct_fields__)
     try:
-        found = msgspec.convert(table, kind)
-    except msgspec.ValidationError as wrong:
-        raise place.mistake("", describe_decode_error(wrong, kind)) from None
+        found = convert(table, kind, place.text, HINT, place.table)
+    except MistakeError as wrong:
+        raise invalid_input(place.path, wrong.message, wrong.hint, wrong.line) from None
     if isinstance(found, Limits):
         for name in Limits.__struct_fields__:
             value = getattr(found, name)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,13 +11,13 @@ from typing import Any
 
 from robochoc.experiments.ranges import range_of
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input, shortened, suggestion
+from robochoc.formats.toml import line_of
 
 HINT = "docs/guides/experiments.md describes the file of a study"
 MAX_INTEGER = 2**53
 """JSON and SQLite hold all integers up to it, and floats have them exactly."""
 MOST_COMBINATIONS = 100_000
 """A table stands for no more."""
-_HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
 
 
 @dataclass(frozen=True)
@@ -43,24 +42,7 @@ class Place:
 
     def line(self, key: str) -> int:
         """Return the line of a key, or of its table if the key is empty or stands elsewhere; 0 if there is none."""
-        table, number, head = "", 0, 0
-        wanted = re.compile(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]") if key else None
-        for line, words in enumerate(self.text.splitlines(), 1):
-            if found := _HEAD.match(words):
-                number = number + 1 if found[1] == table else 0
-                table = found[1]
-                if key and not self.table and table == key:
-                    return line
-            if (table, number) == (self.table, self.number):
-                head = head or line
-                if wanted and wanted.match(words):
-                    return line
-            elif self.table and table == f"{self.table}.{key}":
-                return line
-        outer, dot, inner = self.table.rpartition(".")
-        if dot and not head:  # the table stands in braces
-            return replace(self, table=outer).line(inner)
-        return head if self.table else 0
+        return line_of(self.text, self.table, key, self.number)
 
     def mistake(self, key: str, message: str, hint: str = HINT) -> InvalidInputError:
         """Return the error that something is wrong with a key; empty: with the table."""

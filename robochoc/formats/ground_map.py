@@ -10,6 +10,8 @@ from typing import Annotated
 
 import msgspec
 
+from robochoc.system.decode_errors import describe_decode_error
+
 MAX_BYTES = 8 << 20
 MAX_BLOCKED = 10_000
 """Blocked cells of a map: each is a block to draw, and a point that routes avoid."""
@@ -168,8 +170,10 @@ def read_ground_map(content: bytes) -> GroundMap:
         raise ValueError(f"it has more than {MAX_BYTES:,} bytes")
     try:
         found = msgspec.json.decode(content, type=GroundMap)
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise ValueError(str(error)) from None
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    except msgspec.DecodeError as error:
+        raise ValueError(describe_decode_error(error, GroundMap)) from None
     for what, (x, y) in (*found.starts.items(), *(("a blocked cell", (cell.x, cell.y)) for cell in found.blocked)):
         if x > found.columns or y > found.rows:
             raise ValueError(f"{what} is at ({x}, {y}), beside the map of {found.columns} x {found.rows} cells")

@@ -1,13 +1,24 @@
-"""TOML, within bounds: `tomllib` takes time and memory that grow with the square of the parts of a dotted key."""
+"""TOML, within bounds: `tomllib` takes time and memory that grow with the square of the parts of a dotted key.
+
+Its tables have no lines. These are looked up in the text when there is a mistake to report.
+"""
 
 from __future__ import annotations
 
 import re
 import tomllib  # noqa: TID251 - here, and nowhere else
-from typing import Any
+from typing import Any, TypeVar
 
+import msgspec
+
+from robochoc.formats.diagnostics import MistakeError
+from robochoc.system.decode_errors import describe_decode_error, place_of
+
+_Kind = TypeVar("_Kind")
 MAX_PARTS = 16
 """The maximum number of parts of a dotted key. Nothing that is read here needs more than three."""
+_HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
+_STEP = re.compile(r"\[(\d+)\]$")
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+"""
 _LONG_KEY = re.compile(rf"(?:^|[{{,\[])[ \t]*+(?:{_PART}\.[ \t]*+){{{MAX_PARTS}}}", re.MULTILINE)
 
@@ -26,3 +37,65 @@ def toml_tables(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def convert(tables: object, kind: type[_Kind], text: str, hint: str, table: str = "") -> _Kind:
+    """Return `tables`, or those of the table that is named, as a struct.
+
+    Args:
+        tables: What was read.
+        kind: The struct.
+        text: The file.
+        hint: What to do about a mistake.
+        table: The name of the table in the file. Empty: `tables` are the whole file.
+
+    Raises:
+        MistakeError: if they do not have the fields of the struct, with the line.
+    """
+    try:
+        return msgspec.convert(tables, kind)
+    except msgspec.ValidationError as error:
+        place, field = place_of(error)
+        inner, number = _STEP.sub("", place), _STEP.search(place)
+        name = ".".join(filter(None, (table, re.sub(r"\[[^]]*\]", "", inner))))
+        line = line_of(text, name, field, int(number[1]) if number else 0) if field else _line_of_value(text, name)
+        told = describe_decode_error(error, kind)
+        raise MistakeError(f"{table}: {told}" if table else told, hint, line) from None
+
+
+def line_of(text: str, table: str, key: str = "", number: int = 0) -> int:
+    """Return the line of a key in a TOML file.
+
+    Args:
+        text: The file.
+        table: The name of the table. Empty: keys before all tables.
+        key: The key. Empty: the table itself.
+        number: Which of several tables of that name, from 0.
+
+    Returns:
+        The line, that of the table where the key stands elsewhere, or 0 where there is none.
+    """
+    found_table, found_number, head = "", 0, 0
+    wanted = re.compile(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]") if key else None
+    for line, words in enumerate(text.splitlines(), 1):
+        if found := _HEAD.match(words):
+            found_number = found_number + 1 if found[1] == found_table else 0
+            found_table = found[1]
+            if key and not table and found_table == key:
+                return line
+        if (found_table, found_number) == (table, number):
+            head = head or line
+            if wanted and wanted.match(words):
+                return line
+        elif table and found_table == f"{table}.{key}":
+            return line
+    outer, dot, inner = table.rpartition(".")
+    if table and not head:  # the table stands in braces
+        return line_of(text, outer, inner, number if dot else 0)
+    return head if table else 0
+
+
+def _line_of_value(text: str, name: str) -> int:
+    """Return the line of a value, by its dotted name."""
+    table, _, key = name.rpartition(".")
+    return line_of(text, table, key) if key else 0

@@ -11,6 +11,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import msgspec
 
 _PLACE = re.compile(r" - at `\$\.?(?P<place>[^`]*)`$")
+_UNKNOWN = re.compile(r"Object contains unknown field `([^`]*)`")
 _TYPES = {
     "int": "an integer",
     "float": "a number",
@@ -27,7 +28,7 @@ _SENTENCES = (
     (r"Expected `(?P<expected>[^`]*)`, got `(?P<got>[^`]*)`", "expected {expected}, found {got}"),
     (r"Expected `(?P<expected>[^`]*)`(?P<rest>.*)", "expected {expected}{rest}"),
     (r"Object missing required field `(?P<value>[^`]*)`", "the field '{value}' is missing"),
-    (r"Object contains unknown field `(?P<value>[^`]*)`", "there is no field '{value}'{allowed}"),
+    (r"Object contains unknown field `(?P<value>[^`]*)`", "there is no field '{value}'{nearest}"),
     (r"JSON is malformed: (?P<value>.*)", "it is no JSON: {value}"),
     (r"Input data was truncated", "it is no JSON: it ends too early"),
 )
@@ -50,9 +51,18 @@ def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  #
         if match:
             parts = {name: part or "" for name, part in match.groupdict().items()}
             parts |= {name: _named(parts[name]) for name in ("expected", "got") if name in parts}
-            text = sentence.format(**{"allowed": _allowed(expected, place)} | parts)
+            allowed = _allowed(expected, place)
+            parts |= {"allowed": _one_of(allowed), "nearest": _nearest(parts.get("value", ""), allowed)}
+            text = sentence.format(**parts)
             break
     return f"{place}: {text}" if place else text
+
+
+def place_of(error: msgspec.MsgspecError) -> tuple[str, str]:
+    """Return the place of the value that msgspec refuses, such as `links[1]`, and the name of its unknown field."""
+    text = str(error)
+    place, field = _PLACE.search(text), _UNKNOWN.match(text)
+    return place["place"] if place else "", field[1] if field else ""
 
 
 def _named(types: str) -> str:
@@ -60,18 +70,18 @@ def _named(types: str) -> str:
     return " or ".join(_TYPES.get(one, one) for one in types.split(" | "))
 
 
-def _allowed(kind: Any, place: str) -> str:  # noqa: ANN401 - a type
-    """Return the values or fields that are allowed at `place`, in words; empty where they are not listed."""
+def _allowed(kind: Any, place: str) -> Sequence[str]:  # noqa: ANN401 - a type
+    """Return the values or fields that are allowed at `place`; empty where they are not listed."""
     for step in re.findall(r"\w+|\[[^]]*\]", place):
         kind = _inside(kind, step)
     for option in _options(kind):
         if isinstance(option, type) and issubclass(option, Enum):
-            return _one_of([str(member.value) for member in option])
+            return [str(member.value) for member in option]
         if get_origin(option) is Literal:
-            return _one_of([str(value) for value in get_args(option)])
+            return [str(value) for value in get_args(option)]
         if isinstance(option, type) and issubclass(option, msgspec.Struct):
-            return _one_of([field.encode_name for field in msgspec.structs.fields(option)])
-    return ""
+            return [field.encode_name for field in msgspec.structs.fields(option)]
+    return ()
 
 
 def _inside(kind: Any, step: str) -> Any:  # noqa: ANN401 - types
@@ -89,4 +99,12 @@ def _options(kind: Any) -> Sequence[Any]:  # noqa: ANN401 - types
 
 
 def _one_of(values: Sequence[str]) -> str:
-    return f"; allowed: {', '.join(values)}"
+    return f"; allowed: {', '.join(values)}" if values else ""
+
+
+def _nearest(name: str, known: Sequence[str]) -> str:
+    """Return the name that looks like `name`, or all of them, in words."""
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
+    close = difflib.get_close_matches(name[:40], known, n=1)
+    return f"; did you mean '{close[0]}'?" if close else _one_of(known)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import msgspec
@@ -78,7 +79,7 @@ BAD = {
     "": "the field 'latency_ms' is missing",
     "latency_ms": "is no TOML file",
     "latency_ms = 1\nlatency_ms = 2": "is no TOML file",
-    "latency_ms = 5\nlos = 0.1": "los: a channel has no such field (did you mean 'loss'?",
+    "latency_ms = 5\nlos = 0.1": "there is no field 'los'; did you mean 'loss'?",
     "latency_ms = -1": "latency_ms: expected a number from 0 to 60,000, got -1",
     "latency_ms = nan": "latency_ms: expected a number from 0 to 60,000, got nan",
     "latency_ms = inf": "latency_ms: expected a number from 0 to 60,000, got inf",
@@ -101,7 +102,7 @@ BAD = {
     "latency_ms = 5\nname = 'a b'": "name: expected up to 40",
     "latency_ms = 5\nname = 'wlan'": "name: wlan is the name of a shipped model",
     "latency_ms = 5\nname = ['wlan']": "name: expected a text, found a list",
-    "[channel]\nlatency_ms = 5": "channel: a channel has no such field",
+    "[channel]\nlatency_ms = 5": "there is no field 'channel'",
     f"#{'x' * LARGEST_FILE}": "is too large",
     "latency_ms = 5\npath_loss = 3": "path_loss: expected an object or null, found an integer",
     "latency_ms = 5\n[path_loss]\npower_dbm = 10": "path_loss: the field 'sensitivity_dbm' is missing",
@@ -110,7 +111,7 @@ BAD = {
     ),
     "latency_ms = 5\n[path_loss]\npower_dbm = nan\nsensitivity_dbm = -80": "path_loss: power_dbm: expected a number",
     "latency_ms = 5\n[path_loss]\npower_dbm = 1\nsensitivity_dbm = -80\npower = 3": (
-        "path_loss: there is no field 'power'; allowed: power_dbm, sensitivity_dbm"
+        "path_loss: there is no field 'power'; did you mean 'power_dbm'?"
     ),
     "latency_ms = 5\ndistance_loss = [[0, 0.1], [0, 0.2]]": "distance_loss: expected growing distances, got 0 after 0",
     "latency_ms = 5\ndistance_loss = [[0, 1.1]]": "distance_loss: expected a number from 0 to 1, got 1.1",
@@ -145,7 +146,7 @@ def test_a_bad_file_is_told_in_one_line(tmp_path: Path, content: str, message: s
     with pytest.raises(InvalidInputError) as caught:
         read_channel(path)
     (line,) = str(caught.value).splitlines()
-    assert line.startswith(f"{path}: ")
+    assert re.match(rf"{re.escape(str(path))}(?::\d+)?: ", line)
     assert message in line
     assert len(line) < 400 + len(str(path))
 
@@ -208,3 +209,19 @@ def test_wrong_usage_and_bad_files_are_told(words: tuple[object, ...], status: i
     assert done.returncode == status
     assert message in done.stderr
     assert not done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("latency_ms = 5\n\nlos = 0.1\n", 3),
+        ("latency_ms = 5\nbursts = { begin = 0.1, end = 0.5, los = 1 }\n", 2),
+        ("latency_ms = 5\n[bursts]\nbegin = 0.1\nend = 0.5\nlos = 1\n", 5),
+        ('latency_ms = 5\n[[links]]\nbetween = ["A", "B"]\nloss = 1\n[[links]]\nlos = 1\nbetween = ["A", "C"]\n', 6),
+    ],
+)
+def test_an_unknown_field_has_its_line_and_the_nearest_name(tmp_path: Path, text: str, line: int) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    with pytest.raises(InvalidInputError, match=rf"bad.toml:{line}: .*no field 'los'; did you mean 'loss'"):
+        read_channel(path)

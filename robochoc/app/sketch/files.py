@@ -33,6 +33,12 @@ MAX_SKETCH = 16 << 20
 """Bytes of `sketch.json`. A larger one is none of ours."""
 
 
+class _Version(msgspec.Struct):
+    """The version of a `sketch.json`; a newer one may have more fields than this version of robochoc knows."""
+
+    version: int
+
+
 class _Kept(msgspec.Struct, forbid_unknown_fields=True):
     """What stands in `sketch.json`."""
 
@@ -88,9 +94,10 @@ def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...
     if not path.is_file() or path.stat().st_size > MAX_SKETCH:
         raise _damaged(path, "it is no file, or too large")
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=_Kept)
-        if found.version > VERSION:
+        content = path.read_bytes()
+        if msgspec.json.decode(content, type=_Version).version > VERSION:
             raise invalid_input(path, "a newer version of robochoc wrote it", "install that version")
+        found = msgspec.json.decode(content, type=_Kept)
         sketch = msgspec.json.decode(found.sketch, type=Sketch)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as damaged:
         raise _damaged(path, str(damaged)) from None

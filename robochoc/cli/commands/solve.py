@@ -86,7 +86,7 @@ _SECTIONS: Sections = {
     default="processes",
     show_default=True,
     metavar="NAME",
-    help="processes: one per robot; simulator: one thread, repeatable; network: with TLS; arrays: numpy, no messages.",
+    help="processes: one per robot; simulator: repeatable; network: TLS; arrays: numpy.",
 )
 @click.option(
     "--seed",

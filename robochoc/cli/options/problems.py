@@ -49,8 +49,8 @@ class Pattern(click.ParamType[str]):
 
 def format_option(command: _Command) -> _Command:
     """Add `--format`, the dialect of files that are read."""
-    told = "Format of the files.  [default: recognised by their contents]"
-    return click.option("--format", "dialect", type=click.Choice(READ), help=told)(command)
+    told = "Format of the files, as 'robochoc import --help' lists them."
+    return click.option("--format", "dialect", type=click.Choice(READ), metavar="NAME", help=told)(command)
 
 
 def reading_options(command: _Command) -> _Command:

@@ -29,9 +29,8 @@ from robochoc.communication.simulator.link_loss import (
     refuse_positions,
     refuse_table,
 )
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, shortened, suggestion
-from robochoc.formats.toml import toml_tables
-from robochoc.system.decode_errors import describe_decode_error
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, invalid_input, shortened
+from robochoc.formats.toml import convert, toml_tables
 
 LARGEST_FILE = 2**16
 """A channel's file has no more bytes."""
@@ -205,6 +204,9 @@ CHANNELS = MappingProxyType({model.name: model for model in _SHIPPED})
 """The models that are shipped, by name."""
 
 
+_HINT = "docs/guides/channels.md shows all fields"
+
+
 def read_channel(path: Path) -> ChannelModel:
     """Return the model in the TOML file at `path`, named for the file unless it says otherwise.
 
@@ -215,17 +217,13 @@ def read_channel(path: Path) -> ChannelModel:
         fields = toml_tables(text)
     except ValueError as wrong:  # also numbers of too many digits
         raise _invalid(path, f"is no TOML file: {shortened(str(wrong))}") from None
-    known = ChannelModel.__struct_fields__
-    for field in fields:
-        if field not in known:
-            raise _invalid(path, f"{shortened(field)}: a channel has no such field", suggestion(field, known, "fields"))
     fields.setdefault("name", path.stem)
     if fields["name"] in (*CHANNELS,):
         raise _invalid(path, f"name: {fields['name']} is the name of a shipped model", "name it otherwise")
     try:
-        return msgspec.convert(fields, ChannelModel)
-    except msgspec.ValidationError as wrong:
-        raise _invalid(path, describe_decode_error(wrong, ChannelModel)) from None
+        return convert(fields, ChannelModel, text, _HINT)
+    except MistakeError as wrong:
+        raise invalid_input(os.fspath(path), wrong.message, wrong.hint, wrong.line) from None
 
 
 def _text(path: Path) -> str:
@@ -244,5 +242,5 @@ def _text(path: Path) -> str:
         raise _invalid(path, "is not UTF-8", "a channel's file is TOML, in UTF-8") from None
 
 
-def _invalid(path: Path, message: str, hint: str = "docs/guides/channels.md shows all fields") -> InvalidInputError:
+def _invalid(path: Path, message: str, hint: str = _HINT) -> InvalidInputError:
     return InvalidInputError([Diagnostic(os.fspath(path), 0, message, hint)])

@@ -131,7 +131,7 @@ WRONG = {
     "no number": (SMALL.replace("[0.2, 0.5]", "nan"), 7, "expected numbers, words"),
     "a number of many digits": (SMALL.replace("domain = 3", f"domain = 1{'0' * 30}"), 5, "expected numbers, words"),
     "a seed of many digits": (f"{SMALL}seed = 1{'0' * 30}\n", 12, "expected numbers, words"),
-    "limit of words": (f'{SMALL}[limits]\ntimeout = "x"\n', 12, "limits"),
+    "limit of words": (f'{SMALL}[limits]\ntimeout = "x"\n', 13, "limits: timeout: "),
     "limit below": (f"{SMALL}timeout = -2\n", 12, "expected more than 0"),
     "repeated never": (f"repeat = 0\n{SMALL}", 1, "expected an integer from 1 to 1,000"),
     "unknown recording": (f'record = ["cost"]\n{SMALL}', 1, "expected cost-over-time or robots or journal"),
@@ -164,8 +164,8 @@ WRONG = {
     "a range with a dash": (SMALL.replace('"1..3"', '"1-3"'), 8, "a range is written 1..30"),
     "NCCCs of processes": (f'{SMALL}runtime = "processes"\nncccs = 3\n', 10, "--ncccs is a limit for the simulator"),
     "cycles of none": (f"{SMALL}cycles = 3\n", 10, "--cycles is a limit on the simulator's cycles"),
-    "too narrow": (f"{SMALL}[report]\nwidth = 0.5\n", 12, "report: width: expected a number >= 2.0"),
-    "unknown wish": (f'{SMALL}[report]\nabove = "x"\n', 13, "there is no such key"),
+    "too narrow": (f"{SMALL}[report]\nwidth = 0.5\n", 13, "report: width: expected a number >= 2.0"),
+    "unknown wish": (f'{SMALL}[report]\nabove = "x"\n', 13, "report: there is no field 'above'; did you mean 'over'?"),
 }
 
 
