@@ -31,6 +31,8 @@ from robochoc.solver.encoding import UnsupportedError
 
 CAPACITY = 1000
 """The capacity of an agent for each variable, constraint and value: no algorithm of pyDCOP needs as much."""
+LIMIT = 2**31 - 1
+"""The cost that DPOP of pyDCOP takes for the worst of all."""
 LEAST_INFINITY = 10_000
 """What forbids costs at least so much: pyDCOP's own convention."""
 
@@ -39,7 +41,7 @@ def written(team: Team, options: ExportOptions) -> Written:
     """Return the files of `team`.
 
     Raises:
-        UnsupportedError: if a constraint is too large for a table, or robots join in its scenario.
+        UnsupportedError: if costs or a constraint's table are too large, or robots join in its scenario.
     """
     del options
     file = f"{team.name}.yaml"
@@ -57,8 +59,12 @@ def written(team: Team, options: ExportOptions) -> Written:
 def _problem(team: Team) -> Iterator[str]:
     tables, constant = exported(team)
     maximize = maximises(team)
-    infinity = max(LEAST_INFINITY, 10 * magnitude(tables, constant))
-    forbids = INFINITE in amounts(tables)
+    most, forbids = magnitude(tables, constant), INFINITE in amounts(tables)
+    infinity = max(LEAST_INFINITY, 10 * most)
+    if (infinity if forbids else most) >= LIMIT:
+        more = ", and what forbids costs ten times more" if forbids else ""
+        what = f"costs add up to as much as {most - 1:,}{more}"
+        raise UnsupportedError(f"{what}: pyDCOP's costs end at {LIMIT:,}; write smaller costs")
     yield f"name: {_quoted(team.name)}"
     yield f"objective: {'max' if maximize else 'min'}"
     if forbids:

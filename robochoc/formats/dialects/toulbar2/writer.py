@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from typing import NamedTuple
 
 from robochoc.formats.dialects.dialect import ExportOptions, Written
 from robochoc.formats.dialects.exported import Exported, amounts, decimal, exported, magnitude, maximises
@@ -11,6 +12,18 @@ from robochoc.formats.dialects.tables import Amount, Scale
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError
+
+LIMIT = 2**53
+"""The end of costs in their unit: toulbar2 1.1 reads those of a cfn as floating-point numbers."""
+
+
+class _Network(NamedTuple):
+    """A team's costs with their constant and decimal places, and a bound that no finite sum reaches."""
+
+    tables: list[Exported]
+    constant: Fraction
+    places: int
+    bound: int
 
 
 def cfn(team: Team, options: ExportOptions) -> Written:
@@ -20,37 +33,41 @@ def cfn(team: Team, options: ExportOptions) -> Written:
     other functions, such a sum reaches the bound.
 
     Raises:
-        UnsupportedError: if a constraint is too large for a table, or the team changes over time.
+        UnsupportedError: if costs or a constraint's table are too large, or the team changes over time.
     """
     del options
-    tables, constant = _network(team)
-    return Written({f"{team.name}.cfn": ("\n".join(_cfn(team, tables, constant)) + "\n").encode()})
+    return Written({f"{team.name}.cfn": ("\n".join(_cfn(team, _network(team))) + "\n").encode()})
 
 
 def wcsp(team: Team, options: ExportOptions) -> Written:
     """Return the `.wcsp` of `team`, without any names.
 
     Raises:
-        UnsupportedError: if a cost is negative or no integer, costs are maximised, a constraint is too large for a
-            table, or the team changes over time.
+        UnsupportedError: if a cost is negative or no integer, costs are maximised, costs or a constraint's table are
+            too large, or the team changes over time.
     """
     del options
-    tables, constant = _network(team)
-    costs = {constant, *amounts(tables)}
+    network = _network(team)
+    costs = {network.constant, *amounts(network.tables)}
     if maximises(team) or any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in costs):
         raise UnsupportedError("a wcsp has integer costs of 0 or more that are minimised; a cfn can say this one")
-    return Written({f"{team.name}.wcsp": ("\n".join(_wcsp(team, tables, constant)) + "\n").encode()})
+    return Written({f"{team.name}.wcsp": ("\n".join(_wcsp(team, network)) + "\n").encode()})
 
 
-def _network(team: Team) -> tuple[list[Exported], Fraction]:
+def _network(team: Team) -> _Network:
     if team.scenario:
         raise UnsupportedError("toulbar2's formats have no scenario")
-    return exported(team)
+    tables, constant = exported(team)
+    places, bound = Scale([constant, *amounts(tables)]).places, magnitude(tables, constant)
+    if bound * 10**places >= LIMIT:
+        unit = f" in units of {decimal(Fraction(1, 10**places))}" if places else ""
+        what = f"costs add up to as much as {bound * 10**places:,}{unit}"
+        raise UnsupportedError(f"{what}: toulbar2 1.1 reads less than {LIMIT:,} exactly; write smaller costs")
+    return _Network(tables, constant, places, bound)
 
 
-def _cfn(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str]:
-    places = Scale([constant, *amounts(tables)]).places
-    bound = magnitude(tables, constant)
+def _cfn(team: Team, network: _Network) -> Iterator[str]:
+    tables, constant, places, bound = network
     sign = -1 if maximises(team) else 1
     mustbe = f"{'>' if sign < 0 else '<'}{decimal(sign * bound, places)}"
     forbidding = decimal(sign * 3 * bound, places)
@@ -104,12 +121,12 @@ def _cfn_domain(domain: Domain, names: Mapping[int, str]) -> str:
     return f"[{', '.join(f'{chr(34)}{name}{chr(34)}' for name in names.values())}]"
 
 
-def _wcsp(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str]:
+def _wcsp(team: Team, network: _Network) -> Iterator[str]:
+    tables, constant, _, bound = network
     place = {name: number for number, name in enumerate(team.variables)}
     codes = {
         name: {value: code for code, value in enumerate(variable.domain)} for name, variable in team.variables.items()
     }
-    bound = magnitude(tables, constant)
     sizes = [len(variable.domain) for variable in team.variables.values()]
     yield f"{team.name} {len(sizes)} {max(sizes)} {len(tables) + (1 if constant else 0)} {bound}"
     yield " ".join(map(str, sizes))

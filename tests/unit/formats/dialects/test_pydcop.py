@@ -16,9 +16,10 @@ from robochoc.formats.dialects.pydcop import python_function
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.assembly import assemble
-from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
+from robochoc.model.constraint import INFINITE, Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.problem import ProblemKind, RemoveAgent
+from robochoc.model.problem import ProblemKind, RemoveAgent, Team
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.foreign_problems import imported, optimum, written
 
 HEAD = """name: small
@@ -303,3 +304,17 @@ def test_a_function_does_not_look_at_all_variables_of_the_problem() -> None:
     variables = Counted.fromkeys(f"x{number}" for number in range(100))
     assert PythonFunction("x1 + 2 * x7", variables).scope == ("x1", "x7")
     assert Counted.looks == 0
+
+
+def test_costs_that_dpop_of_pydcop_cannot_compare_are_refused() -> None:
+    def team_of(cost: int, other: float) -> Team:
+        relation = Relation("r", 1, Semantics.SOFT, ((0,),), (cost,), other)
+        variables = {"a": [Variable("x", Domain("bit", (range(2),)))]}
+        return assemble("t", variables, [Constraint("c", relation, ("x",), ("x",))], kind=ProblemKind.DISWCSP)
+
+    assert written("pydcop", team_of(2**31 - 3, 0))
+    assert written("pydcop", team_of(214_748_363, INFINITE))
+    with pytest.raises(UnsupportedError, match="as much as 2,147,483,646: pyDCOP's costs end at 2,147,483,647"):
+        written("pydcop", team_of(2**31 - 2, 0))
+    with pytest.raises(UnsupportedError, match="as much as 214,748,364, and what forbids costs ten times more"):
+        written("pydcop", team_of(214_748_364, INFINITE))

@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import InvalidInputError, check_team
-from tests.support.foreign_problems import imported, optimum
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import INFINITE, Constraint, Domain, Relation, Semantics, Variable
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.foreign_problems import imported, optimum, written
 
 CFN = """# loose
 { problem: { name: "loose" mustbe: "<20.00" }
@@ -79,3 +84,22 @@ def test_what_is_refused(name: str, text: str, message: str, tmp_path: Path) -> 
         imported(text, tmp_path, name)
     assert len(error.value.diagnostics) == 1
     assert message in str(error.value)
+
+
+def test_an_export_is_what_every_toulbar2_reads_exactly() -> None:
+    def team_of(cost: int, places: int) -> Team:
+        relation = Relation("r", 1, Semantics.SOFT, ((0,), (1,)), (cost, INFINITE), 0)
+        variables = {"a": [Variable("x", Domain("bit", (range(2),)))]}
+        units = CostUnits(maximize=True, places=places)
+        constraint = Constraint("c", relation, ("x",), ("x",))
+        return assemble("t", variables, [constraint], kind=ProblemKind.DISWCSP, costs=units)
+
+    (content,) = written("cfn", team_of(15, 1)).values()
+    assert b"inf" not in content
+    assert b'"mustbe": ">-2.0"' in content
+    assert b'"costs": ["0", 1.5, "1", -6.0]' in content
+    assert written("cfn", team_of(2**53 - 2, 0))
+    with pytest.raises(UnsupportedError, match="as much as 9,007,199,254,740,992: toulbar2"):
+        written("cfn", team_of(2**53 - 1, 0))
+    with pytest.raises(UnsupportedError, match=r"in units of 0\.000000001"):
+        written("cfn", team_of(2**53 - 1, 9))
