@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
-from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.xcsp3.terms import (
     FALSE,
     TRUE,
@@ -109,7 +109,7 @@ class Posting:
             return Constant(self.symbols[word]), True
         if word[:1] in "+-0123456789":
             return Constant(integer(word)), False
-        raise MistakeError(f"there is no variable '{shortened(word)}'", "declare it in <variables>")
+        raise MistakeError(f"there is no variable '{shortened(word)}'", suggestion(word, self.names, "variables"))
 
     def term(self, word: str) -> Expression:
         """Return the expression, variable or integer that a word stands for."""

@@ -68,7 +68,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
         options: `owner` says which variables belong to one robot; without it each has a robot of its own.
 
     Raises:
-        InvalidInputError: with what is wrong, or has no counterpart, each with its line.
+        InvalidInputError: with all mistakes and unsupported parts, each with its line.
     """
     if len(paths) != 1:
         raise invalid_input(paths[0], f"{len(paths)} files", "an XCSP3 instance is one file: import them one by one")

@@ -175,7 +175,7 @@ def read_condition(text: str, term: Callable[[str], Expression], max_values: int
         return Condition(match[1], term(match[2]))
     if match and match[1] in {"in", "notin"}:
         return Condition(match[1], tuple(_values(match[2], max_values)))
-    raise MistakeError(f"'{shortened(text)}' is no condition", "write (le,10), (eq,x) or (in,1..3)")
+    raise MistakeError(f"'{shortened(text)}' is not a valid condition", "write (le,10), (eq,x) or (in,1..3)")
 
 
 def together(*lists: Sequence[Any], what: str = "") -> Iterator[tuple[Any, ...]]:
@@ -212,7 +212,7 @@ def words_of(text: str) -> list[str]:
 def integer(text: str) -> int:
     """Return the integer in a text. Raises `MistakeError`."""
     if not _INTEGER.fullmatch(text):
-        raise MistakeError(f"'{shortened(text)}' is no integer", "at most 18 digits, and a sign")
+        raise MistakeError(f"'{shortened(text)}' is not a valid integer", "at most 18 digits, and a sign")
     return int(text)
 
 
@@ -256,7 +256,7 @@ def resolved(tree: Tree, resolve: Resolve, max_values: int) -> Expression:
     """Return `tree` as an expression of ours.
 
     Raises:
-        MistakeError: if it has an operator that has no counterpart, or wrong arguments.
+        MistakeError: if it has an unsupported operator, or wrong arguments.
     """
     return _resolved(tree, resolve, max_values)[0]
 
@@ -294,7 +294,7 @@ def _applied(operator: str, arguments: list[Expression]) -> Expression:
     least, most, make = _MEANINGS.get(operator, (0, -1, None))
     if make is None:
         hint = suggestion(operator, _MEANINGS.keys(), "operators")
-        raise MistakeError(f"the operator '{shortened(operator)}' has no counterpart", hint)
+        raise MistakeError(f"the operator '{shortened(operator)}' is not supported", hint)
     if not least <= len(arguments) <= most:
         raise MistakeError(f"{operator} with {len(arguments)} arguments", "see XCSP3-core, 'intension'")
     return make(arguments)
@@ -407,5 +407,5 @@ def _tree(tokens: Sequence[str], place: int, depth: int, text: str) -> tuple[Tre
 
 
 def _unreadable(text: str, where: str) -> MistakeError:
-    what = f"'{shortened(text)}' is no expression: see '{shortened(where)}'"
+    what = f"'{shortened(text)}' is not a valid expression: see '{shortened(where)}'"
     return MistakeError(what, "write operators, integers and names of variables: le(add(x,y[0]),10)")

@@ -74,11 +74,11 @@ class Variables:
             return [[one for word in row for one in self._meant(word.strip())] for row in lists(text)]
         match = _COMPACT.fullmatch(text)
         if not match or match[1] not in self.shapes:
-            raise MistakeError(f"'{shortened(text)}' is no matrix", "write x[][] or (x,y)(z,u)")
+            raise MistakeError(f"'{shortened(text)}' is not a valid matrix", "write x[][] or (x,y)(z,u)")
         indexes = self._indexes(match[1], match[2])
         wide = [place for place, some in enumerate(indexes) if len(some) != 1]
         if len(wide) != 2:  # noqa: PLR2004 - rows and columns
-            raise MistakeError(f"'{shortened(text)}' is no matrix", "two of its indexes must be open")
+            raise MistakeError(f"'{shortened(text)}' is not a valid matrix", "two of its indexes must be open")
         row, column = wide
         found = []
         for one in indexes[row]:
@@ -149,7 +149,7 @@ def lists(text: str) -> list[list[str]]:
     """Return the words of `(1,2)(3,4)`, list by list. Raises `MistakeError`."""
     text = text.strip()
     if not text.startswith("(") or not text.endswith(")"):
-        raise MistakeError(f"'{shortened(text)}' are no lists in parentheses", "write (1,2)(3,4)")
+        raise MistakeError(f"'{shortened(text)}' are not lists in parentheses", "write (1,2)(3,4)")
     return [row.split(",") for row in re.split(r"\)\s*\(", text[1:-1])]
 
 
