@@ -24,8 +24,8 @@ from robochoc.formats import PREDEFINED
 from robochoc.model.expression import Constant, Name, Type, parse
 from robochoc.model.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Topic, Variable
 
-MAX_N = 64
-"""4,096 robots; beyond that a folder of files is no longer a sensible form."""
+MAX_N = 49
+"""2,401 robots with 191,296 constraints: the largest team within `draws.MAX_CONSTRAINTS`, as for other families."""
 
 Cell = tuple[int, int]
 """Row and column, from 1."""

@@ -25,6 +25,8 @@ from robochoc.model.problem import Constraint, Domain, Function, ProblemKind, Te
 
 MAX_SIDE = 100
 MAX_REQUIREMENT = 1000
+MAX_CELLS = 1_000_000
+"""The maximum number of cells that all robots together can go to."""
 MAX_COMBINATIONS = 1_000_000
 """The maximum number of ways in which the robots near a target can stand."""
 
@@ -56,7 +58,11 @@ class Field:
 
     def cells(self, robot: int) -> list[int]:
         """Return the cells that a robot can get to."""
-        return [cell for cell in range(self.side**2) if self.near(cell, self.starts[robot], self.mobility)]
+        start, side, reach = self.starts[robot], self.side, self.mobility
+        rows, columns = (range(max(0, at - reach), min(side, at + reach + 1)) for at in divmod(start, side))
+        return [
+            row * side + column for row in rows for column in columns if self.near(row * side + column, start, reach)
+        ]
 
 
 def tracking(
@@ -91,11 +97,18 @@ def tracking(
     check_bounds({"targets": (targets, 1, side**2), "mobility": (mobility, 0, side), "sensing": (sensing, 0, side)})
     check_bounds({"requirement": (requirement, 1, MAX_REQUIREMENT), "credibility": (credibility, 1, MAX_REQUIREMENT)})
     field = drawn_field(seeded(seed), (agents, targets, side), credibility, mobility, sensing)
+    reached = min(side, 2 * mobility + 1) ** 2
+    if agents * reached > MAX_CELLS:
+        raise ValueError(
+            f"{agents:,} robots can go to {reached:,} cells each, more than {MAX_CELLS:,} together;"
+            " take fewer robots, a smaller side, or less mobility"
+        )
     cells = [field.cells(robot) for robot in range(agents)]
     lost = 0
     constraints = []
     for number, target in enumerate(field.targets, 1):
-        near = [robot for robot in range(agents) if any(field.near(cell, target, sensing) for cell in cells[robot])]
+        within = [robot for robot in range(agents) if field.near(field.starts[robot], target, mobility + sensing)]
+        near = [robot for robot in within if any(field.near(cell, target, sensing) for cell in cells[robot])]
         if prod(len(cells[robot]) for robot in near) > MAX_COMBINATIONS:
             raise ValueError(
                 f"{len(near)} robots can get near target {number}, in more than {MAX_COMBINATIONS:,} ways;"

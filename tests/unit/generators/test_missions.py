@@ -151,6 +151,7 @@ def test_impossible_ones_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda: tracking(1, 5, 2), "targets is 5"),
         (lambda: tracking(1, 1, 101), "side is 101"),
         (lambda: tracking(20, 1, 5, sensing=5), "20 robots can get near target 1"),
+        (lambda: tracking(1000, 9, 100, mobility=50), "1,000 robots can go to 10,000 cells each"),
         (lambda: tasks(0, 1), "agents is 0"),
         (lambda: tasks(1, 1, skills=Skills(2, 3)), "skilled is 3; it must be from 1 to 2"),
         (lambda: tasks(1, 1, ways=Ways(places=10)), "places is 10"),
