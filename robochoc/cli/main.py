@@ -30,9 +30,9 @@ def main() -> NoReturn:
     ending = TerminationSignals()
     try:
         ending.listen()
-        from robochoc.system.streams import unblock_standard_error
+        from robochoc.system.streams import prepare_standard_streams
 
-        unblock_standard_error()
+        prepare_standard_streams()
         from robochoc.cli.group import run
 
         status = run()

@@ -14,7 +14,7 @@ from robochoc.formats.scenario import SCENARIO
 from robochoc.formats.scenario_writer import team_files
 from robochoc.formats.validation import check_writable
 from robochoc.model.problem import Team
-from robochoc.system.files import resolved
+from robochoc.system.files import errors_naming, resolved
 
 SKETCH_FILE = "sketch.json"
 """The file in which `robochoc app` keeps beside a team how it was drawn."""
@@ -54,13 +54,14 @@ def write_team(
     new = folder.with_name(f".{secrets.token_hex(8)}.new")
     old = new.with_suffix(".old")
     try:
-        new.mkdir()
-        for path, content in {**files, **beside}.items():
-            (new / path).parent.mkdir(exist_ok=True)
-            (new / path).write_bytes(content)
-        if folder.exists():
-            folder.rename(old)
-        new.rename(folder)
+        with errors_naming(folder):
+            new.mkdir()
+            for path, content in {**files, **beside}.items():
+                (new / path).parent.mkdir(exist_ok=True)
+                (new / path).write_bytes(content)
+            if folder.exists():
+                folder.rename(old)
+            new.rename(folder)
     finally:
         if old.exists() and not folder.exists():
             old.rename(folder)

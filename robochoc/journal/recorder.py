@@ -22,7 +22,7 @@ from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.outcome import Outcome
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
-from robochoc.system.files import AppendableFile
+from robochoc.system.files import AppendableFile, errors_naming
 from robochoc.verification.objective import Objective
 
 MOST_IN_A_BLOCK = 8192
@@ -194,22 +194,18 @@ class JournalFile:
         """Take in the next block. Raises `OSError`."""
         if self._closed:
             raise OSError(errno.EBADF, os.strerror(errno.EBADF), str(self._path))
-        try:
+        with errors_naming(self._path):
             if self._file is None:
                 self._file = AppendableFile(self._path, block)
             else:
                 self._file.append(block)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def close(self) -> None:
         """Close the file. Raises `OSError` if its reader, if it is a pipe, did not read all of it."""
         file, self._file, self._closed = self._file, None, True
         if file:
-            try:
+            with errors_naming(self._path):
                 file.close()
-            except OSError as error:
-                raise OSError(error.errno, error.strerror, str(self._path)) from error
 
 
 class _Outlet:

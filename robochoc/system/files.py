@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import errno
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from robochoc.system.streams import BackgroundWriter
@@ -17,8 +18,28 @@ MAX_AHEAD = 64 << 20
 """The number of bytes that may wait for the reader of a pipe to which a file grows."""
 READER_PATIENCE_S = 5.0
 """Closing such a file waits for its reader as long as that reads something within this time."""
+_HIDDEN = (".part", ".new", ".old")
+"""The endings of hidden files and folders that are being written."""
 _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
 """The errors of file systems and kernels without unnamed files."""
+
+
+@contextmanager
+def errors_naming(path: Path) -> Iterator[None]:
+    """Let errors of the system name the file at `path`, where they name none, or a hidden one that takes its place.
+
+    A full disk is noticed by a write, which does not know what it writes to.
+
+    Raises:
+        OSError: as raised within, with a `filename`.
+    """
+    try:
+        yield
+    except OSError as error:
+        named = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else ""
+        if not named or any(part.startswith(".") and part.endswith(_HIDDEN) for part in Path(named).parts):
+            error.filename = str(path)
+        raise
 
 
 class PendingFile:
@@ -41,20 +62,23 @@ class PendingFile:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if _is_stream(path):
             raise OSError(errno.ENOTSUP, "is no file that could be replaced", str(path))
+        self._path = path
         self._named: Path | None = None
-        descriptor = _unnamed(self._target, mode)
-        if descriptor is None:
-            self._named = _beside(self._target)
-            descriptor = os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR, mode)
+        with errors_naming(path):
+            descriptor = _unnamed(self._target, mode)
+            if descriptor is None:
+                self._named = _beside(self._target)
+                descriptor = os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR, mode)
         self.stream = os.fdopen(descriptor, "w+b")
 
     def keep(self) -> None:
         """Put the file in its place. Raises `OSError`; nothing is left behind then."""
         try:
-            self.stream.flush()
-            if self._named is None:
-                self._named = _linked(self.stream.fileno(), self._target) or self._copied()
-            self._named.replace(self._target)
+            with errors_naming(self._path):
+                self.stream.flush()
+                if self._named is None:
+                    self._named = _linked(self.stream.fileno(), self._target) or self._copied()
+                self._named.replace(self._target)
         except BaseException:
             self.discard()
             raise
@@ -98,12 +122,13 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
         OSError: if it cannot be written. Nothing is left behind then.
     """
     if _is_stream(path):
-        with os.fdopen(_open_stream(path), "wb") as stream:
+        with errors_naming(path), os.fdopen(_open_stream(path), "wb") as stream:
             stream.write(content)
         return
     file = PendingFile(path, mode)
     try:
-        file.stream.write(content)
+        with errors_naming(path):
+            file.stream.write(content)
     except BaseException:
         file.discard()
         raise

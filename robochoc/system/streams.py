@@ -180,8 +180,37 @@ class _StandardError(io.RawIOBase):
             self._writer.finish(PATIENCE_S)
 
 
-def unblock_standard_error() -> None:
-    """Let `sys.stderr` no longer wait for its reader, if it is a pipe, a socket or a terminal."""
+class _StandardOutput(io.FileIO):
+    """Standard output, whose first error names it. Then nothing is written: Python tries again at its end."""
+
+    _has_failed = False
+
+    def write(self, content: Buffer, /) -> int:
+        if self._has_failed:
+            return len(bytes(content))
+        try:
+            return super().write(content)
+        except OSError as error:
+            self._has_failed = True
+            error.filename = "standard output"
+            raise
+
+
+_REPLACED: list[object] = []
+"""Streams that Python made. Their descriptors are closed with them."""
+
+
+def prepare_standard_streams() -> None:
+    """Let errors of `sys.stdout` name it, and `sys.stderr` not wait for the reader of a pipe, socket or terminal."""
+    _REPLACED.extend((sys.stdout, sys.stderr))
+    with suppress(OSError, ValueError):
+        old = sys.stdout
+        content = io.BufferedWriter(_StandardOutput(old.fileno(), "w", closefd=False))
+        sys.stdout = io.TextIOWrapper(content, old.encoding, old.errors, line_buffering=old.isatty())
+    _unblock_standard_error()
+
+
+def _unblock_standard_error() -> None:
     try:
         descriptor = sys.stderr.fileno()
         mode = os.fstat(descriptor).st_mode
