@@ -70,7 +70,7 @@ class Account:
             where = "in the simulator or in arrays" if "arrays" in runtimes else "in the simulator"
             yield f"All runs were {where}: counts are exact, and the same wherever they are repeated."
         checked = sum(row["verified"] for row in rows)
-        told = f"The answers of {checked:,} runs were checked against every constraint"
+        told = f"The answers of {checked:,} runs were checked against every constraint in force"
         if self.stopped:
             why = self.stopped.partition("\n")[0]  # the commands that repeat them follow
             yield f"{told}. The study was stopped: {why}"

@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import (
     CheckCounts,
@@ -83,6 +84,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     witness: str | None = None
     bound: int | Decimal | None = None
     tree: dict[str, PseudoTreeNode] = {}
+    dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
 
 class _CheckedForm(msgspec.Struct):
@@ -137,6 +139,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     confirmed_by: tuple[str, ...] = ()
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
+    dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
 
 _ENCODER = msgspec.json.Encoder(decimal_format="number")

@@ -12,8 +12,7 @@ import math
 import re
 import zlib
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 from robochoc.model.constraint import (
     INFINITE,
@@ -42,7 +41,8 @@ _NEVER = Predicate("absent", ("X",), Apply("ne", (Name("X"), Name("X"))))
 _TWO = 2
 
 
-class DroppedConstraint(NamedTuple):
+@dataclass(frozen=True)
+class DroppedConstraint:
     """A constraint that is not in force because a robot is absent.
 
     Attributes:
@@ -98,6 +98,15 @@ def can_be_restated(constraint: Constraint) -> bool:
     except NotAnAggregateError:
         return False
     return True
+
+
+def bears_absence(constraint: Constraint) -> bool:
+    """Return whether `constraint` may cost or forbid something when one of its robots is absent."""
+    if constraint.when_absent == WhenAbsent.FAIL:
+        return True
+    if constraint.when_absent == WhenAbsent.DROP or _is_difference(constraint):
+        return False
+    return can_be_restated(constraint)
 
 
 def is_absence_proof(constraint: Constraint, domains: Mapping[str, Domain]) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 
 RULED_OUT = "has ruled everything out"
@@ -117,6 +118,8 @@ class EpochOutcome:
         bound: As in `Outcome`.
         tree: As in `Outcome`.
         confirmed: As in `Outcome`.
+        improvements: As in `Outcome`.
+        dropped_constraints: As in `Outcome`.
     """
 
     verdict: Verdict
@@ -132,6 +135,7 @@ class EpochOutcome:
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
     improvements: tuple[Improvement, ...] = ()
+    dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
 
 CENTRAL_SOLVER = "the central solver"
@@ -222,6 +226,8 @@ class Outcome:
         deadline: The seconds after which an answer was due, if the search was ended by the time and the answer is the
             best that was known by then.
         improvements: The answers that were published while the search went on, the first of them at the deadline.
+        dropped_constraints: The constraints between robots that were dropped as robots are absent, if there is an
+            assignment (`model/absence.py`). Across machines nobody knows them all, and none is listed.
     """
 
     team: str
@@ -255,6 +261,7 @@ class Outcome:
     optima: Optima | None = None
     deadline: float | None = None
     improvements: tuple[Improvement, ...] = ()
+    dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""
@@ -270,6 +277,11 @@ class Outcome:
         if self.witness is None or self.claimed_by is None:
             return self.witness and f"{self.witness} {RULED_OUT}"
         return f"{self.witness} claims it; nobody could check"
+
+    @property
+    def is_complete(self) -> bool:
+        """Return whether all constraints of all robots are in force, as far as it is known."""
+        return not self.dropped_constraints and not (self.checked is not None and self.withdrawn)
 
     @property
     def events(self) -> int:

@@ -11,6 +11,7 @@ from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check_assignment
 from robochoc.run.options import CENTRAL, Options, Withdrawal
@@ -108,4 +109,12 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
     has_answer = found.cost is not None or verdict == Verdict.SOLUTION
     withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
-    return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=has_answer)
+    return Answer(
+        verdict,
+        assignment=assignment,
+        cost=paid,
+        withdrawn=withdrawn,
+        bound=bound,
+        verified=has_answer,
+        dropped_constraints=dropped_constraints(team, withdrawn) if has_answer else (),
+    )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
+from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
 from robochoc.model.outcome import (
@@ -25,6 +26,7 @@ from robochoc.model.outcome import (
     Verdict,
 )
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.listed_optima import put_together
 from robochoc.run.withdrawal import Phase
@@ -42,9 +44,9 @@ from robochoc.verification.checker import (
 class CheckedAssignment(NamedTuple):
     """An assignment that was checked.
 
-    `withdrawn` are the robots without values. `verified`: no hard constraint is broken. `check_counts` is set where
-    robots have checked. `reason` says why there is no assignment, or why it was not checked. `optima` are there if the
-    protocol lists them.
+    `withdrawn` are the robots without values, `dropped` the constraints that are dropped. `verified`: no hard
+    constraint is broken. `check_counts` is set where robots have checked. `reason` says why there is no assignment, or
+    why it was not checked. `optima` are there if the protocol lists them.
     """
 
     assignment: dict[str, int]
@@ -54,6 +56,7 @@ class CheckedAssignment(NamedTuple):
     check_counts: CheckCounts | None = None
     reason: str | None = None
     optima: Optima | None = None
+    dropped: tuple[DroppedConstraint, ...] = ()
 
 
 Check = Callable[[], CheckedAssignment | None]
@@ -95,6 +98,7 @@ class Answer:
     optima: Optima | None = None
     deadline: float | None = None
     improvements: tuple[Improvement, ...] = ()
+    dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
@@ -129,6 +133,7 @@ class Answer:
             tree=self.tree,
             confirmed=self.confirmed,
             improvements=self.improvements,
+            dropped_constraints=self.dropped_constraints,
         )
 
     def as_outcome(self, header: Outcome, lost: tuple[str, ...]) -> Outcome:
@@ -155,6 +160,7 @@ class Answer:
             optima=self.optima,
             deadline=self.deadline,
             improvements=self.improvements,
+            dropped_constraints=self.dropped_constraints,
         )
 
 
@@ -201,6 +207,7 @@ def evaluate_search(
         checked=found.check_counts,
         reason=found.reason,
         optima=found.optima,
+        dropped_constraints=found.dropped,
     )
 
 
@@ -237,6 +244,7 @@ def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> Answer
         verified=found.verified,
         checked=found.check_counts,
         reason=unfinished if sure else found.reason,
+        dropped_constraints=found.dropped,
     )
 
 
@@ -278,7 +286,9 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     check_assignment(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn)
-    return CheckedAssignment(in_order, paid, withdrawn, optima=_checked_optima(phase, result, team, compiled, paid))
+    listed = _checked_optima(phase, result, team, compiled, paid)
+    dropped = dropped_constraints(team, withdrawn)
+    return CheckedAssignment(in_order, paid, withdrawn, optima=listed, dropped=dropped)
 
 
 def _checked_optima(

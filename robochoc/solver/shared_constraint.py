@@ -7,9 +7,9 @@ import math
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from robochoc.model.absence import can_be_restated, restated
+from robochoc.model.absence import bears_absence, restated
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Constraint, Domain, WhenAbsent
+from robochoc.model.problem import INFINITE, Constraint, Domain
 from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import (
     MAX_TUPLES,
@@ -113,10 +113,7 @@ class SharedConstraint:
 
     def allow_absence(self) -> None:
         """From now on values that are None mean that a robot is withdrawn: see `model/absence.py`."""
-        absent = self._constraint.when_absent
-        self._bears_absence = absent == WhenAbsent.FAIL or (
-            absent != WhenAbsent.DROP and can_be_restated(self._constraint) and len(self._seen) > 0
-        )
+        self._bears_absence = bears_absence(self._constraint)
 
     def compile(self, own: OwnValues) -> None:
         """Get ready for the own compiled domain."""

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.absence import can_be_restated, restated
+from robochoc.model.absence import bears_absence, restated
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable, WhenAbsent
 from robochoc.solver.encoding import (
@@ -186,7 +186,7 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
     constraints = list(team.constraints())
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     shared = [one for robot in team.robots for one in robot.shared]
-    bearing = [one for one in shared if _bears_absence(one)]
+    bearing = [one for one in shared if bears_absence(one)]
     own = {robot.name: tuple(variable.name for variable in robot.variables) for robot in team.robots}
     scopes = [*own.values(), *(one.variables for one in (*soft, *bearing))]
     parts = components(team.variables.values(), constraints, scopes)
@@ -223,13 +223,6 @@ def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table
     if not table.allowed:
         return table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
-
-
-def _bears_absence(constraint: Constraint) -> bool:
-    """Return whether `constraint` may forbid something when robots are absent."""
-    if constraint.when_absent == WhenAbsent.FAIL:
-        return True
-    return constraint.when_absent != WhenAbsent.DROP and not is_soft(constraint) and can_be_restated(constraint)
 
 
 def _forbidden_by_absence(part: Component, network: Network, constraint: Constraint) -> Table:

@@ -18,10 +18,13 @@ from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.wording import counted
 
 WIDTH = 100
 _LARGE = 1 << 16
 """Bytes: messages from this size on are mentioned."""
+_MOST_DROPPED = 3
+"""The number of dropped constraints that are named."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 
@@ -44,10 +47,23 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
-    lines += [*_chosen(outcome), *_preprocessing(outcome)]
+    lines += [*_dropped(outcome), *_chosen(outcome), *_preprocessing(outcome)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
+
+
+def _dropped(outcome: Outcome) -> list[str]:
+    """Return a line on constraints that were dropped, as robots in them are absent; the first few by name."""
+    dropped = outcome.dropped_constraints
+    if not dropped:
+        return []
+    named = [f"{one.name} ({', '.join(map(shortened, one.robots))})" for one in dropped[:_MOST_DROPPED]]
+    others = len(dropped) - len(named)
+    more = f" and {others:,} more" if others else ""
+    verb = "was" if len(dropped) == 1 else "were"
+    what = counted(len(dropped), "constraint")
+    return [f"  {what} {verb} dropped, as robots in them are absent: {', '.join(named)}{more}"]
 
 
 def _chosen(outcome: Outcome) -> list[str]:
@@ -151,7 +167,7 @@ def _checked(outcome: Outcome) -> str:
     if not outcome.verified:
         return f"not checked: {outcome.reason}"
     if outcome.checked is None or not outcome.checked.by_owner:
-        return "checked against every constraint"
+        return f"checked against every constraint{' that remains' * (not outcome.is_complete)}"
     alone, total = outcome.checked.by_owner, sum(outcome.checked)
     return f"checked; by their owner alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
 
