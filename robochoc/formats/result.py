@@ -37,7 +37,9 @@ _ZERO = 0.0
 """msgspec leaves out a float that is the same object as its default."""
 
 
-class _MetricsForm(msgspec.Struct):
+class MetricsForm(msgspec.Struct, frozen=True):
+    """`Metrics` in JSON."""
+
     messages: int
     bytes: int
     ncccs: int
@@ -52,14 +54,18 @@ class _MetricsForm(msgspec.Struct):
     lost_messages: int = 0
 
 
-class _ImprovementForm(msgspec.Struct, omit_defaults=True):
+class ImprovementForm(msgspec.Struct, omit_defaults=True, frozen=True):
+    """`Improvement` in JSON."""
+
     at_s: float = msgspec.field(name="seconds")
     verdict: Verdict
     cost: int | Decimal | None
     withdrawn: tuple[str, ...] = ()
 
 
-class _EpochForm(msgspec.Struct, omit_defaults=True):
+class EpochForm(msgspec.Struct, omit_defaults=True, frozen=True):
+    """`EpochOutcome` in JSON, with its metrics."""
+
     verdict: Verdict
     opened_by: str
     robots: tuple[str, ...]
@@ -76,7 +82,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     simulated_s: float = _ZERO
     cycles: int = 0
     lost_messages: int = 0
-    improvements: tuple[_ImprovementForm, ...] = ()
+    improvements: tuple[ImprovementForm, ...] = ()
     messages_by_type: dict[str, int] = {}
     compile_s: float = _ZERO
     memory: int = 0
@@ -87,24 +93,32 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
 
-class _CheckedForm(msgspec.Struct):
+class CheckedForm(msgspec.Struct, frozen=True):
+    """`CheckCounts` in JSON."""
+
     by_both: int
     by_owner: int
 
 
-class _OptimaForm(msgspec.Struct):
+class OptimaForm(msgspec.Struct, frozen=True):
+    """`Optima` in JSON."""
+
     number: Decimal
     assignments: tuple[dict[str, int | str], ...]
 
 
-class _PreprocessingForm(msgspec.Struct):
+class PreprocessingForm(msgspec.Struct, frozen=True):
+    """`Preprocessing` in JSON."""
+
     name: str
-    metrics: _MetricsForm
+    metrics: MetricsForm
     removed: int
     values: int
 
 
-class _Form(msgspec.Struct, omit_defaults=True):
+class ResultForm(msgspec.Struct, omit_defaults=True, frozen=True):
+    """`Outcome` in JSON, with the names, places and values that it is written with."""
+
     team: str
     protocol: str
     runtime: str
@@ -113,8 +127,8 @@ class _Form(msgspec.Struct, omit_defaults=True):
     assignment: dict[str, int | str]
     cost: int | Decimal | None
     withdrawn: tuple[str, ...]
-    epochs: tuple[_EpochForm, ...]
-    metrics: _MetricsForm
+    epochs: tuple[EpochForm, ...]
+    metrics: MetricsForm
     verified: bool
     count: Decimal | None = None
     reason: str | None = None
@@ -126,13 +140,13 @@ class _Form(msgspec.Struct, omit_defaults=True):
     confirmed: bool = False
     channel: str | None = None
     claimed_by: str | None = None
-    checked: _CheckedForm | None = None
+    checked: CheckedForm | None = None
     names: dict[str, str] = {}
     chosen: dict[str, str] = {}
-    preprocessing: _PreprocessingForm | None = None
-    optima: _OptimaForm | None = None
+    preprocessing: PreprocessingForm | None = None
+    optima: OptimaForm | None = None
     deadline: float | None = None
-    improvements: tuple[_ImprovementForm, ...] = ()
+    improvements: tuple[ImprovementForm, ...] = ()
     places: dict[str, tuple[float, ...]] = {}
     values: dict[str, Any] = {}
     witness: str | None = None
@@ -143,6 +157,8 @@ class _Form(msgspec.Struct, omit_defaults=True):
 
 
 _ENCODER = msgspec.json.Encoder(decimal_format="number")
+_MOST_DIGITS = 10_000
+"""The maximum number of digits of a number of solutions: 1e999999999 would take all memory."""
 _DIGITS_S = 6
 """The number of decimal places of seconds that were measured."""
 
@@ -162,7 +178,7 @@ def result_json(
         values: The user's values of variables whose integers in the assignment mean something else.
     """
     told = outcome.optima
-    form = _Form(
+    form = ResultForm(
         **_fields(outcome, Outcome)
         | {
             "assignment": outcome.labelled(outcome.assignment),
@@ -170,10 +186,10 @@ def result_json(
             "bound": _number(outcome.bound),
             "count": None if outcome.count is None else Decimal(outcome.count),
             "epochs": tuple([_epoch(epoch, outcome) for epoch in outcome.epochs]),
-            "metrics": _MetricsForm(**_metrics(outcome.metrics)),
-            "checked": outcome.checked and _CheckedForm(**outcome.checked._asdict()),
+            "metrics": MetricsForm(**_metrics(outcome.metrics)),
+            "checked": outcome.checked and CheckedForm(**outcome.checked._asdict()),
             "preprocessing": _preprocessing(outcome.preprocessing),
-            "optima": told and _OptimaForm(Decimal(told.number), tuple(map(outcome.labelled, told.assignments))),
+            "optima": told and OptimaForm(Decimal(told.number), tuple(map(outcome.labelled, told.assignments))),
             "improvements": _improvements(outcome.improvements),
         },
         names=dict(names),
@@ -197,9 +213,9 @@ def _number(number: Cost | None) -> Cost | None:
     return Decimal(number) if isinstance(number, int) and number.bit_length() > 63 else number  # noqa: PLR2004 - bits
 
 
-def _improvements(found: Sequence[Improvement]) -> tuple[_ImprovementForm, ...]:
+def _improvements(found: Sequence[Improvement]) -> tuple[ImprovementForm, ...]:
     given = [one._replace(at_s=round(one.at_s, _DIGITS_S), cost=_number(one.cost)) for one in found]
-    return tuple([_ImprovementForm(**one._asdict()) for one in given])
+    return tuple([ImprovementForm(**one._asdict()) for one in given])
 
 
 def _metrics(spent: Metrics) -> dict[str, Any]:
@@ -211,13 +227,13 @@ def _metrics(spent: Metrics) -> dict[str, Any]:
     }
 
 
-def _preprocessing(done: Preprocessing | None) -> _PreprocessingForm | None:
+def _preprocessing(done: Preprocessing | None) -> PreprocessingForm | None:
     if done is None:
         return None
-    return _PreprocessingForm(**_fields(done, Preprocessing) | {"metrics": _MetricsForm(**_metrics(done.metrics))})
+    return PreprocessingForm(**_fields(done, Preprocessing) | {"metrics": MetricsForm(**_metrics(done.metrics))})
 
 
-def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
+def _epoch(epoch: EpochOutcome, outcome: Outcome) -> EpochForm:
     given = _fields(epoch, EpochOutcome)
     spent = _metrics(given.pop("metrics"))
     spent |= {name: spent[name] or _ZERO for name in ("compile_s", "simulated_s")}
@@ -227,7 +243,7 @@ def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
         "bound": _number(epoch.bound),
         "improvements": _improvements(epoch.improvements),
     }
-    return _EpochForm(**given | different, **spent)
+    return EpochForm(**given | different, **spent)
 
 
 class _Symbols:
@@ -254,13 +270,13 @@ class _Symbols:
 def read_result(content: bytes) -> Outcome:
     """Return the outcome in a JSON result. Raises `ResultError`, which says what is wrong."""
     try:
-        form = msgspec.json.decode(content, type=_Form)
+        form = msgspec.json.decode(content, type=ResultForm)
     except UnicodeDecodeError as error:
         raise ResultError("it is not UTF-8") from error
     except RecursionError as error:
         raise ResultError("it is nested too deep") from error
     except msgspec.MsgspecError as error:
-        raise ResultError(describe_decode_error(error, _Form)) from error
+        raise ResultError(describe_decode_error(error, ResultForm)) from error
     symbols = _Symbols(form.symbols, form.symbolic)
     told = form.optima
     different: dict[str, Any] = {
@@ -278,16 +294,16 @@ def read_result(content: bytes) -> Outcome:
 
 
 def _whole(key: str, number: Decimal) -> int:
-    if not number.is_finite() or number != int(number):
-        raise ResultError(f"{key} is {number}; expected an integer")
+    if not number.is_finite() or number.adjusted() > _MOST_DIGITS or number != int(number):
+        raise ResultError(f"{key} is {number}; expected an integer of at most {_MOST_DIGITS:,} digits")
     return int(number)
 
 
-def _improvements_of(forms: Sequence[_ImprovementForm]) -> tuple[Improvement, ...]:
+def _improvements_of(forms: Sequence[ImprovementForm]) -> tuple[Improvement, ...]:
     return tuple([Improvement(**msgspec.structs.asdict(one)) for one in forms])
 
 
-def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
+def _epoch_of(form: EpochForm, symbols: _Symbols) -> EpochOutcome:
     different: dict[str, Any] = {
         "assignment": symbols.values(form.assignment),
         "metrics": _metrics_of(form),
@@ -297,12 +313,12 @@ def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
     return EpochOutcome(**same, **different)
 
 
-def _preprocessing_of(form: _PreprocessingForm | None) -> Preprocessing | None:
+def _preprocessing_of(form: PreprocessingForm | None) -> Preprocessing | None:
     if form is None:
         return None
     return Preprocessing(**_fields(form, Preprocessing) | {"metrics": _metrics_of(form.metrics)})
 
 
-def _metrics_of(form: _MetricsForm | _EpochForm) -> Metrics:
+def _metrics_of(form: MetricsForm | EpochForm) -> Metrics:
     messages = form.messages_by_type or ({"messages": form.messages} if form.messages else {})
     return Metrics(**_fields(form, Metrics) | {"messages": messages})

@@ -9,51 +9,30 @@ from typing import Any
 import msgspec
 
 from robochoc.app.sketch.sketch import Value
+from robochoc.formats.result import MetricsForm, ResultForm
 
 
-class Spent(msgspec.Struct, frozen=True):
-    """What a run took."""
-
-    messages: int = 0
-    bytes: int = 0
-    ncccs: int = 0
-    wall_s: float = 0.0
-
-
-class RunResult(msgspec.Struct, frozen=True):
-    """The answer of a team.
+class RunResult(ResultForm, frozen=True, kw_only=True):
+    """The answer of a team: all of the JSON result; what it may lack has a default.
 
     Attributes:
-        verdict: `solution`, `optimal`, `no-solution` or `unknown`.
-        protocol: The protocol that decided.
-        runtime: Where the robots were.
-        seed: The seed.
         assignment: The values, by `ROBOT.DECISION`.
-        cost: What they cost. None: there are none.
-        withdrawn: Who stepped aside.
-        metrics: What it took.
-        bound: No answer costs less. None: not known.
-        reason: Why there is no verdict, and the like.
-        order: The priority order, by its name.
-        chosen: Why the protocol, and the order, were chosen.
-        placed_by: The protocol that found out who steps aside, if it is another.
-        epochs: One for each change of the problem, if there were some.
+        cost: What they cost, as a float where it is a decimal.
+        bound: No answer costs less, as a float where it is a decimal. None: not known.
+        epochs: One for each change of the problem, if there were some: objects as they are in the JSON result.
     """
 
-    verdict: str
+    team: str = ""
     protocol: str = ""
     runtime: str = ""
     seed: int = 0
-    assignment: dict[str, Value] = {}
-    cost: float | int | None = None
+    assignment: dict[str, Value] = msgspec.field(default_factory=dict)
+    cost: float | int | None = None  # type: ignore[assignment] # a decimal in a file may have millions of digits
+    bound: float | int | None = None  # type: ignore[assignment] # likewise
     withdrawn: tuple[str, ...] = ()
-    metrics: Spent = Spent()
-    bound: float | int | None = None
-    reason: str | None = None
-    order: str | None = None
-    chosen: dict[str, str] = {}
-    placed_by: str | None = None
-    epochs: tuple[dict[str, Any], ...] = ()
+    metrics: MetricsForm = MetricsForm(messages=0, bytes=0, ncccs=0, checks=0, wall_s=0)
+    verified: bool = False
+    epochs: tuple[dict[str, Any], ...] = ()  # type: ignore[assignment] # files of earlier versions may lack anything
 
     @property
     def messages(self) -> int:

@@ -9,6 +9,7 @@ from robochoc.app.runs.result import RunResult
 from robochoc.app.sketch.changes import AnyChange, Battery, Blocked, Fails, Joins, changed
 from robochoc.app.sketch.differences import changing_model
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.model.outcome import Verdict
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABC"))
 TASK = Decision("task", Kind.TASK, ("two words", "wash", "dry"))
@@ -20,7 +21,7 @@ def result(*epochs: tuple[str, dict[str, int | str], int], protocol: str = "dyna
         {"verdict": verdict, "assignment": assignment, "cost": 0, "messages": messages}
         for verdict, assignment, messages in epochs
     )
-    return RunResult(epochs[-1][0], protocol, assignment=epochs[-1][1], epochs=told)
+    return RunResult(Verdict(epochs[-1][0]), protocol=protocol, assignment=epochs[-1][1], epochs=told)
 
 
 def test_robots_stay_move_leave_and_come() -> None:
@@ -56,7 +57,7 @@ def test_a_run_that_did_not_come_to_the_change_has_no_outcome() -> None:
 
 
 def test_a_team_alone_is_told_by_its_result() -> None:
-    part = part_of(TEAM, None, RunResult("solution", assignment={"B.task": "two_words"}, cost=3))
+    part = part_of(TEAM, None, RunResult(Verdict.SOLUTION, assignment={"B.task": "two_words"}, cost=3))
     assert (part.values, part.cost, part.solved) == ({("B", "task"): "two words"}, 3, True)
 
 

@@ -61,10 +61,12 @@ def test_results_of_earlier_versions_are_read() -> None:
     assert read.epochs[0].metrics == Metrics({"messages": 3}, 5, 7, 9, 0.5)
 
 
-@pytest.mark.parametrize(("key", "wrong"), [("count", "1.5"), ("count", '"NaN"'), ("count", '"Infinity"')])
+@pytest.mark.parametrize(
+    ("key", "wrong"), [("count", "1.5"), ("count", '"NaN"'), ("count", '"Infinity"'), ("count", "1e999999999")]
+)
 def test_numbers_that_are_not_integers(key: str, wrong: str) -> None:
     content = result_json(PLAIN).replace(b'"verified"', f'"{key}":{wrong},"verified"'.encode())
-    with pytest.raises(ResultError, match=f"{key} is .*; expected an integer"):
+    with pytest.raises(ResultError, match=f"{key} is .*; expected an integer of at most 10,000 digits"):
         read_result(content)
 
 

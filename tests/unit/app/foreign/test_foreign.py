@@ -24,6 +24,7 @@ from robochoc.app.store import Store
 from robochoc.formats import read_team
 from robochoc.model.constraint import Constraint, Predicate, Relation, Semantics
 from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Verdict
 from tests.support.program import ROOT
 from tests.support.small_teams import pair, pkc_team, triangle
 
@@ -114,7 +115,7 @@ def test_a_part_of_a_partially_known_constraint_says_so() -> None:
 def test_the_answer_tells_every_decision_and_names_are_only_text() -> None:
     team = pair()
     found = facts_of(team)
-    result = RunResult("solution", assignment={"A": "<b>", "B": 2})
+    result = RunResult(Verdict.SOLUTION, assignment={"A": "<b>", "B": 2})
     assert says_of(found, result.assignment) == {"RA": "<b>", "RB": "2"}
     assert "<td>&lt;b&gt;</td>" in table_html(found, result)
     epochs = ({"verdict": "<i>", "opened_by": "<script>", "robots": ["RA"], "assignment": {"A": "<u>"}}, {"robots": 3})
@@ -133,8 +134,8 @@ def test_the_headline_counts_who_is_there_at_the_end(tmp_path: Path) -> None:
     found = facts_of(read_team(RESCUE))
     epochs = ({"robots": ["a", "b", "c"]}, {"robots": ["a", "b"]})
     run = Run(tmp_path, Record(RunOptions(), state=State.ENDED), drawn(ForeignTeam(RESCUE, read_team(RESCUE))))
-    run.result = RunResult("solution", assignment={"lead": 1}, cost=0, epochs=epochs)
+    run.result = RunResult(Verdict.SOLUTION, assignment={"lead": 1}, cost=0, epochs=epochs)
     assert headline(run, found) == "All 2 decide."
-    run.result = RunResult("optimal", assignment={"lead": 1}, cost=7)
+    run.result = RunResult(Verdict.OPTIMAL, assignment={"lead": 1}, cost=7)
     worth = msgspec.structs.replace(found, costs=True, maximised=True)
     assert headline(run, worth) == "All 7 decide. It is worth 7: proven the best."

@@ -24,6 +24,7 @@ from robochoc.app.runs.run import Record, Run, State
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.edits import with_importance
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, Value
+from robochoc.model.outcome import Verdict
 from robochoc.verification.checker import assignment_cost
 from tests.support.rule_teams import random_rules
 from tests.support.sketches import random_sketch
@@ -50,24 +51,26 @@ def _run(
 @pytest.mark.parametrize(
     ("run", "words"),
     [
-        (_run(RunResult("optimal", assignment={"a": 1}, cost=5)), "All 3 decide. It costs 5: proven the best."),
-        (_run(RunResult("solution", assignment={"a": 1})), "All 3 decide."),
-        (_run(RunResult("solution", assignment={"a": 1}, cost=2), robots=1), "The robot decides. It costs 2."),
+        (_run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, cost=5)), "All 3 decide. It costs 5: proven the best."),
+        (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1})), "All 3 decide."),
+        (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1}, cost=2), robots=1), "The robot decides. It costs 2."),
         (
-            _run(RunResult("unknown", assignment={"a": 1}, cost=9, bound=4), State.STOPPED),
+            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=9, bound=4), State.STOPPED),
             "All 3 decide. It was stopped; this is the best so far. It costs 9. Nothing costs less than 4.",
         ),
         (
-            _run(RunResult("unknown", assignment={"a": 1}, cost=1_234_567, bound=1_234_566), State.STOPPED),
+            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=1_234_567, bound=1_234_566), State.STOPPED),
             (
                 "All 3 decide. It was stopped; this is the best so far. It costs 1,234,567. "
                 "Nothing costs less than 1,234,566."
             ),
         ),
-        (_run(RunResult("solution", assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
-        (_run(RunResult("optimal", assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
+        (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
+        (_run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
         (
-            _run(RunResult("unknown", assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=1), withdraw=True),
+            _run(
+                RunResult(Verdict.UNKNOWN, assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=1), withdraw=True
+            ),
             (
                 "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far. It costs 5. "
                 "At least 1 must step aside."
@@ -75,19 +78,19 @@ def _run(
         ),
         (
             _run(
-                RunResult("unknown", assignment={"a": 1}, withdrawn=("Drone1",), cost=0, bound=0),
+                RunResult(Verdict.UNKNOWN, assignment={"a": 1}, withdrawn=("Drone1",), cost=0, bound=0),
                 withdraw=True,
                 costs=False,
             ),
             "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far.",
         ),
         (
-            _run(RunResult("unknown", assignment={"a": 1}, cost=9)),
+            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=9)),
             "All 3 decide. A limit was reached; this is the best so far. It costs 9.",
         ),
-        (_run(RunResult("no-solution")), "There is no solution: the rules cannot all hold."),
+        (_run(RunResult(Verdict.NO_SOLUTION)), "There is no solution: the rules cannot all hold."),
         (
-            _run(RunResult("optimal", assignment={"a": 1}, withdrawn=("Drone1",), cost=1)),
+            _run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, withdrawn=("Drone1",), cost=1)),
             (
                 "2 of 3 decide. These step aside, and it is proven that it cannot be fewer, by their weights: Drone1. "
                 "It costs 1."
@@ -106,7 +109,7 @@ def test_that_the_answer_is_told_in_words(run: Run, words: str) -> None:
 
 
 def test_that_robots_that_step_aside_are_weighed() -> None:
-    result = RunResult("unknown", assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=3)
+    result = RunResult(Verdict.UNKNOWN, assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=3)
     run = Run(Path("00001"), Record(RunOptions(withdraw=True)), with_importance(slots(3, 3), "Drone1", weight=3))
     run.result = result
     assert headline(run).endswith("The weights of those who step aside are at least 3 together.")
@@ -116,7 +119,7 @@ def test_that_hostile_names_are_text() -> None:
     sketch = Sketch(
         HOSTILE, robots=(SketchRobot(HOSTILE, Cell(0, 0)),), decisions=(Decision(HOSTILE, Kind.TASK, (HOSTILE,)),)
     )
-    result = RunResult("solution", assignment={f"{HOSTILE}.{HOSTILE}": HOSTILE})
+    result = RunResult(Verdict.SOLUTION, assignment={f"{HOSTILE}.{HOSTILE}": HOSTILE})
     says = values_of(sketch, result.assignment)
     assert says == {HOSTILE: HOSTILE}
     for made in (table_html(sketch, result), team_svg(sketch, says), team_svg(sketch, {}, aside=frozenset({HOSTILE}))):
@@ -128,7 +131,7 @@ def test_that_hostile_names_are_text() -> None:
 
 def test_that_a_place_is_short_in_the_picture_and_said_in_the_table() -> None:
     sketch = Sketch(robots=(SketchRobot("A", Cell(0, 0)),), decisions=(Decision("spot", Kind.PLACE),))
-    result = RunResult("solution", assignment={"A.spot": 17})
+    result = RunResult(Verdict.SOLUTION, assignment={"A.spot": 17})
     assert values_of(sketch, result.assignment) == {"A": "(2, 3)"}
     assert "column 2, row 3" in table_html(sketch, result)
 
