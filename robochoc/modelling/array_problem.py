@@ -27,6 +27,8 @@ from robochoc.model.wording import counted
 from robochoc.protocols.settings import settings_of
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Domain, Value
+from robochoc.run.option_values import texts_by_name
+from robochoc.run.options import Options
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.solver.encoding import UnsupportedError
@@ -139,25 +141,29 @@ class ArrayProblem:
             UnknownProtocolError: if no such protocol is installed.
             UnsupportedError: if it has no form as arrays, or a setting is not allowed, or costs are too large.
             RefutedError: if the answer costs something else than the run says.
+            ValueError: if an option has a value that is not allowed.
+            TypeError: if an option has a value of a wrong type.
         """
+        limit_s = Options(timeout=timeout).timeout
         began = time.monotonic()
         run = self.run(protocol, seed=seed, ncccs=ncccs, **settings)
         for _ in walk(run):
-            if timeout is not None and time.monotonic() - began > timeout and not run.over:
+            if limit_s is not None and time.monotonic() - began > limit_s and not run.over:
                 run.end()
                 break
         return self._solution(run, time.monotonic() - began)
 
     def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
         """Return a run that has not begun, for those who look at each cycle (`walk`). For the rest see `solve`."""
-        kind = protocol_named(protocol)
-        words = {name: str(value) for name, value in settings.items()}
-        refuse_settings(protocol, kind, words)
+        options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
+        kind = protocol_named(options.protocol)
+        refuse_settings(options.protocol, kind, options.settings)
         form = form_of(kind)
         if not issubclass(kind, CycleProtocol):
-            raise UnsupportedError(f"{protocol} goes through no cycles")
-        known = settings_of(kind, words)
-        return form(self.layout, known if isinstance(known, type(kind.settings)) else kind.settings, seed, clocks=ncccs)
+            raise UnsupportedError(f"{options.protocol} goes through no cycles")
+        known = settings_of(kind, options.settings)
+        chosen = known if isinstance(known, type(kind.settings)) else kind.settings
+        return form(self.layout, chosen, options.seed, clocks=ncccs)
 
     def cost(self, values: ArrayLike) -> float:
         """Return what `values` of all robots cost. Raise `ValueError` where a robot has none, or no such value."""

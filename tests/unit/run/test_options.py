@@ -120,3 +120,12 @@ def test_texts_mean_the_same_wherever_options_are_given() -> None:
     assert (outcome.withdrawn, outcome.verdict) == (("hub",), "optimal")
     assert star().solve("abt", "simulator", withdraw="minimum").withdrawn == ("hub",)
     assert star().solve("ABT", "simulator", withdraw="maximal").withdrawn == ("l0", "l1", "l2", "l3")
+
+
+def test_options_of_problems_as_arrays_are_converted() -> None:
+    problem = robochoc.ArrayProblem(2, 2, [(0, 1)], [[1, 0], [0, 1]])
+    assert problem.solve("DSA", seed=np.int64(1), timeout=np.float32(60)).cost == 0  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"^timeout=-1.0 is not allowed; expected 0 or more seconds$"):
+        problem.solve(timeout=-1)
+    with pytest.raises(TypeError, match=r"^seed=None is not allowed; expected an integer$"):
+        problem.solve(seed=None)  # type: ignore[arg-type]
