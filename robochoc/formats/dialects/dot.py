@@ -31,8 +31,9 @@ def _write(team: Team, options: ExportOptions) -> Written:
         if parent is not None:
             label = _label(shared[frozenset((parent, robot.name))])
             lines.append(f"  {_quoted(parent)} -- {_quoted(robot.name)} [style=bold{label}];")
+    place = {name: number for number, name in enumerate(team.order)}
     for pair, number in shared.items():
-        one, other = sorted(pair, key=team.order.index)
+        one, other = sorted(pair, key=place.__getitem__)
         if tree[one] != other and tree[other] != one:
             edge = f"{_quoted(one)} -- {_quoted(other)}"
             lines.append(f"  {edge} [style=dashed, constraint=false{_label(number)}];")

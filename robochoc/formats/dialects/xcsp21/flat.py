@@ -42,15 +42,15 @@ class FlatTeam:
         self.held = list(held(team))
         self._tabulator = Tabulator(team)
 
-    def table(self, one: Held) -> Exported:
+    def table(self, one: Held, hint: str = "") -> Exported:
         """Return a constraint as a table.
 
         Raises:
-            UnsupportedError: if it is too large for one.
+            UnsupportedError: if it is too large for one; the message ends in `hint`.
         """
         table = self._tabulator.table(one)
         if table is None:
-            raise UnsupportedError(f"{self.title}: {too_large(self.team, one.constraint)}")
+            raise UnsupportedError(f"{self.title}: {too_large(self.team, one.constraint)}{hint}")
         return table
 
     def small_table(self, one: Held) -> Exported | None:

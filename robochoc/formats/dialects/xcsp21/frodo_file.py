@@ -28,6 +28,7 @@ from robochoc.solver.encoding import UnsupportedError
 
 FORMAT = "XCSP 2.1_FRODO"
 TITLE = "FRODO's XCSP 2.1"
+KEEPS_FORMULAS = "--intension keeps predicates and functions, for FRODO's JaCoP parser"
 LIMIT = 2**31 - 1
 """The integer that FRODO's 32 bits take for infinity."""
 
@@ -54,7 +55,8 @@ def frodo_file(team: Team, options: ExportOptions) -> Written:
 class _Writer:
     def __init__(self, flat: FlatTeam, *, intension: bool) -> None:
         self._flat = flat
-        self._contents = [(intension and self._in_intension(one)) or flat.table(one) for one in flat.held]
+        hint = "" if intension else f" ({KEEPS_FORMULAS})"
+        self._contents = [(intension and self._in_intension(one)) or flat.table(one, hint) for one in flat.held]
         tables = [content for content in self._contents if isinstance(content, Exported)]
         if flat.constant:
             tables.append(constant_table(flat.team, flat.constant))

@@ -15,7 +15,8 @@ from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import read_foreign, recognise
 from robochoc.model.assembly import assemble
-from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
+from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Predicate, Relation, Semantics, Variable
+from robochoc.model.expression import Type, parse
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.foreign_problems import imported, optimum, random_problem, written
@@ -270,6 +271,17 @@ def test_an_export_in_intension_keeps_formulas_and_the_optimum(tmp_path: Path) -
         kept += content.count(b"<predicate ") + content.count(b"<function ")
         assert optimum(imported(content.decode(), tmp_path).team) == problem.optimum()
     assert kept
+
+
+def test_a_constraint_that_is_too_large_for_a_relation_needs_intension() -> None:
+    names = ("x", "y", "z")
+    predicate = Predicate("p", ("X", "Y", "Z"), parse("lt(add(X,Y),Z)", ("X", "Y", "Z"), Type.BOOLEAN))
+    variables = {name: [Variable(name, Domain("d", (range(101),)))] for name in names}
+    team = assemble("t", variables, [Constraint("c", predicate, names, names)])
+    with pytest.raises(UnsupportedError, match=r"1,030,301 combinations of values; .*--intension keeps"):
+        written("frodo", team)
+    (content,) = written("frodo", team, intension=True).values()
+    assert content.count(b"<predicate ") == 1
 
 
 def test_costs_and_values_beyond_32_bits_are_refused() -> None:
