@@ -45,6 +45,13 @@ def test_limits_for_what_hangs_are_set_in_one_place() -> None:
     assert found == []
 
 
+def test_readers_of_foreign_xml_work_on_views() -> None:
+    """`formats/element_view.py` reports what a reader has not read, so no reader of a dialect may parse XML itself."""
+    parsing = re.compile(r"formats\.xml\b|\b(fromstring|iterparse|XMLParser|XMLPullParser|ElementTree|minidom|sax)\b")
+    dialects = ROOT / "robochoc" / "formats" / "dialects"
+    assert [path for path in sorted(dialects.rglob("*.py")) if parsing.search(path.read_text())] == []
+
+
 def test_untrusted_bytes_reach_neither_eval_nor_pickle() -> None:
     """`control.py` pickles the messages of a parent to a process that it has started, as `multiprocessing` does."""
     used = re.compile(r"(?<![\w.])(eval|exec)\(|\bpickle\b|Pickler")
