@@ -36,7 +36,7 @@ def opening_of(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> Job
 
     def work(job: Job[Opening]) -> Opening:
         try:
-            finished = job.run(Command((str(store.folder.absolute()), str(file)), module=__name__), within_s=within_s)
+            finished = job.run(Command((str(store.folder), str(file)), module=__name__), within_s=within_s)
         except LateError:
             return Opening(mistakes=say("gallery.too-slow", name=file.name, seconds=f"{within_s:g}"))
         if finished.status or not finished.out:

@@ -58,7 +58,7 @@ class Store:
     """The teams in `folder`, which is made if it is not there."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.folder = folder = folder.absolute()  # processes of jobs run in folders of their own
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
     @contextmanager

@@ -39,6 +39,12 @@ def test_a_team_comes_back_as_it_was(store: Store) -> None:
     assert store.load(name) == history
 
 
+def test_a_relative_folder_is_the_same_in_all_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    project = Projects(Store(Path("teams"))).add(Sketch("a"))
+    assert project.folder == tmp_path / "teams" / project.id
+
+
 def test_the_team_that_was_changed_last_is_the_first(store: Store) -> None:
 
     names = [store.add(Sketch()) for _ in range(3)]
