@@ -24,9 +24,9 @@ def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> No
         "solve", four, "--withdraw", "--json", "--journal", folder / "run.jsonl", "--html", folder / "solve.html"
     )
     (folder / "result.json").write_text(done.stdout)
-    for saved in ("run.jsonl", "result.json"):
-        page = folder / f"{saved}.html"
-        assert robochoc_within("animate", folder / saved, "--team", four, "-o", page).returncode == 0
+    for words in (("run.jsonl",), ("run.jsonl", "--team", four), ("result.json", "--team", four)):
+        page = folder / "animated.html"
+        assert robochoc_within("animate", folder / words[0], *words[1:], "-o", page).returncode == 0
         assert page.read_bytes() == (folder / "solve.html").read_bytes()
     assert robochoc_within("animate", folder / "result.json", "-o", folder / "alone.html").returncode == 0
 

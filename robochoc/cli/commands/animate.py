@@ -40,8 +40,8 @@ def animate(
     if port and not serve:
         raise click.UsageError("--port is for --serve")
     refuse_same_places({"--html": html}, {"the result": saved, "--map": ground}, teams=[folder] if folder else [])
-    outcome = saved_outcome(saved)
-    team, folder = saved_team(outcome, saved, folder)
+    outcome, team = saved_outcome(saved)
+    team, folder = saved_team(outcome, team, saved, folder)
     from robochoc.flight.mission import mission_of
 
     mission = mission_of(outcome, team, ground=ground_map(ground, folder))

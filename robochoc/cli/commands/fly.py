@@ -68,8 +68,8 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         teams=[folder] if folder else [],
         more_outputs=sink_places(given["sinks"]),
     )
-    outcome = saved_outcome(saved)
-    team, folder = saved_team(outcome, saved, folder)
+    outcome, team = saved_outcome(saved)
+    team, folder = saved_team(outcome, team, saved, folder)
     if given["sinks"] and team is None:
         raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
     from robochoc.flight.mission import mission_of

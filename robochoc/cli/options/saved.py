@@ -13,7 +13,7 @@ from robochoc.cli.reports.failures import INVALID, Failure
 if TYPE_CHECKING:
     from robochoc.journal.journal import Journal
     from robochoc.model.outcome import Outcome
-    from robochoc.model.problem import Team
+    from robochoc.model.problem import Robot, Team
 
 LARGEST_FILE = 1 << 30
 """1 GiB: a journal of hundreds of millions of messages, or one of millions as text."""
@@ -25,7 +25,7 @@ team_option = click.option(
     "folder",
     type=TeamFolder(),
     metavar="DIR",
-    help="The team's folder, for names and topics.  [default: instances/TEAM]",
+    help="The team's folder, for names and topics.  [default: the journal's own data, or instances/TEAM]",
 )
 
 journal_team_option = click.option(
@@ -60,32 +60,65 @@ def saved_journal(file: Path) -> Journal:
         raise _refused(file, str(wrong), JOURNAL_STEP) from wrong
 
 
-def saved_outcome(saved: Path) -> Outcome:
-    """Return the outcome that a file, a JSON result or a journal, holds. Raises `Failure`."""
+def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
+    """Return the outcome in a file, a JSON result or a journal; and the team, if a journal has it.
+
+    Raises `Failure`.
+    """
     from robochoc.formats.result import ResultError, read_result
     from robochoc.journal.journal import JournalError, is_journal, read_journal
 
     content = saved_content(saved, _OUTCOME_STEP)
     try:
         if not is_journal(content):
-            return read_result(content)
+            return read_result(content), None
         journal = read_journal(content)
     except (JournalError, ResultError) as wrong:
         raise Failure(INVALID, f"{saved}: {wrong} ({_OUTCOME_STEP})") from wrong
     if journal.outcome is None:
         why = journal.damage or "the run broke off"
         raise Failure(INVALID, f"{saved}: {why}, so there is no outcome to show ({_OUTCOME_STEP})")
-    return journal.outcome
+    return journal.outcome, _given_team(journal)
 
 
-def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> tuple[Team | None, Path | None]:
-    """Return the team in `folder`, or in the default folder of its name, and that folder. None if it does not exist.
+def _given_team(journal: Journal) -> Team | None:
+    """Return all robots that take part in a journal's run, as they were first; None if it does not say."""
+    from robochoc.journal.events import Given
+    from robochoc.journal.given import GivenProblemError, TeamReader
+    from robochoc.model.problem import Team
+
+    reader = TeamReader()
+    robots: dict[str, Robot] = {}
+    try:
+        for event in journal.events:
+            if isinstance(event, Given):
+                robots = {robot.name: robot for robot in reader.team(event).robots} | robots
+    except GivenProblemError:  # robots on other machines keep their problems to themselves, say
+        return None
+    return Team(journal.header.team, tuple(robots.values())) if robots else None
+
+
+def saved_team(
+    outcome: Outcome, given: Team | None, saved: Path, folder: Path | None
+) -> tuple[Team | None, Path | None]:
+    """Return the team of a saved outcome, and its folder. None if there is none.
+
+    It is the team in `folder`, or that which the journal has (`given`), or the one in the default folder of its name.
 
     Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
     """
-    from robochoc.formats import read_team
+    from robochoc.formats import read_team, robot_names
 
+    if folder is None and given is not None and _is_team_of(outcome, given):
+        usual = _usual_folder(outcome)
+        is_there = usual is not None and set(robot_names(usual)) <= {robot.name for robot in given.robots}
+        return given, usual if is_there else None  # for its map
     folder = folder or _usual_folder(outcome)
+    if folder is None:
+        missing = Path("instances") / Path(outcome.team).name
+        click.echo(
+            f"{missing} is not there: drones are named for variables, without topics (give --team DIR)", err=True
+        )
     team = read_team(folder) if folder else None
     if team and not _is_team_of(outcome, team):
         why = f"this is not the team of {saved}, {outcome.team} (give its folder with --team)"
@@ -110,10 +143,7 @@ def _usual_folder(outcome: Outcome) -> Path | None:
     """Return the folder in which `generate` puts teams of that name. None: there is no such folder."""
     name = Path(outcome.team).name
     folder = Path("instances") / name
-    if name not in {"", ".."} and folder.is_dir():
-        return folder
-    click.echo(f"{folder} is not there: drones are named for variables, without topics (give --team DIR)", err=True)
-    return None
+    return folder if name not in {"", ".."} and folder.is_dir() else None
 
 
 def _refused(file: Path, why: str, next_step: str) -> Failure:
