@@ -28,7 +28,9 @@ def read_scenario(
         MistakeError: if it is none.
     """
     there, events, delays, left_out = {robot.name for robot in team.robots}, [], 0, 0
-    listed = root.get("events")
+    listed, inputs = root.get("events"), root.get("inputs")
+    if inputs is not None:
+        inputs.skip()  # of the program that wrote the file
     if listed is None or listed.items is None:
         raise MistakeError("has no events", "write events: and a list of them", root.line)
     for event in listed.items:

@@ -248,7 +248,7 @@ def test_scenarios_and_distributions_are_strict_too(tmp_path: Path) -> None:
         "inputs: {algo: dpop}\ncost: 3\nstatus: SUCCESS\ndistribution: {a1: [x], a2: [y]}\n"
     )
     (tmp_path / "s.yaml").write_text(
-        "events:\n- {id: w, delay: 3}\n- {id: e, actions: [{type: remove_agent, agent: a2}]}\n"
+        "inputs: {by: hand}\nevents:\n- {id: w, delay: 3}\n- {id: e, actions: [{type: remove_agent, agent: a2}]}\n"
     )
     files = [tmp_path / name for name in ("a.yaml", "d.yaml", "s.yaml")]
     assert len(read_foreign(files, ImportOptions()).team.scenario) == 1
