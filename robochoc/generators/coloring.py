@@ -22,6 +22,7 @@ from robochoc.generators.graphs import Graph, uniform
 from robochoc.generators.random_csp import places_told, team_of_edges
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Team
+from robochoc.system.suggestions import member
 
 
 class Conflicts(StrEnum):
@@ -81,7 +82,7 @@ def coloring_of(
     Raises:
         ValueError: if a number is out of its bounds. The text says which.
     """
-    conflicts = Conflicts(conflicts)
+    conflicts = member(Conflicts, "conflicts", conflicts)
     check_bounds({"colors": (colors, 1, MAX_VALUES), "max-cost": (max_cost, 1, MAX_COST)})
     check_places(places)
     chance = seeded(seed)

@@ -34,6 +34,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Domain, Predicate, ProblemKind, Relation, Semantics, Team, Variable
+from robochoc.system.suggestions import member
 
 _TERMS = ("X", "Y", "i", "j")
 ONE_AFTER_THE_OTHER = Predicate(
@@ -128,7 +129,7 @@ def meetings(
     Raises:
         ValueError: if a number is out of its bounds. The text says which.
     """
-    model = MeetingsModel(model)
+    model = member(MeetingsModel, "model", model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "meetings": (meetings, 1, MAX_AGENTS)})
     check_bounds({"participants": (participants, 1, agents), "slots": (slots, 1, MAX_VALUES)})
     preferences = max_value is not None

@@ -23,6 +23,7 @@ from typing import assert_never
 from robochoc.formats import PREDEFINED
 from robochoc.model.expression import Constant, Name, Type, parse
 from robochoc.model.problem import Child, Constraint, Domain, Parent, Predicate, Robot, Team, Topic, Variable
+from robochoc.system.suggestions import member
 
 MAX_N = 49
 """2,401 robots with 191,296 constraints: the largest team within `draws.MAX_CONSTRAINTS`, as for other families."""
@@ -73,10 +74,11 @@ def queens3d(
     """
     if not 1 <= n <= MAX_N:
         raise ValueError(f"n is {n}; it must be from 1 to {MAX_N}")
-    model = QueensModel(model)
+    model = member(QueensModel, "model", model)
+    robots = member(QueensRobots, "robots", robots)
     levels = Domain("D1", (range(1, n + 1),))
     numbers = range(1, n + 1)
-    match QueensRobots(robots):
+    match robots:
         case QueensRobots.CELLS:
             crews = {_robot_name(cell): [cell] for cell in itertools.product(numbers, numbers)}
         case QueensRobots.ROWS:
@@ -84,7 +86,7 @@ def queens3d(
         case never:
             assert_never(never)
     flown_by = {cell: name for name, cells in crews.items() for cell in cells}
-    suffix = "" if robots == QueensRobots.CELLS else f"-{QueensRobots(robots)}"
+    suffix = "" if robots == QueensRobots.CELLS else f"-{robots}"
     team = (_robot(name, cells, flown_by, levels, model) for name, cells in crews.items())
     return Team(f"queens3d-{n}{suffix}", tuple(team))
 

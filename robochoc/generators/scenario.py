@@ -39,6 +39,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.model.team_edits import ChangeError
+from robochoc.system.suggestions import member
 
 MAX_EVENTS = 1000
 MAX_TRIES = 100
@@ -85,7 +86,7 @@ def random_scenario(
     check_bounds({"events": (events, 1, MAX_EVENTS), "rate": (rate, 0, 1)})
     if team.scenario:
         raise ValueError(f"{team.name} has a scenario already; take a team without one")
-    named = set(map(Kind, kinds))
+    named = {member(Kind, "kinds", one) for one in kinds}
     wanted = [kind for kind in Kind if kind in named] or list(Kind)
     shared = sum(len(robot.shared) for robot in team.robots)
     changes = max(1, round(rate * shared))

@@ -29,6 +29,7 @@ from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded,
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Name, Type, parse, total
 from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Semantics, Team, Term, Variable
+from robochoc.system.suggestions import member
 
 MAX_NEEDED = 10
 MAX_PAIRS = 1_000_000
@@ -111,8 +112,9 @@ def sensors(
     pairs = itertools.combinations(numbers, 2)
     compatible = frozenset(pair for pair in pairs if chance.random() < compatibility)
     shares = f"{float(visibility)}-{float(compatibility)}"
-    name = f"sensors-{SensorsModel(model)}-{sensors}-{targets}-{needed}-{shares}-{seed}"
-    return _team(name, SensorNetwork(sensors, seen_by, compatible, needed), SensorsModel(model))
+    model = member(SensorsModel, "model", model)
+    name = f"sensors-{model}-{sensors}-{targets}-{needed}-{shares}-{seed}"
+    return _team(name, SensorNetwork(sensors, seen_by, compatible, needed), model)
 
 
 def grid_sensors(
@@ -165,8 +167,9 @@ def grid_sensors(
         and chance.random() < reach.compatibility
     )
     shares = f"{sight}-{hearing}-{float(reach.visibility)}-{float(reach.compatibility)}"
-    name = f"grid-sensors-{SensorsModel(model)}-{rows}x{columns}-{targets}-{needed}-{shares}-{seed}"
-    return _team(name, SensorNetwork(len(nodes), seen_by, compatible, needed), SensorsModel(model))
+    model = member(SensorsModel, "model", model)
+    name = f"grid-sensors-{model}-{rows}x{columns}-{targets}-{needed}-{shares}-{seed}"
+    return _team(name, SensorNetwork(len(nodes), seen_by, compatible, needed), model)
 
 
 def _check_shares(visibility: float, compatibility: float, needed: int) -> None:

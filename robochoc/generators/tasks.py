@@ -33,6 +33,7 @@ from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignm
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.system.suggestions import member
 
 MAX_SIDE = 10_000
 MAX_SKILLS = 100
@@ -109,7 +110,7 @@ def tasks(
     Raises:
         ValueError: if a number is out of its bounds. The text says which.
     """
-    model = TasksModel(model)
+    model = member(TasksModel, "model", model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "tasks": (tasks, 1, MAX_AGENTS)})
     check_bounds({"side": (ways.side, 1, MAX_SIDE), "worth": (worth, 1, MAX_COST)})
     check_bounds({"skills": (skills.number, 1, MAX_SKILLS), "skilled": (skills.each, 1, skills.number)})

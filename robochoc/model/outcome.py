@@ -195,7 +195,9 @@ class Outcome:
         runtime: The runtime.
         seed: The seed of the run.
         verdict: The answer to the problem.
-        assignment: The values of all variables of the robots that are not withdrawn.
+        assignment: The values of all variables of the robots that are not withdrawn, as the integers that robots
+            compute with: those of `symbolic` variables are places in `symbols`. `Solution.values` has the values of
+            the user.
         cost: The cost of the assignment in the user's numbers, exactly; the utility where that is maximised. None:
             there is no assignment.
         withdrawn: The names of the withdrawn robots, the lost ones included.

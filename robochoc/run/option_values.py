@@ -7,32 +7,20 @@ import operator
 from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
 from numbers import Real
-from typing import TypeVar
 
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
-from robochoc.system.suggestions import did_you_mean
+from robochoc.system.suggestions import member
 
 Converter = Callable[[str, object], object]
 """It gets the name of an option and a value, and returns the value in the type of the option.
 
 It raises `TypeError` for a value of a wrong type, and `ValueError` for one that is not allowed.
 """
-_Member = TypeVar("_Member", bound=StrEnum)
 
 
 def _refusal(name: str, value: object, expected: str) -> str:
     return f"{name}={value!r} is not allowed; expected {expected}"
-
-
-def member(choices: type[_Member], name: str, value: object) -> _Member:
-    """Return the member of `choices` that is called `value`. Raises `ValueError`, which names the nearest member."""
-    try:
-        return choices(value)  # type: ignore[arg-type]
-    except ValueError:
-        known = [str(one) for one in choices]
-        hint = did_you_mean(value, known, f"expected {', '.join(known)}")
-        raise ValueError(f"{name}={value!r} is not allowed; {hint}") from None
 
 
 def one_of(choices: type[StrEnum]) -> Converter:

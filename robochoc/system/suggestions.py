@@ -1,8 +1,12 @@
-"""Suggestions for mistyped names."""
+"""Suggestions for mistyped names, and members of enums by their names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from enum import StrEnum
+from typing import TypeVar
+
+_Member = TypeVar("_Member", bound=StrEnum)
 
 
 def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> str:
@@ -15,3 +19,13 @@ def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> s
         folded = {one.lower(): one for one in words}
         near = [folded[one] for one in difflib.get_close_matches(str(word).lower(), folded, 1)]
     return f"did you mean {near[0]!r}?" if near else fallback
+
+
+def member(choices: type[_Member], name: str, value: object) -> _Member:
+    """Return the member of `choices` that is called `value`. Raises `ValueError`, which names the nearest member."""
+    try:
+        return choices(value)  # type: ignore[arg-type]
+    except ValueError:
+        known = [str(one) for one in choices]
+        hint = did_you_mean(value, known, f"expected {', '.join(known)}")
+        raise ValueError(f"{name}={value!r} is not allowed; {hint}") from None

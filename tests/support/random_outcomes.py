@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from decimal import Decimal
 from enum import StrEnum
 from random import Random
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from robochoc.model.outcome import Outcome
 
@@ -17,9 +17,17 @@ VARIABLES = ("a.x", "a.y", "b.z", "C", "D3.1")
 NAMES = ("a", "b", "C", "D3.1", "the start", "a word or two")
 
 
+Drawn = TypeVar("Drawn")
+
+
 def random_outcome(chance: Random) -> Outcome:
     """Return an outcome. Values of `symbolic` variables are codes of `symbols`, as in real ones."""
-    found: Outcome = _drawn(Outcome, chance, {"symbols": SYMBOLS, "symbolic": tuple(chance.sample(VARIABLES, 2))})
+    return drawn(Outcome, chance, {"symbols": SYMBOLS, "symbolic": tuple(chance.sample(VARIABLES, 2))})
+
+
+def drawn(kind: type[Drawn], chance: Random, given: Mapping[str, object] = types.MappingProxyType({})) -> Drawn:
+    """Return a random object of a type. `given`: values of some fields of the class."""
+    found: Drawn = _drawn(kind, chance, given)
     return found
 
 
