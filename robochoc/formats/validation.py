@@ -38,7 +38,7 @@ from robochoc.formats.rules import (
 from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
 from robochoc.formats.symbols import check_kinds, different_tables, kinds_of, mistyped_constraints
 from robochoc.formats.team_members import TeamMember, TeamMembers
-from robochoc.model.change import apply_changes
+from robochoc.model.change import ExcessiveChangeError, apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
 from robochoc.model.team_edits import ChangeError
@@ -106,8 +106,20 @@ def check_event(team: Team, event: ScenarioEvent) -> None:
     found = list(_of_the_shape(event, ScenarioEvent, place)) or [
         mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
     ]
+    found = found or list(_excessive_changes(team, event.changes, place))
     if found:
         raise InvalidInputError(_numbered(found))
+
+
+def _excessive_changes(team: Team, changes: Iterable[Change], place: Location) -> Iterator[Diagnostic]:
+    """Yield the changes that bring numbers that are too large. Those that `team` cannot take otherwise are left out."""
+    for change in changes:
+        try:
+            team = apply_changes(team, [change])
+        except ExcessiveChangeError as bad:
+            yield place.mistake(bad.message, bad.hint)
+        except ChangeError:
+            continue
 
 
 def with_checked_events(

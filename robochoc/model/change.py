@@ -42,6 +42,10 @@ from robochoc.model.team_edits import (
 )
 
 
+class ExcessiveChangeError(ChangeError):
+    """A change that brings numbers that are too large (`model/magnitudes.py`), whatever else is in the team."""
+
+
 def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
     """Return `team` after `changes`, one after the other.
 
@@ -69,7 +73,7 @@ def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
 
 
 def _check_magnitudes(team: Team, change: Change) -> None:
-    """Raise `ChangeError` where `change`, which `team` has taken, brings numbers that are too large."""
+    """Raise `ExcessiveChangeError` where `change`, which `team` has taken, brings numbers that are too large."""
     match change:
         case AddAgent(robot):
             changed = list(team[robot.name].constraints())
@@ -86,7 +90,7 @@ def _check_magnitudes(team: Team, change: Change) -> None:
         try:
             magnitudes.check(one)
         except MagnitudeError as error:
-            raise ChangeError(error.message, error.hint, line=one.line) from None
+            raise ExcessiveChangeError(error.message, error.hint, line=one.line) from None
 
 
 def team_after_events(team: Team, events: int) -> Team:

@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from robochoc.formats import InvalidInputError, check_team, read_team, write_team
+from robochoc.formats import InvalidInputError, check_event, check_team, read_team, write_team
 from robochoc.model.assembly import assemble
 from robochoc.model.change import apply_changes
 from robochoc.model.cost_units import CostUnits
@@ -160,6 +160,8 @@ def test_changes_that_bring_an_excess_are_refused() -> None:
         apply_changes(small, [larger])
     with pytest.raises(InvalidInputError, match=r"event 1 of the scenario: 'mul\(V1,V2,V1,V2\)' may reach"):
         check_team(replace(small, scenario=(ScenarioEvent((larger,)),)))
+    with pytest.raises(InvalidInputError, match=r"an event: 'mul\(V1,V2,V1,V2\)' may reach"):
+        check_event(small, ScenarioEvent((AddValue("V9", 3), larger)))  # the first is for a robot that may have left
     cubes = Predicate("g", ("X", "Y"), parse("eq(pow(mul(10000,X),add(Y,4)),1)", ("X", "Y"), Type.BOOLEAN))
     added = AddConstraint("R2", "R1", Constraint("C2", cubes, ("V1", "V2"), ("V1", "V2")))
     with pytest.raises(ChangeError, match="beyond the limit"):
