@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeVar
 
-import yaml
+import yaml  # noqa: TID251 - here, and nowhere else
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 

@@ -44,6 +44,11 @@ def test_a_loose_cfn(tmp_path: Path) -> None:
     assert {note.kind for note in found.notes} == {"truncated", "owner"}
 
 
+def test_the_last_brace_of_a_cfn_may_be_missing(tmp_path: Path) -> None:
+    whole = imported(CFN, tmp_path, "a.cfn").team
+    assert imported(CFN.replace("} }", "}"), tmp_path, "a.cfn").team == whole
+
+
 def test_a_wcsp_shares_tables_and_forbids_from_its_bound_on(tmp_path: Path) -> None:
     team = imported(WCSP, tmp_path, "a.wcsp").team
     check_team(team)
@@ -71,7 +76,6 @@ def test_a_maximised_cfn(tmp_path: Path) -> None:
         ("a.wcsp", WCSP.replace("1 1 9", "0 0 9"), ":5: the tuple 0 0 with two costs"),
         ("a.cfn", CFN + "{}", ":10: '{' after the end of the problem"),
         ("a.cfn", CFN.replace("} }", "}, more: { } }"), ":9: 'more' where the problem should end"),
-        ("a.cfn", CFN.replace("} }", "}"), "the file ends where '}' should stand"),
         ("a.cfn", CFN.replace("} }", ""), "the file ends where a function, or '}' should stand"),
         ("a.cfn", CFN.replace("2 3]}", "2 3], extra: 4}"), ":8: 'extra' where the function should end"),
         ("a.cfn", CFN.replace("scope: [x 2]", "scop: [x 2]"), ":8: 'scop' where 'scope' should stand"),
