@@ -37,8 +37,13 @@ class Event:
 
     def __init__(self, model: Model, after: int | None, place: Place) -> None:
         self.after, self.place = after, place
-        self.steps: list[Step] = []
+        self._steps: list[Step] = []
         self._model = model
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The changes, in order."""
+        return tuple(self._steps)
 
     def __repr__(self) -> str:
         return f"<event with {len(self.steps)} change{'s' * (len(self.steps) != 1)}>"
@@ -98,5 +103,5 @@ class Event:
         self._add(Removal(constraint, here()))
 
     def _add(self, step: Step) -> None:
-        self.steps.append(step)
+        self._steps.append(step)
         self._model.changed()

@@ -80,7 +80,7 @@ class Model(Solvable):
         place = here()
         for robot in team.robots:
             added = model.add_robot(robot.name, 0, robot.weight, place)
-            added.topics += robot.topics
+            added.add_topics(*robot.topics)
             for variable in robot.variables:
                 made = given_variable(variable, robot.name, model.symbols, place)
                 added.add_variable(variable.name, made)
@@ -187,10 +187,13 @@ class Model(Solvable):
         Raises:
             ModelError: if the model does not have it, or only an event adds it.
         """
-        for kept in (self._constraints, *(robot.parts for robot in self._robots.values())):
-            if any(one is constraint for one in kept):
-                kept.remove(constraint)
-                self.changed()
+        if any(one is constraint for one in self._constraints):
+            self._constraints.remove(constraint)
+            self.changed()
+            return
+        for robot in self._robots.values():
+            if any(one is constraint for one in robot.parts):
+                robot.remove_part(constraint)
                 return
         raise ModelError(f"{constraint!r} is not a constraint of {self!r}", "give what add() returned")
 

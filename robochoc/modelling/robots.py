@@ -32,8 +32,8 @@ class ModelRobot:
         self._name, self._priority, self._weight, self.place = name, priority, int(weight), place
         self._variables: dict[str, Variable] = {}
         self.joins: object = None
-        self.topics: list[Topic] = []
-        self.parts: list[Rule] = []
+        self._topics: list[Topic] = []
+        self._parts: list[Rule] = []
         self._model = model
 
     @property
@@ -55,6 +55,26 @@ class ModelRobot:
     def variables(self) -> Mapping[str, Variable]:
         """Its variables, by the names that they were given."""
         return MappingProxyType(self._variables)
+
+    @property
+    def parts(self) -> tuple[Rule, ...]:
+        """Its parts of constraints that it shares: what `knows` returned."""
+        return tuple(self._parts)
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """Its topics."""
+        return tuple(self._topics)
+
+    def add_topics(self, *topics: Topic) -> None:
+        """Add topics. See `topic`."""
+        self._topics += topics
+        self._model.changed()
+
+    def remove_part(self, part: Rule) -> None:
+        """Remove one of `parts`. See `Model.remove`."""
+        self._parts.remove(part)
+        self._model.changed()
 
     def add_variable(self, name: str, variable: Variable) -> None:
         """Add a variable of a name that is free. See `variable`."""
@@ -127,7 +147,7 @@ class ModelRobot:
             raise ModelError(
                 f"the part that {self.name} knows is over variables of {' and '.join(owners) or 'no robot'}", hint
             )
-        self.parts.append(rule)
+        self._parts.append(rule)
         self._model.changed()
         return rule
 
@@ -153,8 +173,7 @@ class ModelRobot:
             ModelError: if a term is over other variables, or no file can say it.
         """
         axes = {axis: self._axis(value) for axis, value in (("x", x), ("y", y), ("z", z))}
-        self.topics.append(Topic(name, type, **axes))
-        self._model.changed()
+        self.add_topics(Topic(name, type, **axes))
 
     def _axis(self, value: object) -> Expression | None:
         if value is None:
