@@ -96,6 +96,8 @@ def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imp
     maximize = False
     if objectives is not None:
         with objectives.guard():
+            if root.attribute("type") != "COP":
+                raise MistakeError('<objectives> in an instance of type="CSP"', 'write type="COP"')
             maximize = post_objective(objectives, posting)
     root.ignore("annotations")
     root.report.finish()

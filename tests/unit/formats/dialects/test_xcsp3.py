@@ -165,6 +165,7 @@ def test_large_circuits_get_auxiliary_variables_that_are_determined(tmp_path: Pa
         found = [tuple(one.values())[: len(nodes) + 1] for one in brute_force.solutions(team)]
         assert len(found) == len(truth), seed
         assert set(found) == truth, seed
+        assert len(team.robots) == len(nodes) + 1  # auxiliary variables belong to the robots of nodes
 
 
 def circle(successors: list[int]) -> int:
@@ -313,6 +314,8 @@ HOSTILE = {
     instance(constraints="<sum><list> 1x999999999 </list><condition> (le,1) </condition></sum>"): "a list of more than",
     instance('<var id="x" as="y"/><var id="y" as="x"/>'): "names nothing above",
     "<a>" * 3000: "not well-formed",
+    instance().replace("</instance>", "<objectives><minimize> x </minimize></objectives></instance>"): 'type="COP"',
+    instance(head='type="COP"').replace("</instance>", "<objectives/></instance>"): "an element is missing",
 }
 
 
