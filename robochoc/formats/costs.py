@@ -12,7 +12,7 @@ from dataclasses import replace
 from lxml import etree
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.names import check_integer
+from robochoc.formats.names import BEYOND, check_integer, digits
 from robochoc.formats.xml import attribute
 from robochoc.model.cost_units import MAX_PLACES, CostUnits
 from robochoc.model.problem import (
@@ -82,7 +82,9 @@ def check_units(units: CostUnits, kind: ProblemKind) -> None:
     """Raise `MistakeError` unless a robot of that `kind` can count its costs so."""
     if not 0 <= units.places <= MAX_PLACES:
         raise MistakeError(f"costs of {units.places} decimal places", f"expected 0 to {MAX_PLACES}")
-    check_integer(units.constant)
+    if not -BEYOND < units.constant < BEYOND:
+        message = f"the constant of the costs has {digits(units.constant)} digits"
+        raise MistakeError(message, "at most 18, decimal places included: leave out constants, or use smaller ones")
     if kind != ProblemKind.DISWCSP and units != CostUnits():
         what = "maximize" if units.maximize else "a constant cost" if units.constant else "a scale of costs"
         raise MistakeError(f"{what} in a DisCSP", 'write type="DisWCSP" in the presentation, or delete it')
@@ -179,6 +181,6 @@ def _scale(presentation: etree._Element, places: int) -> int:
 def _decimal(value: int, places: int) -> str:
     if not places:
         return str(value)
-    digits = str(abs(value)).rjust(places + 1, "0")
-    decimals = digits[-places:].rstrip("0")
-    return f"{'-' * (value < 0)}{digits[:-places]}{'.' * bool(decimals)}{decimals}"
+    written = str(abs(value)).rjust(places + 1, "0")
+    decimals = written[-places:].rstrip("0")
+    return f"{'-' * (value < 0)}{written[:-places]}{'.' * bool(decimals)}{decimals}"

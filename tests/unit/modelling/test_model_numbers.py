@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import robochoc
+from robochoc.formats import InvalidInputError
 from robochoc.modelling.terms import Term, Variable
 
 
@@ -75,6 +76,13 @@ def test_a_constant_counts_against_a_sum_that_is_maximised() -> None:
     model.maximize(robochoc.minimum(3, Decimal("4.25")))
     outcome = model.solve("dpop", runtime="simulator")
     assert outcome.cost == Decimal("6.5")
+
+
+def test_a_constant_of_too_many_digits_is_named() -> None:
+    model, x, _ = two()
+    model.minimize(x + 10**18)
+    with pytest.raises(InvalidInputError, match="the constant of the costs has 19 digits"):
+        _ = model.team
 
 
 def test_an_undefined_constant_forbids() -> None:
