@@ -34,15 +34,20 @@ class ChangeError(TransferableError, ValueError):
         self.line = line
 
 
-def without_robots(team: Team, names: Iterable[str]) -> Team:
+def without_robots(team: Team, names: Iterable[str], *, with_files: bool = False) -> Team:
     """Return `team` without the robots `names` and their variables.
 
     Constraints that they share are restated for the robots that stay, or dropped and listed in `Team.dropped`.
+
+    Args:
+        team: The team.
+        names: The robots that leave. Names that the team does not have are ignored.
+        with_files: Whether constraints leave with the robots that hold them, since no other robot knows them.
     """
     gone = {name for name in names if name in team}
     if not gone:
         return team
-    absence = Absence(team, gone)
+    absence = Absence(team, gone, with_files=with_files)
     robots = []
     for robot in team.robots:
         if robot.name not in gone:
@@ -72,24 +77,29 @@ class Absence:
         dropped: Those that were dropped, but for the private constraints of the absent robots.
     """
 
-    def __init__(self, team: Team, absent: Collection[str]) -> None:
+    def __init__(self, team: Team, absent: Collection[str], *, with_files: bool = False) -> None:
         self._gone = {variable.name for name in absent if name in team for variable in team[name].variables}
         self.restated: list[Constraint] = []
         self.dropped: list[DroppedConstraint] = []
         rank = {name: place for place, name in enumerate(team.order)}
         for robot in team.robots:
-            for constraint in robot.private if robot.name in absent else ():
+            is_unknown = with_files and robot.name in absent
+            for constraint in robot.private if robot.name in absent and not is_unknown else ():
                 if constraint.when_absent == WhenAbsent.FAIL:
                     self._add(constraint)
             for constraint in (*robot.shared, *(part for child in robot.children for part in child.constraints)):
-                if not self._gone.isdisjoint(constraint.variables) and not self._add(constraint):
+                if self._gone.isdisjoint(constraint.variables):
+                    continue
+                if is_unknown or not self._add(constraint, robot if with_files else None):
                     owners = {team.owner[name] for name in constraint.variables if name in team.owner}
                     robots = tuple(sorted(owners, key=rank.__getitem__))
                     self.dropped.append(DroppedConstraint(constraint.name, robots))
 
-    def _add(self, constraint: Constraint) -> bool:
-        """Add what is left of `constraint`. Return whether something is."""
+    def _add(self, constraint: Constraint, holder: Robot | None = None) -> bool:
+        """Add what is left of `constraint`. Return whether something is, that mentions the `holder` if one is given."""
         left = restated(constraint, self._gone)
+        if left is not None and holder is not None and left.when_absent != WhenAbsent.FAIL:
+            left = left if any(variable.name in left.variables for variable in holder.variables) else None
         if left is not None:
             self.restated.append(left)
         return left is not None

@@ -14,6 +14,8 @@ from robochoc.model.problem import ConstraintModel, Domain, Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
 
+BREAKABLE = "a constraint that the absence of robots can break"
+"""The end of the text on such a constraint."""
 _TWO = 2
 
 
@@ -39,5 +41,5 @@ def unmet_requirement(
     if traits.absence_proof_only:
         for constraint in robot.constraints():
             if not is_absence_proof(constraint, domains):
-                return f"{robot.name} holds a constraint that the absence of robots can break ({constraint.name})"
+                return f"{robot.name} holds {constraint.name}, {BREAKABLE}"
     return ""

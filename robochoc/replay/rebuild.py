@@ -201,8 +201,8 @@ class Rebuilder:
 
     def _left(self, team: Team) -> Team:
         """Return `team` without the robots lost before. Across machines, interfaces of the others stay."""
-        left = without_robots(team, [name for name in self._lost if name in team])
         on_network = self._header is not None and self._header.runtime == "network"
+        left = without_robots(team, self._lost, with_files=on_network)
         return keep_interfaces(left, team) if on_network else left
 
     def _compiled(self, team: Team) -> CompiledTeam:

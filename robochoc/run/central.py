@@ -17,6 +17,7 @@ from robochoc.run.evaluation import Answer, check_assignment
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, TeamSolver
 from robochoc.solver.failures import SolverLostError
+from robochoc.verification.absence_reason import absence_reason
 from robochoc.verification.checker import assignment_cost, robots_without_values
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import total_cost
@@ -109,8 +110,10 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
     has_answer = found.cost is not None or verdict == Verdict.SOLUTION
     withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
+    is_impossible = verdict == Verdict.NO_SOLUTION
     return Answer(
         verdict,
+        reason=absence_reason(team, withdrawal=price is not None) or None if is_impossible else None,
         assignment=assignment,
         cost=paid,
         withdrawn=withdrawn,

@@ -94,7 +94,7 @@ class ScenarioRun:
         found: the result of the epoch that begins, if what the robots do before the search has settled it.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - they are of one run
         self,
         team: Team,
         order: Sequence[str] | None,
@@ -105,6 +105,7 @@ class ScenarioRun:
         spares: int = 0,
         parameters: RunParameters = DEFAULT_PARAMETERS,
         prepare: Prepare | None = None,
+        with_files: bool = False,
     ) -> None:
         """Begin with `team` as it is before the first event.
 
@@ -118,6 +119,7 @@ class ScenarioRun:
                 happen to them too, and they join at the end of the order.
             parameters: what all robots are given beside the problem.
             prepare: what the robots do before each search (None: nothing).
+            with_files: whether the constraints that lost robots hold are lost with them.
         """
         self.team = self._full = team_after_events(team, events=0)
         self.withdrawn: list[str] = []
@@ -131,6 +133,8 @@ class ScenarioRun:
         self._spares = spares
         self._parameters = parameters
         self._prepare = prepare
+        self._with_files = with_files
+        self._held_in = order if with_files else None
         self.found: RunResult | None = None
         self._joining: set[str] = set()
         self._after_losses = False
@@ -265,11 +269,23 @@ class ScenarioRun:
     def _update_team(self, joining: Collection[str]) -> None:
         """Update the team and its order: the robots that are `joining` come last."""
         self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in joining]
-        self.team = without_robots(self._full, self.withdrawn)
+        self.team = self._remaining()
         if self._order is not None:
             new = {*joining}
             stay = dict.fromkeys(name for name in self._order if name in self.team and name not in new)
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
+
+    def _remaining(self) -> Team:
+        """Return the team without the withdrawn robots.
+
+        Where the constraints that they hold are lost too, these are the constraints that they hold in the order that
+        the run began with.
+        """
+        order = self._held_in
+        if order is None or not self.withdrawn:
+            return without_robots(self._full, self.withdrawn, with_files=self._with_files)
+        left = without_robots(with_priorities(self._full, order), self.withdrawn, with_files=True)
+        return with_priorities(left, [name for name in self._full.order if name in left])
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:
         """Let `session` work on the team as it is now; returns the epoch that begins.

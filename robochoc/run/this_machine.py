@@ -17,6 +17,7 @@ from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
+from robochoc.run.options import Runtime
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
@@ -59,6 +60,7 @@ class ThisMachine(Deployment):
             spares=options.spares,
             parameters=RunParameters(options.seed, options.settings, message_loss=options.dropped),
             prepare=None if options.preprocess is None else self._preprocessed,
+            with_files=options.runtime == Runtime.NETWORK,
         )
         self._searched = CompiledTeam(team, only=())
         """The team of the last `search`; of none, before the first."""
@@ -106,7 +108,8 @@ class ThisMachine(Deployment):
         """See `Deployment.solve`. The problem may change, but not while it is decided which robots withdraw."""
         if not phase.withdrawal:
             return self._solve_epochs(phase)
-        return replace(super().solve(phase), witness=None)  # the witness is that of a team without a solution
+        answer = replace(super().solve(phase), witness=None)  # the witness is that of a team without a solution
+        return replace(answer, reason=answer.reason or self._absence_reason(answer, withdrawal=True))
 
     def search(self, phase: Phase) -> Search:
         """See `Deployment.search`."""
@@ -167,10 +170,19 @@ class ThisMachine(Deployment):
         answer = self._with_epochs(answer)
         missed = self._events_missed(answer)
         why = self._cut_short or missed or self.why_unknown(phase, answer) or answer.reason
+        why = why or self._absence_reason(answer, withdrawal=phase.withdrawal)
         if missed:  # an answer to a problem that was to change
             answer = replace(answer, verdict=Verdict.UNKNOWN, deadline=None)
         reasons = filter(None, [why, *scenario.failed_returns])
         return replace(answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._done))
+
+    def _absence_reason(self, answer: Answer, *, withdrawal: bool) -> str | None:
+        """Return the constraints that no robot is left to satisfy, where there is no solution."""
+        if answer.verdict != Verdict.NO_SOLUTION:
+            return None
+        from robochoc.verification.absence_reason import absence_reason  # noqa: PLC0415 - start-up: seldom asked for
+
+        return absence_reason(self._scenario.team, withdrawal=withdrawal) or None
 
     def _events_missed(self, answer: Answer) -> str:
         """Return in words that a limit came before all events, with an answer; empty: it did not."""

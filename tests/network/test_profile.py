@@ -135,7 +135,7 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
     gone = data.draw(st.sets(st.sampled_from(team.order), max_size=len(team.order) - 1))
     members = registered(team)
     members.remove(gone)
-    left = without_robots(team, gone)
+    left = without_robots(team, gone, with_files=True)
     assert members.order == left.order
     expected = agent_problems(CompiledTeam(left, nothing_of), tree=True)
     for name, task in members.tasks(2, "abt", TREE, DEFAULT_PARAMETERS).items():

@@ -115,7 +115,8 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 def _verdict(team: Team, outcome: Outcome) -> str:
     """Return what happened, in a few words, then why, and how it was checked."""
-    why = outcome.reason if outcome.reason and not outcome.epochs else outcome.ruled_out
+    is_impossible = outcome.verdict == Verdict.NO_SOLUTION
+    why = outcome.reason if outcome.reason and (is_impossible or not outcome.epochs) else outcome.ruled_out
     because = f" ({why})" if why else ""
     confirmed = _confirmed(outcome)
     left = " for the robots that are left" if outcome.lost else ""

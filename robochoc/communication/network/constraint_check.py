@@ -10,6 +10,7 @@ from itertools import islice
 
 from robochoc.communication.network.control_messages import Charge, CheckResult
 from robochoc.communication.network.plausibility import MOST_CHARGES
+from robochoc.model.absence import restated
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
 
 
@@ -17,7 +18,6 @@ def check_constraints(
     epoch: int,
     robot: Robot,
     values: Mapping[str, int],
-    assignment: Mapping[str, int],
     learnt: Mapping[str, Sequence[Constraint]],
 ) -> CheckResult:
     """Return what the constraints charge that `robot` knows.
@@ -26,13 +26,12 @@ def check_constraints(
         epoch: The epoch of the search.
         robot: The robot that checks.
         values: The decided values of all variables that it knows. Withdrawn robots have none, and constraints over
-            their variables are left out.
-        assignment: Those of its own variables; empty if it is withdrawn.
+            their variables are restated for the others or left out (`model/absence.py`).
         learnt: Constraints that it has learnt from others, by the robots that hold them.
     """
     parts = [part for child in robot.children for part in child.constraints]
-    own = robot.private if assignment else ()
-    held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
+    known_to_it = (_in_force(one, values) for one in (*robot.private, *robot.shared, *parts))
+    held = [one for one in known_to_it if one is not None]
     cost = sum(constraint.price(values) for constraint in held)
     shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model != ConstraintModel.PKC], values))
     known = [*((child.name, child.copies) for child in robot.children), *learnt.items()]
@@ -43,10 +42,16 @@ def check_constraints(
 
 
 def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:
-    """Yield, by scope, the costs of the `constraints` of `holder` whose variables all have `values`."""
+    """Yield, by scope, the costs of the `constraints` of `holder` that are in force."""
     groups: dict[tuple[str, ...], list[Constraint]] = {}
     for one in constraints:
-        if values.keys() >= set(one.variables):
-            groups.setdefault(tuple(sorted(one.variables)), []).append(one)
+        in_force = _in_force(one, values)
+        if in_force is not None:
+            groups.setdefault(tuple(sorted(one.variables)), []).append(in_force)
     for variables, group in groups.items():
         yield Charge(holder, variables, len(group), sum(one.price(values) for one in group))
+
+
+def _in_force(constraint: Constraint, values: Mapping[str, int]) -> Constraint | None:
+    """Return what is left of `constraint` when robots without values are absent; None: it is dropped."""
+    return restated(constraint, {name for name in constraint.variables if name not in values})

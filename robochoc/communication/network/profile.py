@@ -6,7 +6,7 @@ works out what all robots know anyway: the priority order, the interfaces, the d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import msgspec
@@ -15,10 +15,11 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
 from robochoc.formats.symbols import check_symbol
+from robochoc.model.absence import broken, restated
 from robochoc.model.cost_units import MAX_PLACES, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.priorities import CycleError, priority_order
-from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable
+from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable, WhenAbsent
 from robochoc.solver.encoding import Cost, max_cost
 
 Ranges = tuple[tuple[int, int], ...]
@@ -244,7 +245,10 @@ def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
 
 
 def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
-    """`robot` in a team of those in `interfaces`: without neighbours that have left, and constraints with them.
+    """Return `robot` in a team of those in `interfaces`, which are in priority order.
+
+    Neighbours that have left are left out. Constraints that the robot holds and that mention them are restated for the
+    others, or dropped (`model/absence.py`); one that is left with variables of this robot alone is private.
 
     It shows the variables that stand there for it, whoever looks at them, and in the order that they have there: so
     others read its values. They do not stand as in its file where it had to show more than its file says.
@@ -253,16 +257,46 @@ def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
     place = {name: number for number, name in enumerate(shown)}
     moved = iter(sorted((one for one in robot.variables if one.name in place), key=lambda one: place[one.name]))
     variables = tuple(next(moved) if one.name in place else one for one in robot.variables)
-    known = {name for names in interfaces.values() for name in names} | {v.name for v in robot.variables}
+    own = {variable.name for variable in robot.variables}
+    owners = {variable: name for name, names in interfaces.items() for variable in names}
+    rank = {name: number for number, name in enumerate(interfaces)}
 
-    def kept(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-        return tuple(constraint for constraint in constraints if known.issuperset(constraint.variables))
+    def lowest(constraint: Constraint) -> str | None:
+        """Return the lowest of the other robots in the scope; None: there is no other."""
+        others = {owners[name] for name in constraint.variables if name not in own}
+        return max(others, key=rank.__getitem__, default=None)
 
+    def kept(constraints: Iterable[Constraint]) -> Iterator[Constraint]:
+        """Yield what is left of `constraints` and mentions this robot."""
+        for constraint in constraints:
+            gone = {name for name in constraint.variables if name not in own and name not in owners}
+            left = restated(constraint, gone)
+            if left is not None and constraint.when_absent == WhenAbsent.FAIL and gone:
+                left = broken(left, (robot.variables[0].name,))
+            if left is not None and not own.isdisjoint(left.variables):
+                yield left
+
+    held = {parent.name: list(kept(parent.constraints)) for parent in robot.parents}
+    private = [replace(one, model=None) for found in held.values() for one in found if lowest(one) is None]
+    under: dict[str | None, list[Constraint]] = {}
+    every = [one for found in held.values() for one in found]
+    for one in sorted(every, key=lambda left: left.original is not None):  # as in `without_robots`
+        under.setdefault(lowest(one), []).append(one)
     children = (child for child in robot.children if child.name in interfaces)
     return replace(
         robot,
         variables=variables,
-        parents=tuple(replace(p, constraints=kept(p.constraints)) for p in robot.parents if p.name in interfaces),
-        children=tuple(replace(c, constraints=kept(c.constraints), copies=kept(c.copies)) for c in children),
+        private=(*robot.private, *private),
+        parents=tuple(
+            replace(one, constraints=tuple(under.get(one.name, ()))) for one in robot.parents if one.name in interfaces
+        ),
+        children=tuple(
+            replace(
+                one,
+                constraints=tuple(kept(one.constraints)),
+                copies=tuple(copy for copy in kept(one.copies) if one.name in {owners.get(v) for v in copy.variables}),
+            )
+            for one in children
+        ),
         shown=shown,
     )

@@ -291,7 +291,7 @@ class Searcher(RobotLoop):
         Raises `FrameRefusedError` if the robot was not asked what it had then.
         """
         own = self._recalled.at(snapshot) if snapshot else self._present
-        found = check_constraints(self.epoch, self._robot, {**values, **own}, own, self._learnt)
+        found = check_constraints(self.epoch, self._robot, {**values, **own}, self._learnt)
         return msgspec.structs.replace(found, snapshot=snapshot)
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.protocols.requirements import unmet_requirement
+from robochoc.protocols.requirements import BREAKABLE, unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
@@ -206,6 +206,8 @@ def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
     domains = {name: variable.domain for name, variable in team.variables.items()} if traits.absence_proof_only else {}
     for robot in team.robots:
         unmet = unmet_requirement(robot, traits, team.owner, domains)
+        if unmet.endswith(BREAKABLE):
+            raise UnsupportedError(f"{unmet}, which {name} does not support; --withdraw minimum does")
         if unmet:
             raise UnfitProtocolError(f"{unmet}, which {name} does not support")
     if traits.allocates and (fault := allocation_fault(team, congestion=traits.congestion)):
