@@ -276,6 +276,18 @@ def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
         assert not any("offboard lost" in vehicle.log for vehicle in vehicles)
 
 
+def test_an_order_to_a_guard_that_is_gone_says_what_vehicles_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also before the reader of its messages has seen the end."""
+    monkeypatch.setattr(GuardProcess, "_read", lambda _: None)
+    with field(tmp_path) as (_, fleet), guarded(fleet) as guard:
+        guard._process.kill()  # noqa: SLF001 - as the system might
+        guard._process.wait()  # noqa: SLF001
+        with pytest.raises(GuardError, match="has ended; vehicles do what their own failsafe says"):
+            guard.permit()
+
+
 def test_a_sink_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
     with field(tmp_path) as (_, fleet):
         sink = MavlinkSink(str(fleet))

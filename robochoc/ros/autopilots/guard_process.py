@@ -140,7 +140,10 @@ class GuardProcess:
         if not problem and time.monotonic() - self._heard_s > limit_s:
             problem = f"the guard process has said nothing for {limit_s:g} s"
         if problem:
-            raise GuardError(f"{problem}; {self.fleet.kind.rules.alone}, until another guard reaches them")
+            raise self._lost(problem)
+
+    def _lost(self, problem: str) -> GuardError:
+        return GuardError(f"{problem}; {self.fleet.kind.rules.alone}, until another guard reaches them")
 
     @property
     def is_flying(self) -> bool:
@@ -198,8 +201,8 @@ class GuardProcess:
                 raise BrokenPipeError
             os.write(self._process.stdin.fileno(), content)
         except (OSError, ValueError):
-            self.check()
-            raise GuardError("the guard process has ended") from None
+            self.check()  # the guard may have said why
+            raise self._lost("the guard process has ended") from None  # which the reader has not seen yet
 
     def _read(self) -> None:
         stdout = self._process.stdout
