@@ -93,6 +93,23 @@ def test_what_is_chosen_stays_in_sight(page: Page) -> None:
     until(lambda: page.evaluate(IN_SIGHT, 300), "lost by a layout")
 
 
+def test_lifelines_and_table_are_scrolled_together(page: Page) -> None:
+    tops = "[Sniffer.page.view.top, Sniffer.page.list.top]"
+    for place, wheel in (("#drawing", 4800), ("#grid", 2800), ("#drawing", -2400), ("#minimap", 1200), ("#grid", -560)):
+        before = page.evaluate(tops)
+        page.locator(place).hover()
+        page.mouse.wheel(0, wheel)
+        until(lambda: all(abs(new - old) > 9 for new, old in zip(page.evaluate(tops), before, strict=True)), place)  # noqa: B023
+        until(lambda: abs(page.evaluate(f"{tops}[0] - {tops}[1]")) < 0.1, f"apart by {place}")
+    page.evaluate("Sniffer.page.chart.scrollBy(1e6)")
+    lowest = page.evaluate("Sniffer.page.view.top")
+    until(lambda: page.evaluate(f"Math.abs({tops}[0] - {tops}[1])") < 0.1, "apart at the end")
+    page.locator("#grid").hover()
+    page.mouse.wheel(0, 100_000)  # the last rows of the table, which is not as tall
+    until(lambda: rows(page)[-1] == COUNT - 1, "the last row cannot be reached")
+    assert page.evaluate("Sniffer.page.view.top") == lowest
+
+
 def test_what_stands_on_top_stays_there(page: Page) -> None:
     page.evaluate("Sniffer.page.view.set({ top: 200 })")
     of = TRACE.messages

@@ -81,8 +81,14 @@
       if (wide && Math.abs(sideways.scrollLeft - view.left) > 1) sideways.scrollLeft = view.left;
     }
 
-    /* The user has moved the window: what is newest is followed no longer, unless that is where they went. */
+    /* The user has moved the window. */
     scrolled() {
+      this.clamp();
+      this.handlers.scrolled();
+    }
+
+    /* Keep the window within the run. What is newest is followed no longer, unless that is where the window is. */
+    clamp() {
       const { view, shape } = this;
       shape.clamp();
       if (view.follow && view.top < shape.lowest - 3) view.set({ follow: false });
@@ -104,7 +110,7 @@
         const x = shape.x(lane);
         if (x < shape.gutter + 20 || x > shape.width - 20) view.set({ left: view.left + x - shape.width / 2 });
       }
-      this.scrolled();
+      this.clamp();
     }
 
     zoom(factor, y = this.shape.height / 2) {

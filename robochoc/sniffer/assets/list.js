@@ -13,6 +13,7 @@
       this.table = Sniffer.byId("table");
       this.rows = [];
       this.said = new Map(); // chunk -> its details, for those in the window
+      this._placed = 0; // where the table was put by the page; anywhere else the user has scrolled it
       this._build();
     }
 
@@ -24,7 +25,12 @@
       this.spacer = Sniffer.make("div", { role: "presentation", class: "spacer" });
       grid.append(this.header, this.spacer);
       grid.setAttribute("aria-colcount", String(COLUMNS.length));
-      grid.addEventListener("scroll", () => this.draw());
+      grid.addEventListener("scroll", () => {
+        this.draw();
+        const byUser = Math.abs(grid.scrollTop - this._placed) >= 1;
+        this._placed = grid.scrollTop;
+        if (byUser) this.handlers.scrolled();
+      });
       grid.addEventListener("wheel", (event) => this._wheel(event), { passive: false });
       grid.addEventListener("click", (event) => {
         const row = event.target.closest(".row[data-message]");
@@ -69,12 +75,14 @@
     set top(row) {
       this._stretch(); // a browser scrolls no farther than the element is tall by now
       this.grid.scrollTop = (row * this.tall) / this.scale;
+      this._placed = this.grid.scrollTop;
     }
 
     _wheel(event) {
       if (this.scale === 1 || event.ctrlKey) return;
       event.preventDefault();
       this.top = this.top + event.deltaY / this.tall;
+      this.handlers.scrolled();
     }
 
     draw() {

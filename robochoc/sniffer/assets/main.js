@@ -25,8 +25,8 @@
       const handlers = { message: (m) => this.message(m), step: (step) => this.time.go(step), robot: (robot) => this.robot(robot),
         words: (m) => this.texts.words(m), has: (chunk) => this.texts.has(chunk), ask: (chunks) => this.texts.ask(chunks),
         begin: () => this.again() };
-      this.chart = new Sniffer.Chart(model, view, this.lanes, this.filter, handlers);
-      this.list = new Sniffer.List(model, view, this.filter, source, { ...handlers, message: (m) => {
+      this.chart = new Sniffer.Chart(model, view, this.lanes, this.filter, { ...handlers, scrolled: () => this.sight.scrolled(this.chart) });
+      this.list = new Sniffer.List(model, view, this.filter, source, { ...handlers, scrolled: () => this.sight.scrolled(this.list), message: (m) => {
         this.message(m);
         if (this.windows.narrow()) this.windows.right(true); // there is no room for it beside the table
       } });
@@ -238,6 +238,7 @@
       if (wanted.top !== undefined && (whole || filter.length > wanted.top + 200)) {
         view.set({ top: wanted.top });
         chart.shape.clamp();
+        if (view.selected < 0) this.sight.scrolled(chart);
         wanted.top = undefined;
       }
     }

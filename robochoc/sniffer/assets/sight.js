@@ -29,6 +29,17 @@
       if (chosen) chart.reveal(row, lanes.of[model.messages.sender[message]]);
     }
 
+    /* One of the windows was scrolled: the other has the same row on top, as far as it goes. */
+    scrolled(window) {
+      const { view, list, chart } = this.page;
+      if (view.layout !== "both" || !list.grid.clientHeight) return;
+      if (window === chart) list.top = view.top;
+      else {
+        view.set({ top: list.top });
+        chart.clamp();
+      }
+    }
+
     /* The table and the lifelines have other sizes now, or were not to be seen before: both show the same. */
     align() {
       const { filter, view, list } = this.page;
