@@ -84,18 +84,6 @@ class ElementView:
         self._asked_attributes.add(name)
         return (self._element.get(name) or "").strip(BLANKS)
 
-    def required_attribute(self, name: str) -> str:
-        """Return the text of an attribute. Raises `MistakeError` where it is missing or empty."""
-        text = self.attribute(name)
-        if not text:
-            unread = [other for other in self._attributes() if other not in self._asked_attributes]
-            raise self.mistake(f"<{self.tag}> lacks its attribute '{name}'", _hint_on_missing(name, unread))
-        return text
-
-    def has_attribute(self, name: str) -> bool:
-        """Return whether there is an attribute of this name. It does not count as read."""
-        return name in self._element.attrib
-
     def ignore_attributes(self, *names: str) -> None:
         """Count attributes as read that have no meaning here."""
         self._asked_attributes.update(names)

@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.posting import Item, Posting
+from robochoc.formats.dialects.xcsp3.posting import MAX_NODES, Item, Posting
 from robochoc.formats.dialects.xcsp3.template import Element, first_index
 from robochoc.formats.dialects.xcsp3.terms import (
     Condition,
@@ -129,6 +129,7 @@ def distinct(members: Sequence[Expression]) -> Expression:
 
 def _distinct(members: Sequence[Vector], spared: Sequence[Row]) -> Expression:
     """Return the number of different `members` that are not `spared`: each counts unless an earlier one is equal."""
+    _limit_pairs(members)
     first = []
     for number, member in enumerate(members):
         new = [differ(member, earlier) for earlier in members[:number]]
@@ -209,6 +210,7 @@ def _post_place(
         for here, there in itertools.permutations(places, 2):
             posting.post(some([compare("ne", condition.operand, numbers[here]), beats(here, there)]))
         return
+    _limit_pairs(members)
     possible = [place for place in places if condition.with_constant(start + place) is not False]
     cases = []
     for here in possible:
@@ -379,6 +381,14 @@ def order_of(element: Element) -> str:
     return operator
 
 
+def _limit_pairs(members: Sequence[object]) -> None:
+    """Raise `MistakeError` where one expression over all pairs of `members` would be too large, before it is built."""
+    pairs = len(members) * (len(members) - 1) // 2
+    if pairs > MAX_NODES:
+        message = f"a constraint that compares {len(members):,} members of a list in pairs"
+        raise MistakeError(message, f"{pairs:,} comparisons exceed the limit of {MAX_NODES:,}: split it")
+
+
 def _products(factors: Sequence[Expression], members: Sequence[Expression], what: str) -> list[Expression]:
     return [times(factor, member) for factor, member in together(factors, members, what=what)]
 
@@ -412,6 +422,7 @@ def _post_chain(operator: str, members: Sequence[Vector], posting: Posting) -> N
 def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]) -> Expression:
     if not pairs:
         raise MistakeError("an empty list", "name its members")
+    _limit_pairs(pairs)
     strict = {"le": "lt", "ge": "gt"}.get(operator, operator)
     *before, last = pairs
     cases = []

@@ -314,6 +314,14 @@ HOSTILE = {
     instance(constraints="<sum><list> 1x999999999 </list><condition> (le,1) </condition></sum>"): "a list of more than",
     instance('<var id="x" as="y"/><var id="y" as="x"/>'): "names nothing above",
     "<a>" * 3000: "not well-formed",
+    **{
+        instance('<array id="x" size="[999]"> 0 1 </array>', wide): "999 members of a list in pairs"
+        for wide in (
+            "<nValues><list> x[] </list><condition> (ge,2) </condition></nValues>",
+            "<lex><list> x[] </list><list> x[] </list><operator> lt </operator></lex>",
+            "<maximumArg><list> x[] </list><condition> (ge,2) </condition></maximumArg>",
+        )
+    },
     instance().replace("</instance>", "<objectives><minimize> x </minimize></objectives></instance>"): 'type="COP"',
     instance(head='type="COP"').replace("</instance>", "<objectives/></instance>"): "an element is missing",
 }
