@@ -83,7 +83,7 @@ class Translation:
         self._add_variable = add_variable
         self._names: dict[str, Expression] = {theirs: Name(ours) for theirs, ours in posting.names.items()}
         self._conditions: list[Expression] = []
-        self._decompositions: dict[int, tuple[Any, Any]] = {}
+        self._decompositions: dict[tuple[int, bool], tuple[Any, Any]] = {}
 
     @contextmanager
     def context(self) -> Iterator[list[Expression]]:
@@ -158,15 +158,16 @@ class Translation:
         """
         for argument in _leaves(term.args):
             self.integer(argument)
-        if id(term) not in self._decompositions:
+        key = id(term), must_hold
+        if key not in self._decompositions:
             try:
                 found, definitions = term.decompose_positive() if must_hold else term.decompose()
             except Exception as error:  # noqa: BLE001 - CPMpy's own exceptions, and CPMpy is not imported here
                 raise MistakeError(f"CPMpy cannot decompose its '{term.name}'", str(error)) from None
             defined = _guarded(self._conditions, TRUE)
             self.definitions += [Definition(one, defined) for one in definitions]
-            self._decompositions[id(term)] = term, found
-        return self._decompositions[id(term)][1]
+            self._decompositions[key] = term, found
+        return self._decompositions[key][1]
 
     def _decomposed_function(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
         if not term.is_total():
