@@ -46,6 +46,7 @@ from robochoc.solver.enumeration import (
     minimum_solution,
 )
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
+from robochoc.solver.linear import Formula, Junction, conjuncts
 from robochoc.solver.propagation import propagate
 from robochoc.solver.query import Query, SolvedBy, SolverAnswer
 from robochoc.system.signals import signals_held
@@ -367,6 +368,21 @@ def _left_s(deadline: float | None) -> float | None:
     return None if deadline is None else min(max(1e-3, deadline - time.monotonic()), LONGEST_WAIT_S)
 
 
+def _in_xcsp3(formula: Formula) -> str:
+    """Return `formula` as a predicate of XCSP3, in which no number is negative."""
+    if isinstance(formula, Junction):
+        return f"{'and' if formula.every else 'or'}({','.join(map(_in_xcsp3, formula.parts))})"
+    left: list[str] = []
+    right: list[str] = []
+    for place, factor in formula.terms:
+        term = f"x{place}" if abs(factor) == 1 else f"mul(x{place},{abs(factor)})"
+        (left if factor > 0 else right).append(term)
+    if formula.bound:
+        (right if formula.bound > 0 else left).append(str(abs(formula.bound)))
+    sides = (side[0] if len(side) == 1 else f"add({','.join(side)})" if side else "0" for side in (left, right))
+    return f"{formula.sign}({','.join(sides)})"
+
+
 def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Costs = ()) -> Task:
     rows: dict[tuple[Codes, ...], int] = {}
     forms = [
@@ -381,4 +397,5 @@ def _task(network: Network, limit: int | None, *, count_only: bool, strategy: St
         count_only=count_only,
         strategy=strategy,
         costs=list(costs),
+        formulas=[_in_xcsp3(formula) for whole in network.formulas for formula in conjuncts(whole)],
     )

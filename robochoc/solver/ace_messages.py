@@ -41,6 +41,7 @@ class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
     `domains` holds each variable's codes, `different` scopes on which all differ. A solution costs the sum of
     the codes of the variables at the places in `costs`, each times the unit there; without any, nothing is minimised.
+    `formulas` are predicates of XCSP3 over `x0`, `x1`, ...
     """
 
     domains: list[list[int]]
@@ -51,6 +52,7 @@ class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     count_only: bool
     strategy: Strategy
     costs: list[tuple[int, int]] = []
+    formulas: list[str] = []
 
 
 class Export(msgspec.Struct, frozen=True, array_like=True, tag=True):

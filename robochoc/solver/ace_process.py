@@ -274,6 +274,11 @@ class _Models:
             posted.append(self._entities.ECtr(constraints.ConstraintAllDifferent(chosen, None)))
         self._entities.EToSatisfy(posted)
         root = self._xcsp.build_document()
+        posts = root.find("constraints")
+        if posts is None:
+            posts = etree.SubElement(root, "constraints")
+        for formula in task.formulas:
+            etree.SubElement(posts, "intension").text = formula
         if task.costs:
             root.set("type", "COP")
             total = etree.SubElement(etree.SubElement(root, "objectives"), "minimize", type="sum")

@@ -140,7 +140,7 @@ class CentralSolver:
             ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
             spare = processes.enter_context(AceProcess(always=True))
             variables, constraints = team.variables.values(), list(team.constraints())
-            parts = computed_by(self._deadline, components, variables, constraints, may_split=True)
+            parts = computed_by(self._deadline, components, variables, constraints, may_split=True, may_add=not count)
             if sum(len(table.rows) for part in parts for table in part.network.tables) > MANY_ROWS:
                 ace.start()
             parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
@@ -185,7 +185,7 @@ class CentralSolver:
         network = part.network
         if network.impossible:
             return None, True
-        if len(part.part.names) == 1:
+        if len(part.part.names) == 1 and not network.formulas:
             (domain, *_), tables = network.domains, network.tables
             return min(tables[0].rows, key=lambda row: row[-1]) if tables else (domain[0],), True
         if self._time_is_over:
@@ -215,7 +215,7 @@ class CentralSolver:
         network = part.network
         if network.impossible:
             return NO_SOLUTIONS
-        if not network.tables:
+        if not network.tables and not network.formulas:
             (domain,) = network.domains
             return SolverAnswer(len(domain), complete=True, solutions=((domain[0],),))
         group = computed_by(self._deadline, symmetries, part)

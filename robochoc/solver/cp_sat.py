@@ -22,9 +22,19 @@ import msgspec
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.central import CentralAnswer
-from robochoc.solver.cp_sat_messages import LENGTH, CpSatAnswer, CpSatFailed, CpSatTable, CpSatTask, FromCpSat
+from robochoc.solver.cp_sat_messages import (
+    LENGTH,
+    CpSatAnswer,
+    CpSatComparison,
+    CpSatFailed,
+    CpSatJunction,
+    CpSatTable,
+    CpSatTask,
+    FromCpSat,
+)
 from robochoc.solver.encoding import Costs, Network, UnsupportedError
 from robochoc.solver.failures import SolverLostError, SolverMissingError
+from robochoc.solver.linear import Formula, Junction
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.signals import signals_held
 from robochoc.system.time_limit import TimeLimitError, computed_by
@@ -208,4 +218,12 @@ class CpSatSolver:
 
 def _task(network: Network, costs: Costs, deadline: float | None) -> CpSatTask:
     tables = tuple(CpSatTable(table.scope, table.allowed, table.rows) for table in network.tables)
-    return CpSatTask(network.domains, tables, tuple(costs), deadline)
+    return CpSatTask(network.domains, tables, tuple(costs), deadline, tuple(map(_message, network.formulas)))
+
+
+def _message(formula: Formula) -> CpSatComparison | CpSatJunction:
+    """Return `formula` as it is sent."""
+    if isinstance(formula, Junction):
+        return CpSatJunction(formula.every, tuple(map(_message, formula.parts)))
+    terms = tuple([(int(place), factor) for place, factor in formula.terms])
+    return CpSatComparison(terms, formula.sign, formula.bound)

@@ -17,6 +17,21 @@ class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
     rows: tuple[tuple[int, ...], ...]
 
 
+class CpSatComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """The sum of `terms`, places of variables with their factors, is `sign` ("le", "eq" or "ne") `bound`."""
+
+    terms: tuple[tuple[int, int], ...]
+    sign: str
+    bound: int
+
+
+class CpSatJunction(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """All of `parts` hold (`every`), or at least one."""
+
+    every: bool
+    parts: tuple[CpSatComparison | CpSatJunction, ...]
+
+
 class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Find one solution; with `costs`, one with the least sum of these codes.
 
@@ -28,6 +43,7 @@ class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
     tables: tuple[CpSatTable, ...]
     costs: tuple[tuple[int, int], ...] = ()
     deadline: float | None = None
+    formulas: tuple[CpSatComparison | CpSatJunction, ...] = ()
 
 
 class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):

@@ -16,11 +16,21 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from io import BufferedRWPair
+from typing import Any
 
 import msgspec
 
-from robochoc.solver.cp_sat_messages import LENGTH, CpSatAnswer, CpSatFailed, CpSatTask, FromCpSat
+from robochoc.solver.cp_sat_messages import (
+    LENGTH,
+    CpSatAnswer,
+    CpSatComparison,
+    CpSatFailed,
+    CpSatJunction,
+    CpSatTask,
+    FromCpSat,
+)
 from robochoc.system.orphans import signal_when_orphaned
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
@@ -63,25 +73,12 @@ def _answer(task: CpSatTask) -> FromCpSat:
 
 
 def _solve(task: CpSatTask) -> CpSatAnswer:
-    """Return the answer of CP-SAT. Its model holds domains, tables and a sum: nothing that computes with values."""
+    """Return the answer of CP-SAT."""
     from ortools.sat.python import cp_model  # noqa: PLC0415 - here, so that its absence can be told
 
-    model = cp_model.CpModel()
-    variables = [
-        model.new_int_var_from_domain(cp_model.Domain.from_values(list(codes)), f"x{place}")
-        for place, codes in enumerate(task.domains)
-    ]
-    for table in task.tables:
-        scope = [variables[place] for place in table.scope]
-        if table.allowed and not table.rows:
-            return CpSatAnswer(None, proven=True)
-        if table.allowed:
-            model.add_allowed_assignments(scope, table.rows)
-        else:
-            model.add_forbidden_assignments(scope, table.rows)
-    if task.costs:
-        paid, units = zip(*task.costs, strict=True)
-        model.minimize(cp_model.LinearExpr.weighted_sum([variables[place] for place in paid], units))
+    if any(table.allowed and not table.rows for table in task.tables):
+        return CpSatAnswer(None, proven=True)
+    model, variables = _model_of(task, cp_model)
     solver = cp_model.CpSolver()
     solver.parameters.num_workers = WORKERS
     solver.parameters.random_seed = 0
@@ -89,16 +86,58 @@ def _solve(task: CpSatTask) -> CpSatAnswer:
     if task.deadline is not None:
         solver.parameters.max_time_in_seconds = max(0.01, task.deadline - time.monotonic())
     status = solver.solve(model)
-    bound = math.ceil(solver.best_objective_bound - 1e-6) if task.costs else 0
-    if status == cp_model.OPTIMAL or (status == cp_model.FEASIBLE and not task.costs):
-        return CpSatAnswer(tuple(solver.value(variable) for variable in variables), proven=True, bound=bound)
-    if status == cp_model.FEASIBLE:
-        return CpSatAnswer(tuple(solver.value(variable) for variable in variables), proven=False, bound=bound)
+    if status in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        codes = tuple([solver.value(variable) for variable in variables])
+        if status == cp_model.OPTIMAL or not task.costs:
+            return CpSatAnswer(codes, proven=True, bound=sum(unit * codes[place] for place, unit in task.costs))
+        return CpSatAnswer(codes, proven=False, bound=math.ceil(solver.best_objective_bound - 1e-6))
     if status == cp_model.INFEASIBLE:
         return CpSatAnswer(None, proven=True)
     if status == cp_model.UNKNOWN:
         return CpSatAnswer(None, proven=False)
     raise ValueError(f"CP-SAT refuses the model: {model.validate()}")
+
+
+def _model_of(task: CpSatTask, cp_model: Any) -> tuple[Any, list[Any]]:  # noqa: ANN401 - imported late
+    """Return a model, and its variables. It holds domains, tables, formulas and a sum of costs."""
+    model = cp_model.CpModel()
+    variables = [
+        model.new_int_var_from_domain(cp_model.Domain.from_values(list(codes)), f"x{place}")
+        for place, codes in enumerate(task.domains)
+    ]
+    for table in task.tables:
+        scope = [variables[place] for place in table.scope]
+        if table.allowed:
+            model.add_allowed_assignments(scope, table.rows)
+        else:
+            model.add_forbidden_assignments(scope, table.rows)
+    for formula in task.formulas:
+        _post(model, variables, formula, ())
+    if task.costs:
+        paid, units = zip(*task.costs, strict=True)
+        model.minimize(cp_model.LinearExpr.weighted_sum([variables[place] for place in paid], units))
+    return model, variables
+
+
+def _post(
+    model: Any,  # noqa: ANN401 - OR-Tools is imported late
+    variables: Sequence[Any],
+    formula: CpSatComparison | CpSatJunction,
+    given: tuple[Any, ...],
+) -> None:
+    """Add `formula` to a model: it holds where the literals `given` do."""
+    if isinstance(formula, CpSatComparison):
+        total = sum(factor * variables[place] for place, factor in formula.terms)
+        facts = {"le": total <= formula.bound, "eq": total == formula.bound, "ne": total != formula.bound}
+        model.add(facts[formula.sign]).only_enforce_if(*given)
+    elif formula.every:
+        for part in formula.parts:
+            _post(model, variables, part, given)
+    else:
+        literals = [model.new_bool_var("") for _ in formula.parts]
+        for literal, part in zip(literals, formula.parts, strict=True):
+            _post(model, variables, part, (literal,))
+        model.add_bool_or(literals).only_enforce_if(*given)
 
 
 if __name__ == "__main__":

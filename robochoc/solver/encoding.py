@@ -12,7 +12,7 @@ import itertools
 import math
 import weakref
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -20,6 +20,7 @@ from robochoc.model.expression import UndefinedValueError
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
 from robochoc.model.expression.closures import Closure, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
+from robochoc.solver.linear import FALSE, Formula, Operand, is_small, linear, operands, renamed
 from robochoc.solver.splitting import MAX_TRIED, split
 
 Cost = int | float
@@ -57,28 +58,39 @@ class Table:
 class Network:
     """A constraint network over codes: a domain for each variable, in ascending order, and tables.
 
-    `different` lists scopes on which all values differ. It may repeat what tables say, never add to it.
+    `different` lists scopes on which all values differ. It may repeat what tables say, never add to it. `formulas` are
+    constraints that are no tables, over places.
     """
 
     domains: tuple[Codes, ...]
     tables: tuple[Table, ...] = ()
     different: tuple[Codes, ...] = ()
+    formulas: tuple[Formula, ...] = ()
 
     @property
     def impossible(self) -> bool:
         """Return whether it can be seen without a search that there is no solution."""
-        return not all(self.domains) or any(table.allowed and not table.rows for table in self.tables)
+        return (
+            not all(self.domains) or FALSE in self.formulas or any(one.allowed and not one.rows for one in self.tables)
+        )
+
+    @property
+    def constrained(self) -> set[int]:
+        """Return the places of the variables that a constraint is on."""
+        places = {place for table in self.tables for place in table.scope}.union(*self.different)
+        return places.union(int(place) for formula in self.formulas for place in operands(formula))
 
 
 @dataclass(frozen=True)
 class Component:
     """Variables that constraints connect, as a network; `values[code]` is the value that a code stands for.
 
-    `names` are the variables, in their given order, and behind them the further ones of split constraints.
+    `names` are the variables, in their given order, and behind them the further ones of split constraints. Where the
+    network has formulas, `values` is a range, so that codes can be added up.
     """
 
     names: tuple[str, ...]
-    values: tuple[int, ...]
+    values: Sequence[int]
     network: Network
 
     def decoded(self, codes: Sequence[int]) -> tuple[int, ...]:
@@ -92,16 +104,19 @@ def components(
     together: Iterable[Sequence[str]] = (),
     *,
     may_split: bool = False,
+    may_add: bool = False,
 ) -> list[Component]:
     """Return the connected components of `variables` under the hard part of `constraints`.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
     `variables` only; so are the scopes in `together`, each of which is to be in one component. With `may_split`,
-    predicates that are too wide for a table become several, with further variables (`solver/splitting.py`).
+    predicates that are too wide for a table become several, with further variables (`solver/splitting.py`). With
+    `may_add`, they become formulas where they compare sums (`solver/linear.py`).
 
     Raises:
         UnsupportedError: when a constraint has too many tuples to be made a table.
     """
+    variables, constraints = list(variables), list(constraints)
     domains = {variable.name: sorted(variable.domain) for variable in variables}
     unary: list[Constraint] = []
     wider: list[Constraint] = []
@@ -110,13 +125,27 @@ def components(
             (unary if len(constraint.variables) <= 1 else wider).append(constraint)
     for constraint in unary:
         _fold(constraint, domains)
-    relevant = _tables(wider, domains, may_split=may_split)
-    groups = _connected(domains, [*(rows.scope for rows in relevant), *together])
-    held: dict[str, list[_Rows]] = {names[0]: [] for names in groups}
+    formulas = list(_formulas(wider, domains)) if may_add else []
+    added = {number for number, _ in formulas}
+    left = [constraint for number, constraint in enumerate(wider) if number not in added]
+    relevant = _tables(left, domains, may_split=may_split)
+    scopes = [tuple(map(str, operands(formula))) for _, formula in formulas]
+    groups = _connected(domains, [*(rows.scope for rows in relevant), *scopes, *together])
+    held: dict[str, tuple[list[_Rows], list[Formula]]] = {names[0]: ([], []) for names in groups}
     first = {name: names[0] for names in groups for name in names}
     for rows in relevant:
-        held[first[rows.scope[0]]].append(rows)
-    return [_component(names, domains, held[names[0]]) for names in groups]
+        held[first[rows.scope[0]]][0].append(rows)
+    for scope, (_, formula) in zip(scopes, formulas, strict=True):
+        held[first[scope[0]] if scope else groups[0][0]][1].append(formula)
+    found = [_component(names, domains, *held[names[0]]) for names in groups]
+    if all(map(_is_small, found)):
+        return found
+    return components(variables, constraints, together, may_split=may_split)
+
+
+def _is_small(part: Component) -> bool:
+    """Return whether solvers can compute with the codes of `part`, if it has formulas."""
+    return all(is_small(formula, len(part.values)) for formula in part.network.formulas)
 
 
 def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
@@ -262,15 +291,22 @@ class _Rows:
     rows: tuple[tuple[int, ...], ...]
 
 
-def _component(names: Sequence[str], domains: Mapping[str, list[int]], held: Iterable[_Rows]) -> Component:
-    values = sorted({value for name in names for value in domains[name]})
-    code = {value: number for number, value in enumerate(values)}
-    place = {name: index for index, name in enumerate(names)}
+def _component(
+    names: Sequence[str], domains: Mapping[str, list[int]], held: Iterable[_Rows], formulas: Sequence[Formula]
+) -> Component:
+    occurring = {value for name in names for value in domains[name]}
+    values: Sequence[int] = tuple(sorted(occurring))
+    if formulas and values:
+        values = range(values[0], values[-1] + 1)
+    code = {value: value - values[0] for value in occurring} if formulas else dict(zip(values, itertools.count()))
+    place: dict[str, int] = {name: index for index, name in enumerate(names)}
     coded = tuple(tuple([code[value] for value in domains[name]]) for name in names)
     coder = _Coder(place, code)
     tables = {coder.table(rows) for rows in held}
     ordered = sorted(tables, key=lambda table: (table.scope, table.allowed, table.rows))
-    return Component(tuple(names), tuple(values), Network(coded, tuple(ordered)))
+    at: dict[Operand, Operand] = dict(place.items())
+    over_codes = tuple([renamed(formula, at, {}, shift=values[0] if values else 0) for formula in formulas])
+    return Component(tuple(names), values, Network(coded, tuple(ordered), formulas=over_codes))
 
 
 class _Coder:
@@ -289,6 +325,15 @@ class _Coder:
             code = self._code
             self._rows[alike] = tuple(sorted(tuple([code[row[index]] for index in order]) for row in held.rows))
         return Table(tuple(sorted(scope)), held.allowed, self._rows[alike])
+
+
+def _formulas(constraints: Iterable[Constraint], domains: Mapping[str, list[int]]) -> Iterator[tuple[int, Formula]]:
+    """Yield the numbers of those `constraints` that are too wide for a table and compare sums, as formulas."""
+    for number, constraint in enumerate(constraints):
+        if math.prod(len(domains[name]) for name in constraint.variables) > MAX_ALLOWED_ROWS:
+            formula = linear(constraint, domains)
+            if formula is not None:
+                yield number, formula
 
 
 def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *, may_split: bool) -> list[_Rows]:

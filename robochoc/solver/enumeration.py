@@ -94,6 +94,8 @@ class _Search:
 
     def __init__(self, network: Network, budget: Budget) -> None:
         self._budget = budget
+        if network.formulas:
+            budget.spend(budget.steps + 1)
         budget.spend(sum(len(domain) * (1 + len(domain) // ROWS_A_STEP) for domain in network.domains))
         self._code = [{1 << index: code for index, code in enumerate(domain)} for domain in network.domains]
         self._bit = [{code: 1 << index for index, code in enumerate(domain)} for domain in network.domains]

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, Network, Table
+from robochoc.solver.linear import FALSE, Formula, Operand, conjuncts, holds, operands, renamed
 
 LARGEST_PERMUTATION = 5
 """The largest allDifferent over as many values that becomes a table (120 rows). ACE does so up to 4 variables."""
@@ -35,10 +36,28 @@ def propagate(network: Network) -> Network:
     scopes = [scope for scope in chosen if len(scope) > 1]
     spelt_out = [_spelt_out(scope, domains) for scope in scopes if is_small_permutation(scope, domains)]
     kept = tuple(scope for scope in scopes if not is_small_permutation(scope, domains))
-    result = Network(domains, (*tables, *spelt_out), kept)
+    formulas, unary = _simplified(network.formulas, domains)
+    if FALSE in formulas:
+        return Network(tuple(() for _ in domains))
+    result = Network(domains, (*tables, *spelt_out, *unary), kept, formulas)
     # A table that was made of something else may have more to say.
     forbidding = sum(not table.allowed for table in filtered.tables)
-    return propagate(result) if spelt_out or forbidding > sum(not table.allowed for table in tables) else result
+    fewer = forbidding > sum(not table.allowed for table in tables)
+    return propagate(result) if spelt_out or unary or fewer else result
+
+
+def _simplified(formulas: Sequence[Formula], domains: Sequence[Codes]) -> tuple[tuple[Formula, ...], list[Table]]:
+    """Return `formulas` without variables that have one value, those on one variable as tables."""
+    fixed: dict[Operand, int] = {place: domain[0] for place, domain in enumerate(domains) if len(domain) == 1}
+    parts = [part for formula in formulas for part in conjuncts(renamed(formula, {}, fixed))]
+    wider = tuple([part for part in parts if len(operands(part)) != 1])
+    tables = []
+    for part in parts:
+        if len(operands(part)) == 1:
+            (place,) = map(int, operands(part))
+            rows = tuple([(code,) for code in domains[place] if holds(part, {place: code})])
+            tables.append(Table((place,), allowed=True, rows=rows))
+    return wider, tables
 
 
 class _Filter:

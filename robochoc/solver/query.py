@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Self
 
 from robochoc.solver.encoding import Codes, Costs, Network
+from robochoc.solver.linear import Operand, renamed
 
 
 class SolvedBy(StrEnum):
@@ -54,14 +55,15 @@ class Query:
     @classmethod
     def of(cls, network: Network, limit: int | None, *, count_only: bool, costs: Costs) -> Self:
         """Return what has to be asked of `network`, which is propagated."""
-        bound = {place for table in network.tables for place in table.scope}
-        bound.update(place for scope in network.different for place in scope)
+        bound = network.constrained
         places = tuple(sorted(bound))
         at = {place: index for index, place in enumerate(places)}
+        operands_at: dict[Operand, Operand] = dict(at.items())
         asked = Network(
             tuple(network.domains[place] for place in places),
             tuple(replace(table, scope=tuple([at[place] for place in table.scope])) for table in network.tables),
             tuple(tuple([at[place] for place in scope]) for scope in network.different),
+            tuple([renamed(formula, operands_at, {}) for formula in network.formulas]),
         )
         free = {place: domain for place, domain in enumerate(network.domains) if place not in bound}
         paid = tuple([(at[place], unit) for place, unit in costs if place in at])

@@ -86,7 +86,7 @@ class Split:
     def _compare(self, operator: str, left: Expression, right: Expression) -> None:
         """Add tables that say that a comparison is true: of a sum of terms with zero."""
         terms: dict[Expression, int] = {}
-        target = -_collect(left, 1, terms) - _collect(right, -1, terms) + _STRICT.get(operator, 0)
+        target = -collect_terms(left, 1, terms) - collect_terms(right, -1, terms) + _STRICT.get(operator, 0)
         kept = [(term, factor) for term, factor in terms.items() if factor or _may_be_undefined(term)]
         reduced = [_times(self._reduced(term), factor) for term, factor in kept]
         window = _Window(_COMPARISONS[operator], target)
@@ -242,8 +242,8 @@ def split(
     if any(not values for values in given.values()):
         return None
     try:
-        body = _with(definition.body, actual)
-        if _largest(body, {name: Interval(values[0], values[-1]) for name, values in given.items()}) > LARGEST:
+        body = with_arguments(definition.body, actual)
+        if largest_value(body, {name: Interval(values[0], values[-1]) for name, values in given.items()}) > LARGEST:
             return None
         result.require(body)
     except NotSplitError:
@@ -277,19 +277,19 @@ class _Window:
                 return value if least <= self.target <= most else self.target - low + 1
 
 
-def _collect(expression: Expression, factor: int, terms: dict[Expression, int]) -> int:
+def collect_terms(expression: Expression, factor: int, terms: dict[Expression, int]) -> int:
     """Add the terms of `factor` times `expression` to `terms`; return what is constant in it."""
     match expression:
         case Constant(value):
             return factor * value
         case Apply("add" | "sub" | "neg" as operator, arguments):
             signs = {"add": [1] * len(arguments), "sub": [1, -1], "neg": [-1]}[operator]
-            return sum(_collect(part, sign * factor, terms) for part, sign in zip(arguments, signs, strict=True))
+            return sum(collect_terms(part, sign * factor, terms) for part, sign in zip(arguments, signs, strict=True))
         case Apply("mul", arguments):
             fixed = math.prod(one.value for one in arguments if isinstance(one, Constant))
             others = [one for one in arguments if not isinstance(one, Constant)]
             if len(others) <= 1:
-                return _collect(others[0] if others else Constant(1), factor * fixed, terms)
+                return collect_terms(others[0] if others else Constant(1), factor * fixed, terms)
         case _:
             pass
     terms[expression] = terms.get(expression, 0) + factor
@@ -304,13 +304,13 @@ def _times(term: Expression, factor: int) -> Expression:
     return term if factor == 1 else Apply("mul", (Constant(factor), term))
 
 
-def _with(expression: Expression, actual: Mapping[str, Expression]) -> Expression:
+def with_arguments(expression: Expression, actual: Mapping[str, Expression]) -> Expression:
     """Return `expression` with what its names stand for."""
     match expression:
         case Name(name):
             return actual[name]
         case Apply(operator, arguments):
-            return Apply(operator, tuple(_with(argument, actual) for argument in arguments))
+            return Apply(operator, tuple(with_arguments(argument, actual) for argument in arguments))
         case Constant():
             return expression
 
@@ -321,11 +321,11 @@ def _may_be_undefined(expression: Expression) -> bool:
     )
 
 
-def _largest(expression: Expression, limits: Mapping[str, Interval]) -> float:
+def largest_value(expression: Expression, limits: Mapping[str, Interval]) -> float:
     """Return a bound on all that is computed on the way: how far it can be from zero."""
     if not isinstance(expression, Apply):
         return 0
-    parts = [_largest(part, limits) for part in expression.arguments]
+    parts = [largest_value(part, limits) for part in expression.arguments]
     ends = [bounds(part, limits) for part in expression.arguments]
     sizes = [max(abs(end.low), abs(end.high)) for end in ends]
     own = bounds(expression, limits)

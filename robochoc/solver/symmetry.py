@@ -41,6 +41,8 @@ class Symmetry(NamedTuple):
 def symmetries(part: Component) -> tuple[Symmetry, ...]:
     """Return a group of symmetries of the network of `part`, without the identity; empty when none was found."""
     network = part.network
+    if network.formulas:
+        return ()
     identity = Symmetry(tuple(range(len(part.names))), reflects=False)
     is_symmetry = _verifier(network)
     generators = [guess for guess in _guesses(part.names) if guess != identity and is_symmetry(guess)]

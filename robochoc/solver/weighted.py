@@ -107,7 +107,8 @@ def weighted_components(variables: Iterable[Variable], constraints: Sequence[Con
         UnsupportedError: when a constraint has too many tuples, or charges are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
-    parts = components(variables, constraints, [constraint.variables for constraint in soft], may_split=True)
+    scopes = [constraint.variables for constraint in soft]
+    parts = components(variables, constraints, scopes, may_split=True, may_add=True)
     of: dict[str, list[Constraint]] = {part.names[0]: [] for part in parts}
     first = {name: part.names[0] for part in parts for name in part.names}
     for constraint in soft:
@@ -166,7 +167,9 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
         costs += zip(places, units, strict=True)
         tables.append(Table((*scope, *places), allowed=True, rows=rows))
         domains += [tuple(sorted(set(column))) for column in [*zip(*rows, strict=True)][len(scope) :]]
-    return WeightedComponent(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
+    return WeightedComponent(
+        part, replace(network, domains=tuple(domains), tables=tuple(tables)), tuple(costs), sum(least.values()), unit
+    )
 
 
 def _cost_rows(prices: Mapping[Codes, int]) -> tuple[tuple[Codes, ...], Codes]:
