@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.orders import Order
-from robochoc.model.problem import Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.wording import counted
 from robochoc.run.alternatives import refuse_team
 from robochoc.run.choice_rules import FEW_LOSSES, LOSSY, RULES
@@ -73,6 +73,16 @@ def decided(team: Team, options: Options, *, environment: bool = False, ordered:
     if choice.options.order == Order.GIVEN:
         choice = replace(choice, options=replace(choice.options, order=None))
     return choice
+
+
+def decided_at_once(team: Team, options: Options) -> Choice:
+    """Return how to run a team when there is no time to look at it: with the usual protocol, in the given order."""
+    order = None if options.order == Order.GIVEN else options.order
+    if options.protocol != AUTO:
+        return Choice(replace(options, order=order))
+    usual = DEFAULT_COST_PROTOCOL if team.kind == ProblemKind.DISWCSP else DEFAULT_PROTOCOL
+    chosen = {"protocol": "there was no time to look at the team"}
+    return Choice(replace(options, protocol=usual, order=order, chosen=chosen))
 
 
 def _decided(team: Team, options: Options, *, environment: bool) -> Choice:

@@ -14,7 +14,7 @@ from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
-from robochoc.run.choice import decided
+from robochoc.run.choice import decided, decided_at_once
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, UnfitProtocolError, refuse_unfit
 from robochoc.run.context import RunContext
@@ -29,6 +29,7 @@ from robochoc.solver.compile import CompileTimeoutError
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.time_limit import TimeLimitError, computed_by
 from robochoc.verification.checker import check_told_cost
 
 if TYPE_CHECKING:
@@ -74,9 +75,14 @@ def solve(
     check_team(team)
     environment = environment and with_checked_events(environment)
     refuse_options(options, environment=environment is not None)
-    options = decided(team, options, environment=environment is not None, ordered=ordered).options
+    context = RunContext(options, observer, progress, solver)
     try:
-        context = RunContext(options, observer, progress, solver)
+        changing = environment is not None
+        choice = computed_by(context.deadline, decided, team, options, environment=changing, ordered=ordered)
+    except TimeLimitError:
+        choice = decided_at_once(team, options)
+    context.options = options = choice.options
+    try:
         counted = normalized(team)
         if options.protocol == CENTRAL:
             outcome = _solve_centrally(counted, context)

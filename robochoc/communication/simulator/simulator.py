@@ -7,7 +7,8 @@ and no robot has anything to say.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
@@ -29,11 +30,14 @@ from robochoc.solver.team_compiler import OutOfTimeError
 from robochoc.system.compiling import answer_signals, mypyc_attr
 from robochoc.system.garbage import collection_paused, collection_seldom
 from robochoc.system.stopping import stop_requested
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
 PROGRESS_S = 0.25
 """Seconds after which there is one in any case: some packets are much work."""
+LONGEST_STEP_S = 0.3
+"""A step that goes on for so many seconds after the time is over is broken off."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,10 @@ class Simulation(Session):
         self._under_way = UnderWay() if may_be_shared(protocol.messages) else None
         with collection_paused():
             parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
-            self._hosts = {name: self._host(part) for name, part in parts.items()}
+            try:
+                self._hosts = computed_by(deadline, self._set_up, parts)
+            except TimeLimitError:
+                raise OutOfTimeError("the time was over before all robots knew their problems") from None
         if losses is not None:
             losses.follow(self.compiled.team, self._values_of)
 
@@ -116,8 +123,10 @@ class Simulation(Session):
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
         if self._verdict is None:
-            with garbage_frozen(), collection_seldom():  # robots' problems are none, and they are most of what there is
-                self._play(began, timeout, messages)
+            end = None if timeout is None else began + timeout + LONGEST_STEP_S
+            # Robots' problems are no garbage, and they are most of what there is.
+            with garbage_frozen(), collection_seldom(), suppress(TimeLimitError):
+                computed_by(end, self._play, began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
         result = RunResult.of(
@@ -158,6 +167,10 @@ class Simulation(Session):
         """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
         if over(self._deadline):
             raise OutOfTimeError(f"the time was over before {name} knew its problem")
+
+    def _set_up(self, parts: Mapping[str, AgentProblem]) -> dict[str, Host]:
+        """Return the host of each robot."""
+        return {name: self._host(part) for name, part in parts.items()}
 
     def _host(self, part: AgentProblem) -> Host:
         self._check_time(part.robot.name)

@@ -16,7 +16,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
-from robochoc.run import Options, solve
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver import central
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import BEST
@@ -111,6 +112,20 @@ def test_compilation_without_an_end_ends_with_the_time(monkeypatch: pytest.Monke
     outcome = solve(SMALL, Options(protocol="dpop", timeout=SOON_S))
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.reason == "the time was over while Robot1 was compiled"
+
+
+@pytest.mark.parametrize("step", ["start", "receive", "__init__"])
+def test_a_step_of_a_robot_without_an_end_ends_with_the_time(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ABT, step, endless)
+    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, timeout=SOON_S)
+    assert solve(queens3d(3), options).verdict is Verdict.UNKNOWN
+
+
+def test_the_choice_of_a_protocol_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.run.orchestrator.decided", endless)
+    outcome = solve(SMALL, Options(protocol="auto", runtime=Runtime.SIMULATOR, timeout=SOON_S))
+    assert (outcome.verdict, outcome.protocol) == (Verdict.UNKNOWN, "sfb")
+    assert outcome.chosen == {"protocol": "there was no time to look at the team"}
 
 
 def test_a_process_that_does_not_read_its_task_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
