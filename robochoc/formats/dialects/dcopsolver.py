@@ -44,7 +44,7 @@ def _write(team: Team, options: ExportOptions) -> Written:
     _check(team)
     tables, constant = exported(team)
     if any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in {constant, *amounts(tables)}):
-        raise UnsupportedError(f"{TITLE} has integer costs of 0 or more: an XCSP3 file or FRODO's may have others")
+        raise UnsupportedError(f"{TITLE} has integer costs of 0 or more; --format frodo and pydcop have others")
     bound = magnitude(tables, constant)
     by_pair = _by_pair(team, tables)
     if bound * len(by_pair) >= LIMIT:

@@ -61,7 +61,7 @@ class _Writer:
                 element = etree.SubElement(document.variables, "variable", agent=robot.name, name=variable.name)
                 element.attrib.update({"id": str(place), "domain": domain, "description": variable.name})
         for one in flat.held:
-            if not (one.private_part and self._asymmetric):
+            if not self._is_side(one):
                 self._add(one)
         if self._asymmetric:
             self._add_sides()
@@ -95,11 +95,21 @@ class _Writer:
         tuples = "|".join(f"{self._cost(cost, name)}:{values}" for values, cost in listed.items())
         return self._document.relation(exported, attributes, tuples)
 
+    def _is_side(self, one: Held) -> bool:
+        """Return whether a constraint becomes one side of an asymmetric one. Raises `UnsupportedError`."""
+        scope = one.constraint.variables
+        if not self._asymmetric or not one.private_part or len({self._flat.team.owner[name] for name in scope}) == 1:
+            return False
+        if len(scope) != 2:  # noqa: PLR2004 - a cost for each of two variables
+            what = f"the partially known constraint {one.constraint.name} has {len(scope)} variables"
+            raise UnsupportedError(f"{FORMAT} has asymmetric costs of two variables, and {what}")
+        return True
+
     def _add_sides(self) -> None:
         """Write both sides of each pair of variables as one relation with two costs a tuple."""
         sides: dict[tuple[str, ...], dict[str, list[Exported]]] = defaultdict(lambda: defaultdict(list))
         for one in self._flat.held:
-            if one.private_part:
+            if self._is_side(one):
                 table = self._flat.table(one)
                 sides[tuple(sorted(table.scope))][one.robot.name].append(table)
         for pair, by_robot in sides.items():

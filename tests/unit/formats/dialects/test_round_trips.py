@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import math
 import re
+from collections import Counter
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -16,11 +19,12 @@ from lxml import etree
 from robochoc.formats import check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
-from robochoc.model.assembly import assemble
-from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
+from robochoc.model.assembly import Extras, assemble
+from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.examples import count
 from tests.support.foreign_problems import optimum, random_problem, written
 
@@ -47,6 +51,32 @@ def test_dcopsolver_there_and_back(rounds: int, tmp_path: Path) -> None:
     for _ in range(rounds):
         problem, team = random_problem(chance, plain=True, simple=True)
         assert _there_and_back("dcopsolver", team, tmp_path) == problem.optimum()
+
+
+@count("rounds", 12, 200)
+def test_asymmetric_teams_there_and_back(rounds: int, tmp_path: Path) -> None:
+    chance = Random("asymmetric")
+    exported: Counter[str] = Counter()
+    while exported["frodo"] < rounds:
+        team = random_asymmetric_team(chance)
+        if math.prod(len(variable.domain) for variable in team.variables.values()) > 500:
+            continue
+        best = optimum(team)
+        for name in ("frodo", "xdiscsp", "dcopsolver"):
+            with contextlib.suppress(UnsupportedError):
+                assert _there_and_back(name, team, tmp_path) == best
+                exported[name] += 1
+    assert min(exported.values()) > rounds / 4
+
+
+def test_asymmetric_costs_of_three_variables_are_refused_in_xdiscsp() -> None:
+    bit, scope = Domain("bit", (range(2),)), ("x", "y", "z")
+    variables = {"a": [Variable("x", bit), Variable("y", bit)], "b": [Variable("z", bit)]}
+    relation = Relation("r", 3, Semantics.SOFT, ((0, 0, 0),), (1,), 3)
+    parts = {"a": [Constraint("c", relation, scope, scope, ConstraintModel.PKC)]}
+    team = assemble("t", variables, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
+    with pytest.raises(UnsupportedError, match="the partially known constraint c has 3 variables"):
+        written("xdiscsp", team)
 
 
 def test_dcopsolver_has_what_its_parser_requires() -> None:
