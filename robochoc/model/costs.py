@@ -14,7 +14,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
-from robochoc.model.absence import can_be_restated
+from robochoc.model.absence import can_be_restated, restated
 from robochoc.model.constraint import (
     INFINITE,
     Constraint,
@@ -109,7 +109,7 @@ def told_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
     Args:
         team: A normalised team.
         total: A sum of normalised costs of the constraints of `team`.
-        without: Robots whose constraints are not in it: they have withdrawn.
+        without: Robots that have withdrawn: their constraints were restated or dropped.
     """
     sign = -1 if team.told_in.maximize else 1
     return team.told_in.told(sign * (int(total) + _taken_out(team, without)))
@@ -122,11 +122,9 @@ def flat_units(team: Team) -> CostUnits:
 
 
 def _taken_out(team: Team, without: Collection[str] = ()) -> int:
-    return sum(
-        constraint.offset
-        for constraint in team.constraints()
-        if not (without and any(team.owner[name] in without for name in constraint.variables))
-    )
+    absent = {name for name in team.variables if team.owner[name] in without}
+    in_force = (restated(constraint, absent) if absent else constraint for constraint in team.constraints())
+    return sum(constraint.offset for constraint in in_force if constraint is not None)
 
 
 def normalized_joining(team: Team, robot: Robot) -> Robot:

@@ -12,9 +12,11 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.absence import is_absence_proof
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
+from robochoc.model.team_edits import constraints_in_force
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver import local_constraints
@@ -22,7 +24,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
 from robochoc.solver.domain import CompiledDomain, compile_domain
-from robochoc.verification.checker import violations
+from robochoc.verification.checker import robots_without_values, violations
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
 from tests.support.limits import HANG_S
@@ -117,7 +119,7 @@ def test_withdrawing_leaves_a_placement_that_no_robot_could_join() -> None:
     with AceProcess() as solver:
         while wanted:
             team = random_complex_team(chance)
-            if any(solutions(team)):
+            if any(solutions(team)) or breaks_by_absence(team):
                 continue
             wanted -= 1
             options = Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL, cache=False)
@@ -128,8 +130,13 @@ def test_withdrawing_leaves_a_placement_that_no_robot_could_join() -> None:
 
 
 def fits(team: Team, assignment: dict[str, int]) -> bool:
-    met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
-    return all(constraint.allows(assignment) for constraint in met)
+    absent = robots_without_values(team, assignment)
+    return all(constraint.allows(assignment) for constraint in constraints_in_force(team, absent))
+
+
+def breaks_by_absence(team: Team) -> bool:
+    domains = {name: variable.domain for name, variable in team.variables.items()}
+    return not all(is_absence_proof(constraint, domains) for constraint in team.constraints())
 
 
 @pytest.mark.parametrize("teams", [60, pytest.param(300, marks=pytest.mark.slow)])

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
+from robochoc.model.team_edits import constraints_in_force
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.verification.checker import violations
@@ -121,8 +122,8 @@ def joinable(team: Team, outcome: Outcome) -> list[str]:
         (variable,) = team[name].variables
         for value in variable.domain:
             larger = {**outcome.assignment, variable.name: value}
-            met = (c for c in team.constraints() if all(seen in larger for seen in c.variables))
-            if all(constraint.allows(larger) for constraint in met):
+            in_force = constraints_in_force(team, [other for other in outcome.withdrawn if other != name])
+            if all(constraint.allows(larger) for constraint in in_force):
                 fitting.append(name)
     return fitting
 

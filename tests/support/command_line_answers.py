@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from robochoc.model.absence import restated
 from robochoc.model.cost_units import common_units
 from robochoc.model.costs import normalized, told_cost
 from robochoc.model.problem import INFINITE, Function, ProblemKind, Team
@@ -60,9 +61,11 @@ class Truth:
         for robot in self.team.robots:
             parts = [one for child in robot.children for one in child.constraints]
             for constraint in (*robot.private, *robot.shared, *parts):
-                if any(self.team.owner[name] in without for name in constraint.variables):
+                gone = {name for name in constraint.variables if self.team.owner[name] in without}
+                in_force = restated(constraint, gone)
+                if in_force is None:
                     continue
-                price = constraint.price(assignment)
+                price = in_force.price(assignment)
                 if price == INFINITE:
                     return None
                 whole = isinstance(constraint.definition, Function)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
+from robochoc.model.absence import bears_absence, restated
 from robochoc.model.problem import (
     INFINITE,
     Assignment,
@@ -93,20 +94,22 @@ def cost_of(assignment: Assignment, constraints: Sequence[Constraint]) -> float:
 
 def minimum_withdrawal(team: Team) -> int:
     """The least weight of robots that have to withdraw so that the others have a solution, by brute force."""
-    constraints = list(team.constraints())
     own = {robot.name: {variable.name for variable in robot.variables} for robot in team.robots}
+    dropped = [c for c in team.constraints() if not bears_absence(c)]
+    counted = [c for c in team.constraints() if bears_absence(c)]
 
     def place(left: Sequence[Robot], assignment: Assignment, aside: int, best: int) -> int:
         if aside >= best:
             return best
         if not left:
-            return aside
+            known = (restated(c, {name for name in c.variables if name not in assignment}) for c in counted)
+            return aside if all(one is None or one.allows(assignment) for one in known) else best
         robot, *others = left
         columns = [variable.domain for variable in robot.variables]
         for values in itertools.product(*columns):
             names = [variable.name for variable in robot.variables]
             wider = {**assignment, **dict(zip(names, values, strict=True))}
-            met = (c for c in constraints if own[robot.name] & {*c.variables} and wider.keys() >= {*c.variables})
+            met = (c for c in dropped if own[robot.name] & {*c.variables} and wider.keys() >= {*c.variables})
             if all(constraint.allows(wider) for constraint in met):
                 best = place(others, wider, aside, best)
         return place(others, assignment, aside + robot.weight, best)

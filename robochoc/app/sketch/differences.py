@@ -16,7 +16,7 @@ from typing import cast
 import msgspec
 
 from robochoc.app.sketch.building import applied, state, tell_where, term_of
-from robochoc.app.sketch.palette import Applied
+from robochoc.app.sketch.palette import Applied, Links
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch, SketchRule, Value
 from robochoc.formats import InvalidInputError
@@ -91,9 +91,24 @@ class _Difference:
         self._come = [robot for robot in after.robots if robot.name not in there]
         self._links = [*_with_names(links_of(before), set())]
         then_links = [*links_of(after)]
-        self._dropped = [*_beyond(self._links, then_links)]
+        remaining = [(link, left) for link in self._links if (left := self._remaining(link)) is not None]
+        still = Counter(link.meaning for link in then_links)
+        self._dropped: list[Link] = []
+        for link, left in remaining:
+            if still[left.meaning]:
+                still[left.meaning] -= 1
+            else:
+                self._dropped.append(link)
         taken = {link.name for link in self._links}
-        self._added = [*_with_names(_beyond(then_links, self._links), taken)]
+        self._added = [*_with_names(_beyond(then_links, [left for _, left in remaining]), taken)]
+
+    def _remaining(self, link: Link) -> Link | None:
+        """Return what is left of a link when robots have left: a count is restated, all else is dropped."""
+        if self._stay.issuperset(link.robots):
+            return link
+        rest = tuple(name for name in link.robots if name in self._stay)
+        is_count = PALETTE[link.rule.kind].links == Links.GROUP and not link.rule.private
+        return replace(link, robots=rest) if rest and is_count else None
 
     def check(self) -> None:
         """Raise `AnewError` if events cannot say the difference."""
@@ -167,6 +182,9 @@ class _Difference:
 
     def _say(self, model: Model, event: Event) -> None:
         """Say which robots and constraints go and come."""
+        for link in self._dropped:
+            if not self._stay.issuperset(link.robots):  # before it is restated for the robots that stay
+                event.remove_constraint(link.name)
         for name in self._leave:
             event.remove_robot(name)
         for link in self._dropped:
