@@ -1,0 +1,123 @@
+"""What constraints mean when robots are absent, in whole runs, held against brute force over the definition."""
+
+from __future__ import annotations
+
+import math
+from random import Random
+
+import pytest
+
+import robochoc
+from robochoc.communication.kill_schedule import Kill
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.absence_models import AbsenceModel
+
+MINIMIZING = ("sfb", "dpop", "afb", "adopt", "bnb-adopt", "syncbb", "ncbb", "pt-fb", "hs-cai", "o-dpop", "mb-dpop")
+SATISFYING = ("abt", "afc", "awc", "sfb", "dynabt")
+
+
+@pytest.mark.parametrize("models", [16, pytest.param(1000, marks=pytest.mark.slow)])
+def test_as_few_as_possible_withdraw(models: int) -> None:
+    aside = impossible = 0
+    for seed in range(models):
+        chance = Random(seed)
+        case = AbsenceModel(chance)
+        weight, cost = case.minimum()
+        protocol = chance.choice(MINIMIZING if case.has_costs else (*MINIMIZING, "abt", "afc", "central"))
+        outcome = case.model.solve(protocol, runtime="simulator", withdraw="minimum", verify=protocol == "sfb")
+        if weight == math.inf:
+            impossible += 1
+            assert outcome.verdict == "no-solution", seed
+            assert "must not withdraw" in (outcome.reason or ""), seed
+            continue
+        aside += bool(outcome.withdrawn)
+        assert outcome.verdict in {"optimal", "solution"}, seed
+        assert sum(case.weights[name] for name in outcome.withdrawn) == weight, seed
+        assert case.price(case.told(outcome.values)) == cost, seed
+        assert not case.has_costs or outcome.cost == cost, seed
+        assert not outcome.dropped_constraints or outcome.withdrawn, seed
+    assert aside > models // 8
+    assert impossible
+
+
+@pytest.mark.parametrize("models", [15, pytest.param(700, marks=pytest.mark.slow)])
+def test_robots_withdraw_one_after_the_other_where_no_absence_breaks_a_constraint(models: int) -> None:
+    ran, refused = 0, list[str]()
+    for seed in range(models * 3):
+        case = AbsenceModel(Random(seed))
+        if case.has_costs:
+            continue
+        try:
+            outcome = case.model.solve("abt", runtime="simulator", withdraw="maximal")
+        except UnsupportedError as why:
+            refused.append(str(why))
+            continue
+        ran += 1
+        present = tuple(name for name in case.names if name not in outcome.withdrawn)
+        values = case.told(outcome.values)
+        assert case.price(values) == 0, seed
+        for name in outcome.withdrawn:
+            assert min(case.price({**values, name: value}) for value in case.domains[name]) == math.inf, seed
+        assert {*present} == {*values}, seed
+    assert ran
+    assert refused
+    assert all("the absence of robots can break" in why for why in refused)
+
+
+@pytest.mark.parametrize("models", [20, pytest.param(800, marks=pytest.mark.slow)])
+def test_robots_leave_by_events(models: int) -> None:
+    unsolved = 0
+    for seed in range(models):
+        chance = Random(seed)
+        case = AbsenceModel(chance)
+        gone = chance.sample(case.names, chance.randint(1, 2))
+        protocol = chance.choice(("sfb", "dpop", "afb") if case.has_costs else SATISFYING)
+        check(case, case.without(gone).solve(protocol, runtime="simulator"), gone, seed)
+        unsolved += case.best([name for name in case.names if name not in gone]) == math.inf
+    assert 0 < unsolved < models
+
+
+@pytest.mark.parametrize("models", [3, pytest.param(300, marks=pytest.mark.slow)])
+def test_robots_are_lost(models: int) -> None:
+    for seed in range(models):
+        chance = Random(seed)
+        case = AbsenceModel(chance)
+        lost = chance.choice(case.names)
+        protocol = chance.choice(("sfb", "dpop") if case.has_costs else SATISFYING)
+        outcome = case.model.solve(protocol, runtime="processes", kill=[Kill(lost, 0)], on_loss="withdraw")
+        check(case, outcome, outcome.lost, seed)
+
+
+@pytest.mark.slow
+def test_robots_come_back_under_their_constraints(tmp_path_factory: pytest.TempPathFactory) -> None:
+    for seed in range(100):
+        chance = Random(seed)
+        case = AbsenceModel(chance)
+        folder = tmp_path_factory.mktemp("team") / "absence"
+        case.model.save(folder)
+        lost = chance.choice(case.names)
+        protocol = "sfb" if case.has_costs else chance.choice(SATISFYING)
+        outcome = robochoc.load(folder).solve(protocol, runtime="processes", kill=[Kill(lost, 0)], spares=1)
+        check(case, outcome, (), seed)
+
+
+@pytest.mark.slow
+def test_as_few_as_possible_withdraw_on_other_runtimes() -> None:
+    for seed in range(150):
+        case = AbsenceModel(Random(seed))
+        weight, cost = case.minimum()
+        for runtime in ("processes", "network") if seed < 30 else ("processes",):
+            outcome = case.model.solve("sfb", runtime=runtime, withdraw="minimum")
+            assert (outcome.verdict == "no-solution") is (weight == math.inf), (seed, runtime)
+            if weight < math.inf:
+                assert sum(case.weights[name] for name in outcome.withdrawn) == weight, (seed, runtime)
+                assert case.price(case.told(outcome.values)) == cost, (seed, runtime)
+
+
+def check(case: AbsenceModel, outcome: robochoc.Solution, gone: tuple[str, ...] | list[str], seed: int) -> None:
+    """Check an outcome without the robots `gone` against brute force."""
+    best = case.best([name for name in case.names if name not in gone])
+    assert (outcome.verdict == "no-solution") is (best == math.inf), seed
+    if best < math.inf:
+        assert outcome.verdict in {"optimal", "solution"}, seed
+        assert case.price(case.told(outcome.values)) == best, seed
