@@ -170,6 +170,8 @@ def read_ground_map(content: bytes) -> GroundMap:
         raise ValueError(f"it has more than {MAX_BYTES:,} bytes")
     try:
         found = msgspec.json.decode(content, type=GroundMap)
+    except UnicodeDecodeError:
+        raise ValueError("it is not UTF-8") from None
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     except msgspec.DecodeError as error:

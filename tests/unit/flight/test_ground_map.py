@@ -127,12 +127,13 @@ def test_a_map_is_read_and_a_wrong_one_told() -> None:
         ({"blocked": [{"x": 1, "y": 1}] * 10_001}, "length"),
         ({"starts": {"A": [1]}}, "length"),
         ({"height": 3}, "height"),
+        ({"colums": 3}, "there is no field 'colums'; did you mean 'columns'"),
         ({"first": [1]}, "length"),
         ({"first": [1, 10**7]}, "first"),
         ({"scale": 0}, "scale"),
     ):
         with pytest.raises(ValueError, match=why):
             read_ground_map(json.dumps({**whole, **wrong}).encode())
-    for broken in (b" " * (MAX_BYTES + 1), b"", b"[" * 100_000, b"{}", b"\xff"):
+    for broken in (b" " * (MAX_BYTES + 1), b"", b"[" * 100_000, b"{}", b"\xff", b'{"\xff": 1}'):
         with pytest.raises(ValueError):  # noqa: PT011 - the JSON reader's words
             read_ground_map(broken)
