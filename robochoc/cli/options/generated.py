@@ -12,6 +12,7 @@ import click
 from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import invalid_input_fails
+from robochoc.cli.reports.progress import elapsed_time
 
 if TYPE_CHECKING:
     from robochoc.formats.ground_map import GroundMap
@@ -83,7 +84,8 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     from robochoc.formats.folder import GROUND_FILE
 
     try:
-        made = make()
+        with elapsed_time("generate", "drawing the problem"):
+            made = make()
     except InvalidInputError:
         raise
     except ValueError as error:
@@ -95,7 +97,8 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
         from robochoc.formats.ground_map import ground_map_json
 
         beside[GROUND_FILE] = ground_map_json(ground)
-    write_team(team, folder, replace=replace, beside=beside)
+    with elapsed_time("generate", f"writing {len(team.robots):,} robots"):
+        write_team(team, folder, replace=replace, beside=beside)
     constraints = sum(len(robot.shared) for robot in team.robots)
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")

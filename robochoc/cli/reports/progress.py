@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress
 
 REFRESH_S = 0.1
+TICK_S = 0.5
 _ERASE = "\r\x1b[K"
 """Go to the beginning of the line, and erase it (ECMA-48)."""
 
@@ -54,6 +56,30 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
         yield show
     finally:
         click.echo(_ERASE, nl=False, err=True)
+
+
+@contextmanager
+def elapsed_time(what: str, stage: str) -> Iterator[None]:
+    """Show, on a terminal, how long the work within has taken. For work that reports nothing, and forks nothing."""
+    from robochoc.communication.run_result import Progress
+
+    with progress_line(what) as show:
+        if show is None:
+            yield
+            return
+        began, is_over = time.monotonic(), threading.Event()
+
+        def tick() -> None:
+            while not is_over.wait(TICK_S):
+                show(Progress(0, time.monotonic() - began, stage))
+
+        ticking = threading.Thread(target=tick, daemon=True)
+        ticking.start()
+        try:
+            yield
+        finally:
+            is_over.set()
+            ticking.join()
 
 
 def print_above(line: str) -> None:

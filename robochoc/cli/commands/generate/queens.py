@@ -10,6 +10,7 @@ from robochoc.cli.options.generated import next_step
 from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import invalid_input_fails
+from robochoc.cli.reports.progress import elapsed_time
 
 MAX_N = 49
 """As `generators/queens3d.py` has it, which is not imported at the start."""
@@ -47,8 +48,9 @@ def queens3d(n: int, model: str, robots: str, output: Path | None, *, force: boo
     from robochoc.formats import write_team
     from robochoc.generators.queens3d import queens3d as team_of_queens
 
-    team = team_of_queens(n, model, robots)
-    folder = output or Path("instances") / team.name
-    write_team(team, folder, replace=force)
+    with elapsed_time("generate", f"writing the robots of {n:,} x {n:,} cells"):
+        team = team_of_queens(n, model, robots)
+        folder = output or Path("instances") / team.name
+        write_team(team, folder, replace=force)
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots; {next_step(folder, count)}")
