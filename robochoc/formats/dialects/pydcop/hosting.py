@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from heapq import heapify, heapreplace
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Note
@@ -39,12 +40,13 @@ class Hosting:
         if not node.is_mapping:
             raise MistakeError(f"the {what} is no mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
         found: dict[str, str] = {}
+        variables, agents = set(self.variables), set(self.agents)
         for agent, hosted in _named(node):
-            if agent not in self.agents:
+            if agent not in agents:
                 message = f"the {what} names the agent '{shortened(agent)}', which the problem has not"
                 raise MistakeError(message, suggestion(agent, self.agents, "agents"), hosted.line)
             for name in _names(hosted):
-                if name in self.variables:
+                if name in variables:
                     if found.setdefault(name, agent) != agent:
                         message = f"the {what} gives '{shortened(name)}' to {shortened(found[name])} and to {agent}"
                         raise MistakeError(message, "let one of them have it", hosted.line)
@@ -67,10 +69,12 @@ class Hosting:
         load = dict.fromkeys(self.agents, 0)
         for agent in self.owners.values():
             load[agent] += 1
+        least = [(number, place, agent) for place, (agent, number) in enumerate(load.items())]
+        heapify(least)
         for name in left:
-            agent = min(load, key=load.__getitem__)
+            number, place, agent = least[0]
             self.owners[name] = agent
-            load[agent] += 1
+            heapreplace(least, (number + 1, place, agent))
         text = f"the file says no owner of {len(left)} variables: agents that had least took them, in their order"
         self.notes.append(Note("owner", text))
 

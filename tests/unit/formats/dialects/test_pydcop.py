@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from random import Random
 
 import pytest
 import yaml
@@ -13,6 +14,7 @@ import yaml
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.pydcop import python_function
+from robochoc.formats.dialects.pydcop.hosting import Hosting
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.assembly import assemble
@@ -318,3 +320,18 @@ def test_costs_that_dpop_of_pydcop_cannot_compare_are_refused() -> None:
         written("pydcop", team_of(2**31 - 2, 0))
     with pytest.raises(UnsupportedError, match="as much as 214,748,364, and what forbids costs ten times more"):
         written("pydcop", team_of(214_748_364, INFINITE))
+
+
+def test_variables_without_an_owner_go_to_the_agents_that_have_least() -> None:
+    chance = Random("owners")
+    for _ in range(200):
+        agents = [f"a{number}" for number in range(chance.randint(1, 6))]
+        variables = [f"v{number}" for number in range(chance.randint(0, 12))]
+        owners = {name: chance.choice(agents) for name in variables if chance.random() < 0.4}
+        hosting = Hosting(agents, variables, (), dict(owners))
+        hosting.rest()
+        for name in variables:
+            if name not in owners:
+                load = [list(owners.values()).count(agent) for agent in agents]
+                owners[name] = agents[load.index(min(load))]
+        assert hosting.owners == owners
