@@ -226,7 +226,7 @@ class SharedConstraint:
         except IndexError:
             raise self._refusal_of_width(view) from None
         if part is None:
-            return self.costs((part,)) if self._bears_absence else None
+            return self.costs((None,)) if self._bears_absence else None
         prices = self._costs_by.get(part)
         if prices is None:
             prices = self._costs_by[part] = self.costs((part,))
@@ -320,7 +320,7 @@ class SharedConstraint:
         except IndexError:
             raise self._refusal_of_width(view) from None
         if part is None:
-            return self.mask((part,)) if self._bears_absence else UNKNOWN
+            return self.mask((None,)) if self._bears_absence else UNKNOWN
         mask = self._looks.get(part)
         if mask is None:
             mask = self._looks[part] = self.mask((part,))
