@@ -14,7 +14,8 @@ from robochoc.solver.encoding import UnsupportedError
 from tests.support.foreign_problems import Tables, optimum, random_problem, written
 from tests.support.foreign_solvers import Solver, solvers
 
-ROUNDS = 100
+ROUNDS = {"xcsp3": 30}
+"""The number of problems of a format, if not 100: two Java processes are started for each XCSP3 file."""
 
 
 @pytest.mark.slow
@@ -24,7 +25,7 @@ def test_programs_find_the_optimum(kind: str, tmp_path: Path) -> None:
     if not programs:
         pytest.skip(f"no program for {kind} is installed: see tests/support/foreign_solvers.py")
     chance = Random(kind)
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS.get(kind, 100)):
         problem, team = random_problem(chance, plain=chance.random() < 0.5, simple=kind == "dcopsolver")
         with contextlib.suppress(UnsupportedError):
             _compare(kind, programs, problem, team, tmp_path)
