@@ -8,6 +8,7 @@ waits.
 from __future__ import annotations
 
 import _thread
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -69,8 +70,23 @@ def _watch(
     while not running.acquire(timeout=min(max(AGAIN_S, deadline - time.monotonic()), _LONGEST_WAIT_S)):
         with raising:
             if running.locked() and not are_held(thread) and time.monotonic() >= deadline:
+                _ignore_where_dropped()
                 raised.append(deadline)
                 _raise_in(thread, TimeLimitError)
+
+
+def _ignore_where_dropped() -> None:
+    """Keep Python from printing a `TimeLimitError` that it drops in a destructor or a callback."""
+    before = sys.unraisablehook
+    if getattr(before, "ignores_time_limits", False):
+        return
+
+    def print_others(dropped: sys.UnraisableHookArgs) -> None:
+        if dropped.exc_type is not TimeLimitError:
+            before(dropped)
+
+    print_others.ignores_time_limits = True  # type: ignore[attr-defined]
+    sys.unraisablehook = print_others
 
 
 def _raise_in(thread: int, error: type[Exception] | None) -> None:

@@ -28,6 +28,21 @@ def endless_but_for_errors() -> None:
         endless()
 
 
+class Busy:
+    """An object whose destructor takes longer than the time."""
+
+    def __del__(self) -> None:
+        until = time.monotonic() + 5 * SOON_S
+        while time.monotonic() < until:
+            pass
+
+
+def endless_after_a_destructor() -> None:
+    """Let the first error come in a destructor, where Python drops it."""
+    Busy()
+    endless()
+
+
 def limited_within() -> None:
     """End a computation with a limit of its own, and go on."""
     with pytest.raises(TimeLimitError):
@@ -35,7 +50,7 @@ def limited_within() -> None:
     endless()
 
 
-@pytest.mark.parametrize("function", [endless, endless_but_for_errors, limited_within])
+@pytest.mark.parametrize("function", [endless, endless_but_for_errors, endless_after_a_destructor, limited_within])
 def test_a_computation_ends_with_its_time(function: Callable[[], object]) -> None:
     with pytest.raises(TimeLimitError):
         computed_by(time.monotonic() + SOON_S, function)
