@@ -94,4 +94,4 @@ def test_where_no_protocol_does_the_judge_may(monkeypatch: pytest.MonkeyPatch) -
         team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
         said = refusal_of(team, Options(protocol=asked))
         assert said.endswith("; no protocol does, but the central solver (--protocol central)")
-    assert "central" not in refusal_of(partly_known(2**31), Options(protocol="sfb"))
+    assert "central" not in refusal_of(partly_known(2**56), Options(protocol="sfb"))
