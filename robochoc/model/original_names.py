@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from robochoc.model.absence import DroppedConstraint
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import EpochOutcome, Improvement, Outcome, PseudoTreeNode
 from robochoc.model.problem import Team
@@ -31,6 +32,7 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
         optima=outcome.optima
         and outcome.optima._replace(assignments=tuple(_by(one, names) for one in outcome.optima.assignments)),
         improvements=_improvements(outcome.improvements, names),
+        dropped_constraints=_dropped(outcome.dropped_constraints, names),
     )
 
 
@@ -74,7 +76,12 @@ def _epoch(epoch: EpochOutcome, names: Mapping[str, str]) -> EpochOutcome:
         lost=_all(epoch.lost, names),
         tree=_tree(epoch.tree, names),
         improvements=_improvements(epoch.improvements, names),
+        dropped_constraints=_dropped(epoch.dropped_constraints, names),
     )
+
+
+def _dropped(found: Iterable[DroppedConstraint], names: Mapping[str, str]) -> tuple[DroppedConstraint, ...]:
+    return tuple(replace(one, robots=_all(one.robots, names)) for one in found)
 
 
 def _improvements(found: Iterable[Improvement], names: Mapping[str, str]) -> tuple[Improvement, ...]:
