@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from robochoc.model.absence import bears_absence, restated
 from robochoc.model.disclosure import View
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
@@ -65,6 +66,7 @@ class TeamSecrets:
         """Costs of withdrawing, and of values that look like it: they are not counted, and never narrowed."""
         self._shared: dict[str, list[_Entries]] = {robot.name: [] for robot in team.team.robots}
         self._team = team.team
+        self._may_withdraw = parameters.withdrawal_cost is not None
         self._places = {
             name: (robot.name, place) for robot in team.team.robots for place, name in enumerate(robot.interface)
         }
@@ -143,12 +145,16 @@ class TeamSecrets:
         return cost < INFINITE and secret not in self.withdrawing
 
     def _between(self, view: View, shared: Sequence[_Entries]) -> list[Secret]:
-        """Return the secrets in those of these constraints whose robots are all in `view`, none of them withdrawn."""
-        return [
-            one.secrets[tuple([view[robot][place] for robot, place in one.places])]
-            for one in shared
-            if all(owner in view and not is_withdrawn(view[owner]) for owner in one.owners)
-        ]
+        """Return the secrets in those of these constraints whose robots are all in `view`.
+
+        Constraints that are dropped, as one of the robots is withdrawn, have none.
+        """
+        found = []
+        for one in shared:
+            if all(owner in view for owner in one.owners):
+                secret = one.secrets.get(tuple([view[robot][place] for robot, place in one.places]))
+                found += [] if secret is None else [secret]
+        return found
 
     def _add_charges(self, robot: Robot, team: CompiledTeam, parameters: RunParameters) -> None:
         columns = [sorted(self._team.variables[name].domain) for name in robot.interface]
@@ -182,11 +188,30 @@ class TeamSecrets:
             values: self._added(constraint.price(dict(zip(names, values, strict=True))))
             for values in itertools.product(*columns)
         }
+        entries = tuple(secrets.values())
+        if self._may_withdraw and bears_absence(constraint):
+            secrets.update(self._in_absence(constraint, places))
         added = _Entries(places, owners, knowing, secrets)
         for owner in sorted(owners | {holder}):
             self._shared[owner].append(added)
             self.neighbours[owner] |= owners - {owner}
-            self.entries[owner].update(dict.fromkeys(secrets.values(), knowing))
+            self.entries[owner].update(dict.fromkeys(entries, knowing))
+
+    def _in_absence(self, constraint: Constraint, places: Sequence[tuple[str, int]]) -> Iterator[tuple[Value, Secret]]:
+        """Yield the values of a scope, None for withdrawn robots, for which `constraint` is restated, and its cost."""
+        names = constraint.variables
+        owners = dict.fromkeys(robot for robot, _ in places)
+        for many in range(1, len(owners) + 1):
+            for away in itertools.combinations(owners, many):
+                gone = {name for name, (robot, _) in zip(names, places, strict=True) if robot in away}
+                left = restated(constraint, gone)
+                columns: list[Sequence[int | None]] = [
+                    [None] if name in gone else sorted(self._team.variables[name].domain) for name in names
+                ]
+                self._make_room(math.prod(map(len, columns)), f"constraint {constraint.name} has")
+                for values in itertools.product(*columns) if left is not None else ():
+                    known = {name: value for name, value in zip(names, values, strict=True) if value is not None}
+                    yield values, self._added(left.price(known) if left is not None else 0)
 
     def _added(self, cost: float) -> Secret:
         self.truths.append(cost)
