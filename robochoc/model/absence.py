@@ -8,7 +8,6 @@ a team all use `restated`.
 
 from __future__ import annotations
 
-import math
 import re
 import zlib
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
@@ -18,7 +17,6 @@ from robochoc.model.constraint import (
     INFINITE,
     Constraint,
     ConstraintModel,
-    Domain,
     Function,
     GlobalPredicate,
     Predicate,
@@ -26,7 +24,6 @@ from robochoc.model.constraint import (
     WhenAbsent,
 )
 from robochoc.model.expression import Apply, Constant, Expression, Name, names, text
-from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
 
 AGGREGATES = frozenset({"add", "min", "max", "and", "or"})
 """The operators whose arguments are terms of an aggregate."""
@@ -107,30 +104,6 @@ def bears_absence(constraint: Constraint) -> bool:
     if constraint.when_absent == WhenAbsent.DROP or _is_difference(constraint):
         return False
     return can_be_restated(constraint)
-
-
-def is_absence_proof(constraint: Constraint, domains: Mapping[str, Domain]) -> bool:
-    """Return whether no absence can break `constraint`: fewer terms only make it easier to satisfy.
-
-    Constraints that are dropped are. "At least" is not. False where it is not known.
-
-    Args:
-        constraint: The constraint.
-        domains: The domains of variables, as far as they are known.
-    """
-    if constraint.when_absent == WhenAbsent.FAIL:
-        return False
-    if constraint.when_absent == WhenAbsent.DROP or not can_be_restated(constraint):
-        return True
-    definition = constraint.definition
-    if isinstance(definition, Relation) or definition.name in {_ALL_DIFFERENT, _CUMULATIVE}:
-        return True
-    if _is_difference(constraint) or constraint.cost < INFINITE or isinstance(definition, Function):
-        return True
-    formals = _formals(constraint)
-    limits = {name: _interval(domains.get(str(term))) for name, term in formals.items()}
-    direction = _direction(_with_constants(definition.body, formals), limits)
-    return direction is not None and direction >= 0
 
 
 def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | None:
@@ -257,54 +230,6 @@ def _signed(sign: int, shape: Hashable) -> Hashable:
 
 def _sign(value: int) -> int:
     return (value > 0) - (value < 0)
-
-
-def _direction(expression: Expression, limits: Mapping[str, Interval]) -> int | None:
-    """Return how the value of an aggregate moves when it loses terms: 1 up, -1 down, 0 not at all; None: unknown."""
-    if not isinstance(expression, Apply):
-        return 0
-    arguments = _flat(expression)
-    terms = [one for one in arguments if names(one)]
-    if len(terms) >= _TWO:
-        return _direction_of_aggregate(expression.operator, terms, limits)
-    inner = _direction(terms[0], limits) if terms else 0
-    return inner and _carried(expression.operator, arguments, inner)
-
-
-def _direction_of_aggregate(operator: str, terms: Sequence[Expression], limits: Mapping[str, Interval]) -> int | None:
-    if any(len(names(term)) > _TWO for term in terms):  # they may lose terms themselves
-        return None
-    if operator == "add":
-        ranges = [bounds(term, limits) for term in terms]
-        return -1 if all(one.low >= 0 for one in ranges) else 1 if all(one.high <= 0 for one in ranges) else None
-    return {"and": 1, "min": 1, "or": -1, "max": -1}.get(operator)
-
-
-def _carried(operator: str, arguments: Sequence[Expression], inner: int) -> int | None:
-    """Return how the value of `operator` moves when its only argument with names moves as `inner` says."""
-    sign = _SIGNS.get(operator)
-    if sign is not None:
-        return inner * (-sign if not names(arguments[0]) and operator not in AGGREGATES else sign)
-    numbers = [one.value for one in arguments if isinstance(one, Constant)]
-    if len(numbers) < len(arguments) - 1:
-        return None
-    match operator:
-        case "mul":
-            return inner * _sign(math.prod(numbers))
-        case "if" if names(arguments[0]):
-            return inner * _sign(numbers[0] - numbers[1])
-        case _:
-            return None
-
-
-_SIGNS = {"le": -1, "lt": -1, "ge": 1, "gt": 1, "not": -1, "neg": -1, "sub": 1, **dict.fromkeys(AGGREGATES, 1)}
-"""The direction of operators' values as their first argument grows; as the second one grows it is the opposite."""
-
-
-def _interval(domain: Domain | None) -> Interval:
-    if domain is None or not domain.ranges:
-        return ANY_INTEGER
-    return Interval(min(part.start for part in domain.ranges), math.inf)
 
 
 def _formals(constraint: Constraint) -> dict[str, str | int]:

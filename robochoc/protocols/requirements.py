@@ -7,28 +7,24 @@ constraints, so each robot checks itself. This module is where both can import i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
-from robochoc.model.absence import is_absence_proof
-from robochoc.model.problem import ConstraintModel, Domain, Robot
+from robochoc.model.absence import bears_absence
+from robochoc.model.problem import ConstraintModel, Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
 
-BREAKABLE = "a constraint that the absence of robots can break"
+BREAKABLE = "a constraint that is restated when a robot is absent"
 """The end of the text on such a constraint."""
 _TWO = 2
 
 
-def unmet_requirement(
-    robot: Robot, traits: Traits, owners: Mapping[str, str], domains: Mapping[str, Domain] = MappingProxyType({})
-) -> str:
+def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -> str:
     """Return a feature of `robot` that a protocol with these `traits` does not support; empty if there is none.
 
     Args:
         robot: The robot with its constraints.
         traits: The protocol's capabilities.
         owners: The names of the robots that own the variables, by the variables' names.
-        domains: The domains of variables, as far as they are known.
     """
     held_for_children = (constraint for child in robot.children for constraint in child.constraints)
     for constraint in (*robot.shared, *held_for_children):
@@ -38,8 +34,8 @@ def unmet_requirement(
             return f"{robot.name} shares a partially known constraint (PKC, {constraint.name})"
         if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > _TWO:
             return f"{robot.name} holds a constraint over more than two robots ({constraint.name})"
-    if traits.absence_proof_only:
+    if traits.drops_only:
         for constraint in robot.constraints():
-            if not is_absence_proof(constraint, domains):
+            if bears_absence(constraint):
                 return f"{robot.name} holds {constraint.name}, {BREAKABLE}"
     return ""

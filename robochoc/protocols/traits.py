@@ -48,8 +48,8 @@ class Traits:
         allocates: It takes task allocations only: teams that share nothing but that some things are done by one robot
             at most, and in which each robot can do without (`solver/exclusions.py`).
         congestion: Of those it also takes such in which several robots may do a task, each pair of them at a cost.
-        absence_proof_only: It takes only constraints that no absent robot can break (`model/absence.py`): its robots
-            withdraw one after the other, and none comes back.
+        drops_only: It takes only constraints that are dropped when a robot is absent (`model/absence.py`): its robots
+            withdraw one after the other, so one that is restated could be broken by robots that have decided before.
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
     """
@@ -76,7 +76,7 @@ class Traits:
     bears_loss: bool = False
     allocates: bool = False
     congestion: bool = False
-    absence_proof_only: bool = False
+    drops_only: bool = False
     privacy: str = ""
     use_when: str = ""
 

@@ -216,10 +216,6 @@ class LocalProblem(LocalConstraints):
         """
         return self._at_least(self._parts.get(robot, ()))
 
-    def width(self, robot: str) -> int:
-        """Return how many parts a value of `robot` has."""
-        return len(self._part.known.interfaces[robot])
-
     def refuse_value(self, robot: str, value: Value) -> None:
         """Raise `ValueError` for a `value` that `robot`, as its files declare it, cannot have: others say anything."""
         names = self._part.known.interfaces.get(robot, ())

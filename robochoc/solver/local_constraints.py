@@ -95,11 +95,6 @@ class LocalConstraints:
         for constraint in self._constraints:
             constraint.allow_undeclared()
 
-    def allow_absence(self) -> None:
-        """From now on a value all of whose parts are None means that its robot is withdrawn."""
-        for constraint in self._constraints:
-            constraint.allow_absence()
-
     def declared_count(self, robot: str) -> int:
         """Return how many values `declared` returns; nothing is allocated."""
         domains, names = self._part.known.domains, self._part.known.interfaces[robot]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import secrets
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -141,11 +140,7 @@ class Searcher(RobotLoop):
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
         """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
-        domains = {variable.name: variable.domain for variable in robot.variables}
-        if traits.absence_proof_only:
-            with suppress(ProfileError):  # which is reported where the problem is made of them
-                domains |= {name: domain_of(name, ranges) for name, ranges in self._task.domains.items()}
-        unmet = unmet_requirement(robot, traits, owners, domains)
+        unmet = unmet_requirement(robot, traits, owners)
         if robot.kind == ProblemKind.DISWCSP and not traits.costs:
             unmet = f"{robot.name} is part of a DisWCSP"
         if unmet:

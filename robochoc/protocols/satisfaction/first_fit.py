@@ -34,7 +34,7 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FirstFit(Protocol):
-    """One robot. `view` holds the values of the parents, `awaited` the parents without a message yet."""
+    """One robot. `view` holds the values of the parents that fly, `awaited` the parents without a message yet."""
 
     messages: ClassVar[Any] = Placed
     traits: ClassVar[Traits] = Traits(
@@ -42,14 +42,13 @@ class FirstFit(Protocol):
         paper="paper, Section 5.2",
         complete=False,
         writes_to_non_neighbours=False,
-        absence_proof_only=True,
+        drops_only=True,
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.view: dict[str, Value] = {}
         self.awaited = set(problem.parents)
-        problem.allow_absence()
 
     def start(self) -> None:
         """Decide at once if there are no parents."""
@@ -59,7 +58,8 @@ class FirstFit(Protocol):
         """Store a parent's decision."""
         value = cast("Placed", message).value
         self.awaited.discard(sender)
-        self.view[sender] = (None,) * self.problem.width(sender) if value is None else value
+        if value is not None:
+            self.view[sender] = value
 
     def settle(self) -> None:
         """Decide and send the decision once all parents have decided; each robot does so exactly once."""

@@ -203,9 +203,8 @@ def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
 
 def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
     """Raise `UnfitProtocolError` for constraints that the one called `name` cannot take."""
-    domains = {name: variable.domain for name, variable in team.variables.items()} if traits.absence_proof_only else {}
     for robot in team.robots:
-        unmet = unmet_requirement(robot, traits, team.owner, domains)
+        unmet = unmet_requirement(robot, traits, team.owner)
         if unmet.endswith(BREAKABLE):
             raise UnsupportedError(f"{unmet}, which {name} does not support; --withdraw minimum does")
         if unmet:
