@@ -107,10 +107,12 @@ class Simulation(Session):
         self._under_way = UnderWay() if may_be_shared(protocol.messages) else None
         with collection_paused():
             parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
+            self._hosts: dict[str, Host] = {}
             try:
-                self._hosts = computed_by(deadline, self._set_up, parts)
+                computed_by(deadline, self._set_up, parts)
             except TimeLimitError:
-                raise OutOfTimeError("the time was over before all robots knew their problems") from None
+                late = next((name for name in parts if name not in self._hosts), "the last robot")
+                raise OutOfTimeError(f"the time was over before {late} knew its problem") from None
         if losses is not None:
             losses.follow(self.compiled.team, self._values_of)
 
@@ -168,9 +170,10 @@ class Simulation(Session):
         if over(self._deadline):
             raise OutOfTimeError(f"the time was over before {name} knew its problem")
 
-    def _set_up(self, parts: Mapping[str, AgentProblem]) -> dict[str, Host]:
-        """Return the host of each robot."""
-        return {name: self._host(part) for name, part in parts.items()}
+    def _set_up(self, parts: Mapping[str, AgentProblem]) -> None:
+        """Set up all robots."""
+        for name, part in parts.items():
+            self._hosts[name] = self._host(part)
 
     def _host(self, part: AgentProblem) -> Host:
         self._check_time(part.robot.name)
