@@ -187,4 +187,4 @@ def test_what_is_no_map_is_said_with_its_file_and_line(tmp_path: Path) -> None:
     (tmp_path / "plan.yaml").write_text("image: plan.pgm\nresolution: none\n")
     done = robochoc_within("generate", "formation", "--map", "plan.yaml", "--agents", "3")
     assert (done.returncode, done.stdout) == (INVALID, "")
-    assert done.stderr.startswith("plan.yaml: has no origin")
+    assert done.stderr.startswith("plan.yaml:1: the map has no origin")

