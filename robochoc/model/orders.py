@@ -19,7 +19,7 @@ from enum import StrEnum
 from typing import assert_never
 
 from robochoc.model.priorities import natural_key, priority_order
-from robochoc.model.problem import Child, Constraint, ConstraintModel, Definition, Parent, Robot, Team
+from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Robot, Team
 
 Graph = Mapping[str, frozenset[str]]
 """The neighbours of each robot."""
@@ -272,9 +272,11 @@ class _Reordering:
     def _robot(self, name: str) -> Robot:
         old = self._old[name]
         under: dict[str, list[Constraint]] = defaultdict(list)
-        for constraint in self._definable(old, self._held[name]):
+        stay = set(map(id, old.shared))
+        for constraint in self._held[name]:
             others = _owners(self._old, constraint) - {name}
-            under[max(others, key=self._seen.__getitem__)].append(constraint)
+            held = constraint if id(constraint) in stay else replace(constraint, line=0)
+            under[max(others, key=self._seen.__getitem__)].append(held)
         parents = {parent.name: parent for parent in old.parents}
         children = {child.name: child for child in old.children}
         return replace(
@@ -300,30 +302,6 @@ class _Reordering:
         kept = [name for name in child.variables if name in needs_now or name not in needed_before]
         own = [variable.name for variable in robot.variables if variable.name in needs_now]
         return replace(child, variables=tuple(dict.fromkeys([*kept, *own])))
-
-    def _definable(self, robot: Robot, held: Sequence[Constraint]) -> Iterator[Constraint]:
-        """Yield the constraints in `held`; definitions that come from another file give way where two have one name."""
-        stay = set(map(id, robot.shared))
-        parts = (constraint for child in robot.children for constraint in child.constraints)
-        own = (*robot.private, *parts, *(constraint for constraint in held if id(constraint) in stay))
-        known = {constraint.definition.name: constraint.definition for constraint in own}
-        for constraint in held:
-            if id(constraint) in stay:
-                yield constraint
-            else:
-                yield replace(constraint, definition=_unlike(constraint.definition, known), line=0)
-
-
-def _unlike(definition: Definition, known: dict[str, Definition]) -> Definition:
-    """Return `definition`, under the first of its name, name_2, ...
-
-    that means nothing else in `known`; and puts it there.
-    """
-    named, number = definition, 1
-    while known.setdefault(named.name, named) != named:
-        number += 1
-        named = replace(definition, name=f"{definition.name}_{number}")
-    return known[named.name]
 
 
 def _child(parent: Robot, name: str) -> Child:

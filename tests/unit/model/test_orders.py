@@ -12,7 +12,10 @@ from random import Random
 import pytest
 
 from robochoc.formats import read_team, write_team
+from robochoc.formats.global_constraints import read_form
+from robochoc.formats.labels import with_names_apart
 from robochoc.generators.queens3d import queens3d
+from robochoc.model.absence import bears_absence
 from robochoc.model.orders import Order, OrderError, compute_order, constraint_graph, with_order, with_priorities
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, ScenarioEvent, Semantics
@@ -194,9 +197,22 @@ def test_definitions_of_one_name_in_two_files_do_not_become_one() -> None:
 
     given = [apart("A", "B", (1, 1)), apart("A", "C", (2, 2)), apart("A", "D", (2, 2)), apart("A", "E", (1, 1))]
     turned = with_priorities(team_of(dict.fromkeys("ABCDE", (1, 2)), given), ["RB", "RC", "RD", "RE", "RA"])
-    definitions = {constraint.scope[1]: constraint.definition for constraint in turned["RA"].shared}
-    assert {name: one.name for name, one in definitions.items()} == {"B": "R", "C": "R_2", "D": "R_2", "E": "R"}
-    assert [meaning(one) for one in turned["RA"].shared] == [meaning(one) for one in given]
+    assert [one.definition for one in turned["RA"].shared] == [one.definition for one in given]
+    written = with_names_apart(turned["RA"])
+    assert [one.definition.name for one in written.shared] == ["R", "R.2", "R.2", "R"]
+    assert [meaning(one) for one in written.shared] == [meaning(one) for one in given]
+
+
+def test_global_constraints_are_of_the_same_kind_in_every_order() -> None:
+    kind, rows = (
+        "global:cumulative",
+        ("[ {X0 2 1} {X1 2 1} {X2 2 1} ] <le/> 1", "[ {X0 1 2} {X1 1 2} {X2 1 2} ] <le/> 2"),
+    )
+    scopes = ("A", "B", "C"), ("A", "B", "D")
+    given = [Constraint("C", read_form(kind, row), scope, scope) for row, scope in zip(rows, scopes, strict=True)]
+    turned = with_priorities(team_of(dict.fromkeys("ABCD", (1, 2)), given), ["RD", "RC", "RB", "RA"])
+    assert [one.definition.name for one in turned["RA"].shared] == [kind, kind]
+    assert all(bears_absence(one) for one in turned.constraints())
 
 
 def test_a_partially_known_constraint_stays_as_it_is_held() -> None:
