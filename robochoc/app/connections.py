@@ -1,4 +1,4 @@
-"""Connections of the application's server, bounded: uvicorn itself waits for ever for the rest of a request."""
+"""Bounded connections of the application's server: uvicorn has no time limit for the rest of a request."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ else:
     from uvicorn.protocols.http.auto import AutoHTTPProtocol as HTTPProtocol
 
 MAX_CONNECTIONS = 200
-"""The number of connections beyond which further ones are closed at once. A browser opens six a page."""
+"""The maximum number of open connections; more are closed at once. A browser opens six for each page."""
 MAX_HEAD = 1 << 16
 """The maximum number of bytes of a request's line and headers."""
 HEAD_S = 30.0
-"""The time within which a request's line and headers must have come; twice that on a connection with earlier ones."""
+"""The time limit for the line and headers of a request; twice that on a connection with earlier requests."""
 
 
 class BoundedConnection(HTTPProtocol):
-    """One connection. It is closed when a request does not come in time, or begins with too much."""
+    """One connection, closed if a request is late or its line and headers are too long."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
-        """Begin to wait for the first request."""
+        """Start the time limit of the first request."""
         super().connection_made(transport)
         self._head = 0
         if len(self.connections) > MAX_CONNECTIONS:
@@ -43,7 +43,7 @@ class BoundedConnection(HTTPProtocol):
         return bool(getattr(self.cycle, "response_complete", True))
 
     def _check(self, last: object) -> None:
-        """Close the connection if it waits for a request, and no other one came since `last`."""
+        """Close the connection if it still waits for the request after `last`."""
         if self.transport.is_closing() or self.transport.get_protocol() is not self:  # it is a WebSocket now
             return
         if self._is_waiting and self.cycle is last:

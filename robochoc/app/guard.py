@@ -119,12 +119,12 @@ class Guard:
 
 
 class _Taken:
-    """Receives a request; of one that is too long, or does not come on, as if its sender had gone."""
+    """Receives a request; if the request is too long or late, the client counts as disconnected."""
 
     def __init__(self, receive: Receive) -> None:
         self.too_much = False
         self.is_late = False
-        """Whether the next part of its body did not come in time."""
+        """Whether the next part of the request's body was late."""
         self.gone = False
         """Whether its sender has gone."""
         self._receive, self._left = receive, MOST_BYTES

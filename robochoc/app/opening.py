@@ -1,4 +1,4 @@
-"""Open a file as a new team, in a process of its own: a file of somebody else can take any time and memory to read.
+"""Open a file as a new team in a separate process, since reading an untrusted file can take any time and memory.
 
 python -m robochoc.app.opening STORE FILE
 """
@@ -21,18 +21,18 @@ from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 
 PATIENCE_S = 60.0
-"""The time in which a file must have been opened."""
+"""The time limit for opening a file."""
 
 
 class Opening(msgspec.Struct, frozen=True):
-    """The id of the new team, or the mistakes of the file, one a line."""
+    """The id of the new team, or the errors in the file, one on each line."""
 
     team: str = ""
     mistakes: str = ""
 
 
 def opening_of(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> Job[Opening]:
-    """Begin to open `file` as a new team in `store`; return the job."""
+    """Start opening `file` as a new team in `store`; return the job."""
 
     def work(job: Job[Opening]) -> Opening:
         try:

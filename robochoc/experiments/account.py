@@ -79,7 +79,7 @@ class Account:
         yield from self._remarks
 
     def answers(self) -> list[str]:
-        """Return the best ways to run, and those that do the same, a sentence each."""
+        """Return a sentence for each best configuration, and for each group of equal ones."""
         return ranking.answers(self.rows, self.metrics)
 
     def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:

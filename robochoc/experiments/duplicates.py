@@ -8,7 +8,7 @@ from typing import Any
 from robochoc.model.wording import listed
 
 SEEDS = ("seed", "problem_seed", "scenario_seed")
-"""Parameters that are drawn by chance: they are no setting."""
+"""Parameters that are drawn at random: they do not belong to a setting."""
 
 Setting = tuple[tuple[str, Any], ...]
 
@@ -18,8 +18,8 @@ def without_duplicates(
 ) -> tuple[list[Mapping[str, Any]], list[str]]:
     """Return the results of the first of all settings with the same problems, and a sentence about the others.
 
-    Two settings are the same if they have the same problem for each seed. The same problem for different seeds of one
-    setting is no mistake: small problems are often drawn twice.
+    Two settings are the same if they have the same problem for each seed. Different seeds of one setting may well have
+    the same problem: small problems are often drawn twice.
 
     Args:
         rows: The results of a study.

@@ -1,4 +1,4 @@
-"""The best ways to run, a sentence for each metric, for readers who look for the answer first."""
+"""The best configurations, in one sentence for each metric, for readers who look for the answer first."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SEARCHED = ("messages", "ncccs", "bytes", "cost")
 
 
 def answers(rows: Rows, metrics: Sequence[str]) -> list[str]:
-    """Return sentences about the ways to run that need least, and those that do the same.
+    """Return sentences about the best configurations, and about those with equal results.
 
     Args:
         rows: The results of several ways to run.

@@ -115,7 +115,7 @@ def comparisons(rows: Rows, metric: str) -> list[Comparison]:
 
 
 def maximised(rows: Rows, metric: str) -> set[str]:
-    """Return the problems of which more of a metric is better: those with utilities."""
+    """Return the problems with utilities, for which higher values of the metric are better."""
     return {row["digest"] for row in rows if row["maximises"]} if metric == "cost" else set()
 
 
@@ -163,7 +163,7 @@ def _comparison(
 def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
     """Return the median of the ratios of all `pairs`; None where it does not exist.
 
-    The ratio of 0 to 0 is 1, that of more to 0 is higher than all others. There is none of negative numbers.
+    The ratio of 0 to 0 is 1; the ratio of a positive number to 0 is higher than all others. Negative numbers have none.
     """
     if not pairs or min(map(min, pairs)) < 0:
         return None

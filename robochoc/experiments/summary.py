@@ -149,7 +149,7 @@ class Prepared(NamedTuple):
     """The results as tables and figures show them.
 
     Attributes:
-        over: The parameter that tables and figures are over.
+        over: The parameter on the axis of tables and figures.
         rows: The results. Problems without a parameter have their name in its place.
         remarks: Sentences about results that were left out.
     """

@@ -91,7 +91,7 @@ class LocalWorkers:
         for content in worker.frames.take(received):
             row = msgspec.json.decode(content, type=Row)
             task = worker.tasks.popleft()
-            if row.status == Status.MEMORY:  # and with this it leaves
+            if row.status == Status.MEMORY:  # the worker ends after this result
                 self._replace(worker, waiting)
             else:
                 worker.next()

@@ -1,4 +1,4 @@
-"""XML elements that record which of their parts were read: a part that no reader has read is an error.
+"""XML elements that record which of their parts were read: an unread part is an error.
 
 `open_xml` is the only way to a view. When its block ends, the whole tree is checked: each element, attribute and text
 that was not read becomes a diagnostic with its line. So a reader cannot forget to refuse a part that it does not know.
@@ -85,13 +85,13 @@ class ElementView:
         return (self._element.get(name) or "").strip(BLANKS)
 
     def ignore_attributes(self, *names: str) -> None:
-        """Count attributes as read that have no meaning here."""
+        """Ignore attributes that have no meaning here."""
         self._asked_attributes.update(names)
 
     # Text
 
     def text(self) -> str:
-        """Return the text of an element without child elements. Raises `MistakeError` where there are some."""
+        """Return the text of an element. Raises `MistakeError` if it has child elements."""
         for child in self._element:
             raise MistakeError(f"<{child.tag}> inside <{self.tag}>", "only text is expected there", line(child))
         self._is_text_read = True
@@ -138,7 +138,7 @@ class ElementView:
         return found
 
     def one_of(self, *names: str) -> ElementView:
-        """Return the only child element of these names. Raises `MistakeError` where there is none, or a second one."""
+        """Return the only child element with one of these names. Raises `MistakeError` unless there is exactly one."""
         found = self.children(*names)
         if len(found) == 1:
             return found[0]
@@ -158,7 +158,7 @@ class ElementView:
         return found
 
     def ignore(self, *names: str) -> None:
-        """Count child elements of these names as read, with everything in them."""
+        """Ignore child elements of these names, with everything in them."""
         for child in self.children(*names):
             child._is_unchecked = True
 
@@ -170,9 +170,9 @@ class ElementView:
 
     @contextmanager
     def guard(self) -> Iterator[None]:
-        """Note a `MistakeError` raised inside and continue behind the block.
+        """Report a `MistakeError` raised inside, and continue after the block.
 
-        Parts of this element that were not read because of the mistake are not reported.
+        Parts of this element that were not read because of the error are not reported.
         """
         try:
             yield

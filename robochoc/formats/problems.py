@@ -82,5 +82,5 @@ def read_problem(
         if found is None or first is None:
             raise
         hint = f"robochoc import {place} -o FOLDER"
-        told = Diagnostic(first.file, 0, f"is {found.title}, and no file of a robot", hint)
+        told = Diagnostic(first.file, 0, f"is {found.title}, not a file of a robot", hint)
         raise InvalidInputError([told]) from None

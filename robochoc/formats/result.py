@@ -117,7 +117,7 @@ class PreprocessingForm(msgspec.Struct, frozen=True):
 
 
 class ResultForm(msgspec.Struct, omit_defaults=True, frozen=True):
-    """`Outcome` in JSON, with the names, places and values that it is written with."""
+    """`Outcome` in JSON, with original names, places and values."""
 
     team: str
     protocol: str
@@ -175,7 +175,7 @@ def result_json(
         outcome: The outcome.
         names: What robots and variables are called elsewhere, by the names in `outcome`.
         places: Where on a map the values of variables are, in metres.
-        values: The user's values of variables whose integers in the assignment mean something else.
+        values: The user's values of variables, where they differ from the integers in the assignment.
     """
     told = outcome.optima
     form = ResultForm(
@@ -209,7 +209,7 @@ def _fields(source: object, kind: type) -> dict[str, Any]:
 
 
 def _number(number: Cost | None) -> Cost | None:
-    """Return a number that msgspec can write: its integers have 64 bits at most."""
+    """Return a number that msgspec can write: it writes integers of at most 64 bits."""
     return Decimal(number) if isinstance(number, int) and number.bit_length() > 63 else number  # noqa: PLR2004 - bits
 
 
@@ -247,9 +247,9 @@ def _epoch(epoch: EpochOutcome, outcome: Outcome) -> EpochForm:
 
 
 class _Symbols:
-    """The symbols in a JSON result, and the variables whose values they are.
+    """The symbols in a JSON result, and the symbolic variables.
 
-    Results of earlier versions do not list them: they get codes in the order in which they are met.
+    Results of earlier versions do not list the symbols: these get codes in the order of their first use.
     """
 
     def __init__(self, symbols: Sequence[str], variables: Sequence[str]) -> None:

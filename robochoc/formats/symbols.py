@@ -137,7 +137,7 @@ def check_kinds(constraint: Constraint, symbolic: Mapping[str, bool]) -> None:
             message = f"{name} takes {_SAID[bool(wanted)]} where '{term}' stands, and that is {_SAID[bool(kind)]}"
             raise MistakeError(message, "write symbol X or int X among its parameters, as its arguments are")
     if isinstance(constraint.definition, Relation):
-        return  # a column of a relation without tuples may hold either, whatever others hold
+        return  # a column of a relation without tuples fits any domain
     loose = {
         kind: term for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True) if wanted is None
     }

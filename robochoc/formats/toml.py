@@ -1,6 +1,6 @@
-"""TOML, within bounds: `tomllib` takes time and memory that grow with the square of the parts of a dotted key.
+"""A bounded reader of TOML: in `tomllib`, time and memory grow with the square of the parts of a dotted key.
 
-Its tables have no lines. These are looked up in the text when there is a mistake to report.
+The tables of `tomllib` have no lines. Lines are looked up in the text when an error is reported.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from robochoc.system.decode_errors import describe_decode_error, place_of
 
 _Kind = TypeVar("_Kind")
 MAX_PARTS = 16
-"""The maximum number of parts of a dotted key. Nothing that is read here needs more than three."""
+"""The maximum number of parts of a dotted key. No file of robochoc needs more than three."""
 _HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
 _STEP = re.compile(r"\[(\d+)\]$")
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+"""
@@ -40,17 +40,17 @@ def toml_tables(text: str) -> dict[str, Any]:
 
 
 def convert(tables: object, kind: type[_Kind], text: str, hint: str, table: str = "") -> _Kind:
-    """Return `tables`, or those of the table that is named, as a struct.
+    """Return `tables`, the contents of a file or of one table in it, as a struct.
 
     Args:
-        tables: What was read.
+        tables: The decoded TOML.
         kind: The struct.
-        text: The file.
-        hint: What to do about a mistake.
+        text: The text of the file.
+        hint: The next step after an error.
         table: The name of the table in the file. Empty: `tables` are the whole file.
 
     Raises:
-        MistakeError: if they do not have the fields of the struct, with the line.
+        MistakeError: if the tables do not fit the fields of the struct; with the line.
     """
     try:
         return msgspec.convert(tables, kind)
@@ -67,13 +67,13 @@ def line_of(text: str, table: str, key: str = "", number: int = 0) -> int:
     """Return the line of a key in a TOML file.
 
     Args:
-        text: The file.
+        text: The text of the file.
         table: The name of the table. Empty: keys before all tables.
         key: The key. Empty: the table itself.
         number: Which of several tables of that name, from 0.
 
     Returns:
-        The line, that of the table where the key stands elsewhere, or 0 where there is none.
+        The line of the key, or of the table if the key is not found in it; 0 if neither is found.
     """
     found_table, found_number, head = "", 0, 0
     wanted = re.compile(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]") if key else None
@@ -90,7 +90,7 @@ def line_of(text: str, table: str, key: str = "", number: int = 0) -> int:
         elif table and found_table == f"{table}.{key}":
             return line
     outer, dot, inner = table.rpartition(".")
-    if table and not head:  # the table stands in braces
+    if table and not head:  # an inline table
         return line_of(text, outer, inner, number if dot else 0)
     return head if table else 0
 

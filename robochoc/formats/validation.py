@@ -112,7 +112,7 @@ def check_event(team: Team, event: ScenarioEvent) -> None:
 
 
 def _excessive_changes(team: Team, changes: Iterable[Change], place: Location) -> Iterator[Diagnostic]:
-    """Yield the changes that bring numbers that are too large. Those that `team` cannot take otherwise are left out."""
+    """Yield changes with numbers that are too large, except changes that are invalid for other reasons."""
     for change in changes:
         try:
             team = apply_changes(team, [change])

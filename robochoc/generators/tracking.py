@@ -101,7 +101,7 @@ def tracking(
     if agents * reached > MAX_CELLS:
         raise ValueError(
             f"{agents:,} robots can go to {reached:,} cells each, more than {MAX_CELLS:,} together;"
-            " take fewer robots, a smaller side, or less mobility"
+            " use fewer robots, a smaller side, or less mobility"
         )
     cells = [field.cells(robot) for robot in range(agents)]
     lost = 0

@@ -53,7 +53,7 @@ class Ended(Event, frozen=True, kw_only=True):
 
     @classmethod
     def of(cls, outcome: Outcome) -> Ended:
-        """Return the entry of an outcome."""
+        """Return the entry for an outcome."""
         long: dict[str, Decimal] = {}
         if outcome.count is not None and outcome.count.bit_length() > _BITS:
             long["count"], outcome = Decimal(outcome.count), replace(outcome, count=None)

@@ -201,7 +201,7 @@ class JournalFile:
                 self._file.append(block)
 
     def close(self) -> None:
-        """Close the file. Raises `OSError` if its reader, if it is a pipe, did not read all of it."""
+        """Close the file. Raises `OSError` if the file is a pipe and its reader did not read all of it."""
         file, self._file, self._closed = self._file, None, True
         if file:
             with errors_naming(self._path):

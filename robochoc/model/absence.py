@@ -1,9 +1,9 @@
-"""What a constraint means when a robot is absent: it has withdrawn, was lost, or was removed by an event.
+"""The meaning of a constraint when a robot is absent: it has withdrawn, was lost, or was removed by an event.
 
-The definition, with examples: docs/reference/absence.md. An aggregate of alike terms that is compared with numbers
+docs/reference/absence.md has the definition, with examples. An aggregate of alike terms that is compared with numbers
 loses the terms of the absent robots and stays in force. Every other constraint that mentions an absent robot is
-dropped. The author of a constraint may say otherwise (`WhenAbsent`). Searches, checker, central solvers and changes of
-a team all use `restated`.
+dropped. The author of a constraint may choose another meaning (`WhenAbsent`). Searches, checker, central
+solvers and changes of a team all use `restated`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from robochoc.model.expression import Apply, Constant, Expression, Name, names, 
 AGGREGATES = frozenset({"add", "min", "max", "and", "or"})
 """The operators whose arguments are terms of an aggregate."""
 _COMPARING = AGGREGATES | {"eq", "ne", "lt", "le", "gt", "ge", "in", "not", "sub", "neg", "mul", "if"}
-"""The operators that may compare an aggregate with numbers, or add numbers to it before."""
+"""The operators that may compare an aggregate with numbers, or combine it with numbers before that."""
 _NUMBERS = frozenset({"add", "min", "max"})
 """Aggregates of numbers: the numbers in their terms may differ from robot to robot."""
 _ALL_DIFFERENT, _CUMULATIVE = "global:allDifferent", "global:cumulative"
@@ -56,7 +56,7 @@ class NotAnAggregateError(Exception):
 
 
 def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | None:
-    """Return `constraint` as it holds for the robots that stay; None: it is dropped.
+    """Return `constraint` as restated for the robots that stay; None: it is dropped.
 
     A constraint that was restated before is restated from its original form, so the order of departures does not
     matter.
@@ -81,9 +81,9 @@ def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | No
 
 
 def can_be_restated(constraint: Constraint) -> bool:
-    """Return whether `constraint` can stay in force for fewer robots, in whichever way it is written.
+    """Return whether `constraint` can stay in force for fewer robots.
 
-    `x != y` counts as all different over two variables: without one of them nothing is left of it.
+    `x != y` counts as all different over two variables: without one of them it is always satisfied.
     """
     if constraint.model == ConstraintModel.PKC or isinstance(constraint.definition, Relation):
         return False
@@ -107,7 +107,7 @@ def bears_absence(constraint: Constraint) -> bool:
 
 
 def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | None:
-    """Return what is left of a constraint without the variables `gone`. Raises `NotAnAggregateError`."""
+    """Return a constraint without the variables `gone`; None: it is dropped. Raises `NotAnAggregateError`."""
     definition = constraint.definition
     if (
         constraint.when_absent == WhenAbsent.DROP
@@ -128,7 +128,7 @@ def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | No
         symbolic = tuple(name for name in definition.symbolic if name in kept)
         if body is None:
             return None
-        name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # several may be left of one definition
+        name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # one definition can have several remainders
         left = replace(definition, name=name, parameters=kept, body=body, symbolic=symbolic)
         terms = [formals[name] for name in kept]
     if left is None:
@@ -141,10 +141,10 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
     """Return an aggregate, compared with numbers, without the terms of the names `lost`.
 
     Returns:
-        What is left; None: no term.
+        The remaining aggregate; None if it has lost all terms.
 
     Raises:
-        NotAnAggregateError: if it is something else.
+        NotAnAggregateError: if `expression` has another form.
     """
     mentioned = names(expression)
     if not any(name in lost for name in mentioned):
@@ -169,7 +169,7 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
 
 
 def _term(term: Expression, lost: Collection[str]) -> Expression | None:
-    """Return what is left of a term of an aggregate; None: it is lost.
+    """Return a term of an aggregate without the names `lost`; None: the term is lost.
 
     A term that mentions several robots is restated if it is an aggregate of its own and mentions two that stay.
     """
@@ -183,7 +183,7 @@ def _term(term: Expression, lost: Collection[str]) -> Expression | None:
 
 
 def _flat(expression: Apply) -> Sequence[Expression]:
-    """Return the arguments; those of an aggregate within one of its kind are terms of the outer one."""
+    """Return the arguments of an aggregate, including those of nested aggregates of the same kind."""
     if expression.operator not in AGGREGATES:
         return expression.arguments
     found: list[Expression] = []
@@ -199,7 +199,7 @@ def _alike(operator: str, terms: Iterable[Expression]) -> bool:
 
 
 def _shape(expression: Expression, *, loose: bool) -> Hashable:
-    """Return the form of a term without names; with `loose`, without numbers but for the signs of factors."""
+    """Return the form of a term without names; with `loose`, also without numbers, except the signs of factors."""
     match expression:
         case Name():
             return "name"
@@ -240,7 +240,7 @@ def _formals(constraint: Constraint) -> dict[str, str | int]:
 
 
 def _with_constants(expression: Expression, formals: Mapping[str, str | int]) -> Expression:
-    """Return `expression` with the numbers that formal parameters stand for."""
+    """Return `expression` with numbers in place of the formal parameters that have one."""
     match expression:
         case Name(name):
             actual = formals[name]
@@ -252,7 +252,7 @@ def _with_constants(expression: Expression, formals: Mapping[str, str | int]) ->
 
 
 def _is_difference(constraint: Constraint) -> bool:
-    """Return whether `constraint` says that two variables differ: `all_different` is stated by such pairs."""
+    """Return whether `constraint` requires that two variables differ: `all_different` consists of such pairs."""
     definition = constraint.definition
     if not isinstance(definition, Predicate) or not isinstance(definition.body, Apply):
         return False
@@ -263,7 +263,7 @@ def _is_difference(constraint: Constraint) -> bool:
 def _is_choice(body: Expression) -> bool:
     """Return whether `body` is one of two numbers, by a condition that mentions all of its names.
 
-    What it costs is then bounded by the numbers, however many terms the condition has lost.
+    The cost is then bounded by the two numbers, however many terms the condition has lost.
     """
     while isinstance(body, Apply):
         open_arguments = [one for one in body.arguments if names(one)]
@@ -276,7 +276,7 @@ def _is_choice(body: Expression) -> bool:
 
 
 def broken(constraint: Constraint, scope: tuple[str, ...]) -> Constraint:
-    """Return a hard constraint of the same name over `scope`, one variable or none, that nothing satisfies."""
+    """Return a hard constraint of the same name over `scope`, one variable or none, that is never satisfied."""
     never = _NEVER if scope else _FALSE
     return replace(constraint, definition=never, scope=scope, parameters=scope, model=None, cost=INFINITE)
 

@@ -43,7 +43,7 @@ from robochoc.model.team_edits import (
 
 
 class ExcessiveChangeError(ChangeError):
-    """A change that brings numbers that are too large (`model/magnitudes.py`), whatever else is in the team."""
+    """A change with numbers that are too large (`model/magnitudes.py`) in any team."""
 
 
 def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
@@ -73,7 +73,7 @@ def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
 
 
 def _check_magnitudes(team: Team, change: Change) -> None:
-    """Raise `ExcessiveChangeError` where `change`, which `team` has taken, brings numbers that are too large."""
+    """Raise `ExcessiveChangeError` if `change`, already applied in `team`, has numbers that are too large."""
     match change:
         case AddAgent(robot):
             changed = list(team[robot.name].constraints())

@@ -212,8 +212,8 @@ class Constraint:
         line: The line of the file that it was read from.
         offset: What was taken out of each of its costs, so that none is negative (`model/costs.py`).
         when_absent: Its meaning when a robot is absent. None: as its form implies.
-        original: Of a constraint that was restated for the robots that stay: what it was before.
-        absent: Of the same: the variables of `original` whose robots are absent.
+        original: The original form of a constraint that was restated for the robots that stay.
+        absent: The variables of `original` whose robots are absent.
     """
 
     name: str

@@ -274,7 +274,7 @@ def _with_function(constraint: Constraint, function: Function, factor: int, doma
 def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...], domains: Domains) -> tuple[int, int]:
     """Return the least and the greatest cost of a function, or bounds of them."""
     names = constraint.variables
-    if len(names) > 1 and can_be_restated(constraint):  # for fewer robots it may cost what it does not cost for all
+    if len(names) > 1 and can_be_restated(constraint):  # its costs for fewer robots may differ
         low, high = bounds(body, defaultdict(lambda: ANY_INTEGER))
         return int(low), int(high)
     size = math.prod(len(domains[name]) if name in domains else MAX_TRIED + 1 for name in names)

@@ -1,9 +1,9 @@
 """Limits of the numbers that constraints compute, for all values of their variables.
 
-Expressions are evaluated within +-2**63 (`model/expression`); beyond that a constraint would be violated, and a cost
-would forbid, though the author wrote nothing of the kind. Costs have 18 digits at most, so that they stay within 64
-bits when they are counted in the team's unit and the least of them is taken out (`model/costs.py`). Interval arithmetic
-finds what may lie beyond; where there are few values, they are tried, and only a true excess counts.
+Expressions are evaluated within +-2**63 (`model/expression`); beyond that, a constraint would be violated and a cost
+would forbid, which the author did not intend. Costs have 18 digits at most, so that they stay within 64 bits when they
+are converted to the team's unit and normalised (`model/costs.py`). Interval arithmetic finds possible excesses; if
+there are few combinations of values, all are tried, and only actual excesses count.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from robochoc.system.errors import TransferableError
 MAX_COST = 10**18 - 1
 """The largest cost, in the team's unit."""
 MAX_TRIED = 4096
-"""The maximum number of combinations of values of which an excess is confirmed by trying them."""
+"""The maximum number of combinations of values that are tried to confirm an excess."""
 _MAX_DIGITS = 25
 
 
@@ -148,7 +148,7 @@ def _renamed(expression: Expression, actual: Mapping[str, Actual]) -> Expression
 
 
 def _in_digits(number: float) -> str:
-    """Return a number with its digits, or, where these are very many, its power of ten."""
+    """Return a number with all digits, or as a power of ten if there are very many."""
     if number in {math.inf, -math.inf}:
         return f"{'-' if number < 0 else ''}10^1000 and more"
     digits = str(number)

@@ -228,8 +228,8 @@ class Outcome:
         deadline: The seconds after which an answer was due, if the search was ended by the time and the answer is the
             best that was known by then.
         improvements: The answers that were published while the search went on, the first of them at the deadline.
-        dropped_constraints: The constraints between robots that were dropped as robots are absent, if there is an
-            assignment (`model/absence.py`). Across machines nobody knows them all, and none is listed.
+        dropped_constraints: The constraints between robots that were dropped because robots are absent, if there is an
+            assignment (`model/absence.py`). Across machines no robot knows all of them, and none is listed.
     """
 
     team: str
@@ -282,7 +282,7 @@ class Outcome:
 
     @property
     def is_complete(self) -> bool:
-        """Return whether all constraints of all robots are in force, as far as it is known."""
+        """Return whether all constraints of all robots are in force, as far as this is known."""
         return not self.dropped_constraints and not (self.checked is not None and self.withdrawn)
 
     @property

@@ -74,7 +74,7 @@ class Absence:
 
     Attributes:
         restated: Those that were restated for the robots that stay.
-        dropped: Those that were dropped, but for the private constraints of the absent robots.
+        dropped: Those that were dropped, except private constraints of the absent robots.
     """
 
     def __init__(self, team: Team, absent: Collection[str], *, with_files: bool = False) -> None:
@@ -96,7 +96,7 @@ class Absence:
                     self.dropped.append(DroppedConstraint(constraint.name, robots))
 
     def _add(self, constraint: Constraint, holder: Robot | None = None) -> bool:
-        """Add what is left of `constraint`. Return whether something is, that mentions the `holder` if one is given."""
+        """Add the rest of `constraint`. Return whether there is one, which mentions the `holder` if one is given."""
         left = restated(constraint, self._gone)
         if left is not None and holder is not None and left.when_absent != WhenAbsent.FAIL:
             left = left if any(variable.name in left.variables for variable in holder.variables) else None
@@ -119,7 +119,7 @@ def constraints_in_force(team: Team, absent: Collection[str]) -> list[Constraint
 
 
 def dropped_constraints(team: Team, absent: Collection[str]) -> tuple[DroppedConstraint, ...]:
-    """Return the constraints that are dropped as robots of their scopes have left `team`, or are in `absent`."""
+    """Return the constraints that are dropped because robots in their scopes have left `team` or are in `absent`."""
     before = (one for one in team.dropped if any(name not in team for name in one.robots))
     return (*before, *Absence(team, absent).dropped)
 
@@ -127,8 +127,8 @@ def dropped_constraints(team: Team, absent: Collection[str]) -> tuple[DroppedCon
 def with_constraint_held(team: Team, constraint: Constraint) -> Team:
     """Return `team` with `constraint`: held by the lowest robot of its scope, or private where it has one robot.
 
-    Robots of the scope that are not linked with the lowest one are linked. A constraint that no robot is left of is
-    private to the first robot.
+    Robots of the scope that are not linked with the lowest one are linked. A constraint without robots becomes private
+    to the first robot of the team.
     """
     owners = [name for name in team.order if name in {team.owner[name] for name in constraint.variables}]
     if len(owners) <= 1:

@@ -206,7 +206,7 @@ class _Builder:
 
     @property
     def rules(self) -> list[Rule]:
-        """The constraints that there are before the first event."""
+        """The constraints before the first event."""
         return [*self._model.constraints, *(part for robot in self._robots for part in robot.parts)]
 
     def shared_by(self, rule: Rule, order: Sequence[str]) -> set[tuple[str, str, str]]:

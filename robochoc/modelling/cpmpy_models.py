@@ -101,7 +101,7 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
 
 
 class _Robots:
-    """The robots of variables: of those of the model, and of further ones, which CPMpy's decompositions make.
+    """The robots of variables: those of the model, and further ones of CPMpy's decompositions.
 
     Args:
         owned: The robot of each variable of the model.
@@ -114,7 +114,7 @@ class _Robots:
         self._owner = ""
 
     def owner_of_further(self, variables: Sequence[Any]) -> None:
-        """Let further variables, from now on, belong to the robot of the first of `variables`."""
+        """Assign further variables, from now on, to the robot of the first of `variables`."""
         self._owner = self._owned[variables[0].name] if variables else next(iter(self._owned.values()))
 
     def add(self, variable: Any, posting: Posting) -> Expression:  # noqa: ANN401 - CPMpy's expressions
@@ -212,7 +212,7 @@ def _post(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - 
 
 
 def _post_as_such(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
-    """Post a table, tasks, or an element that is compared. Return whether it is one that can be posted as such."""
+    """Post a table, a cumulative or the comparison of an element directly. Return whether that is possible."""
     kind = getattr(constraint, "name", "")
     with translation.context() as conditions:
         match kind:

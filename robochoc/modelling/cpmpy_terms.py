@@ -1,4 +1,4 @@
-"""CPMpy's expressions as ours. CPMpy is looked at by the names of its operators, and never imported.
+"""CPMpy's expressions as ours. CPMpy's operators are recognised by name; CPMpy is never imported.
 
 A partial function (a quotient, an element of an array) has CPMpy's relational semantics: the nearest Boolean expression
 around it is false where it has no value. `Translation.boolean` attaches that condition, and nothing rewrites a CPMpy
@@ -118,7 +118,7 @@ class Translation:
         """Return `term` as a Boolean, which is false where an integer in it has no value.
 
         Raises:
-            MistakeError: for what has no counterpart.
+            MistakeError: for an expression without a counterpart.
         """
         with self.context() as conditions:
             found = self._unguarded(term)
@@ -141,7 +141,7 @@ class Translation:
             return every(self.booleans(self.decomposed(term)))
         if is_variable(term) or term.name in _INTEGERS or hasattr(term, "decompose"):
             return compare("ne", self.integer(term), Constant(0))
-        raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "write it otherwise")
+        raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "rewrite it with other operators")
 
     def booleans(self, terms: Iterable[Any]) -> list[Expression]:
         """Return all of `terms` as Booleans."""
@@ -184,7 +184,7 @@ class Translation:
         return bounds(expression, {name: Interval(min(one), max(one)) for name, one in ends.items()})
 
     def has_value_if(self, condition: Expression) -> None:
-        """Note a condition under which the expression in hand has a value."""
+        """Record a condition under which the current expression has a value."""
         if condition not in self._conditions:
             self._conditions.append(condition)
 
@@ -244,9 +244,9 @@ def _leaves(arguments: Any) -> Iterator[Any]:  # noqa: ANN401 - CPMpy's expressi
 
 
 def _guarded(conditions: Sequence[Expression], found: Expression) -> Expression:
-    """Return `found`, and false where a condition does not hold: then `found` is not looked at.
+    """Return `found`, or false where a condition does not hold: then `found` is not evaluated.
 
-    A condition may have a value only where those before it hold. Those that always have one are looked at together.
+    A condition may have a value only where those before it hold. Those that always have one are evaluated together.
     """
     if not conditions:
         return found

@@ -39,7 +39,7 @@ class Draft:
 
     Attributes:
         name: Its name.
-        scope: Its variables. Empty: it is true, false or has a cost whatever the values (`model/assembly.py`).
+        scope: Its variables. Empty: its truth or cost is constant (`model/assembly.py`).
         place: Where it was made.
         body: The expression of a condition or of a cost, over `X0`, `X1`, ... for the variables.
         rows: The rows of a table, where it is one.
@@ -90,7 +90,7 @@ class Draft:
 
 
 def conditions(term: Term, name: str, place: Place, *, in_pairs: bool = True) -> Iterator[Draft]:
-    """Yield what says that `term` holds: for a conjunction each of its parts, for `all_different` each pair.
+    """Yield drafts that require `term`: one for each part of a conjunction, and for each pair of `all_different`.
 
     Without `in_pairs`, `all_different` is one constraint.
     """
@@ -173,7 +173,7 @@ def _sum(group: Sequence[Part], name: str) -> Draft:
 
 
 def _check_digits(found: Mapping[Row, Price], term: Term, place: Place) -> None:
-    """Raise `ModelError` where a cost has more digits than files hold."""
+    """Raise `ModelError` where a cost has more digits than files allow."""
     for price in found.values():
         if price != math.inf and not -MAX_COST <= price <= MAX_COST:
             message = f"the cost {in_short(term)} reaches {shown(exact(price))}"

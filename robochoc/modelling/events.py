@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class Removal:
-    """The removal of one constraint, or of all that have a name, in a line of the user's."""
+    """The removal of one constraint, or of all with a name, and the line of the user's code."""
 
     def __init__(self, removed: Rule | str, place: Place) -> None:
         self.removed, self.place = removed, place
 
     @property
     def name(self) -> str:
-        """The name of what is removed."""
+        """The name of the removed constraints."""
         return self.removed if isinstance(self.removed, str) else self.removed.name
 
 
@@ -90,16 +90,16 @@ class Event:
         """Remove a constraint between robots.
 
         Args:
-            constraint: What `add` returned: this constraint is removed, and others of its name stay. Or a name: all
-                constraints between robots that have it are removed.
+            constraint: A result of `add`: only this constraint is removed. Or a name: all constraints between robots
+                with this name are removed.
 
         Raises:
             ModelError: if the model has no such constraint.
         """
         if not isinstance(constraint, (Rule, str)):
-            raise ModelTypeError(f"{constraint!r} is no constraint that was added", "give what add() returned")
+            raise ModelTypeError(f"{constraint!r} is not a constraint that was added", "use a result of add()")
         if isinstance(constraint, Rule) and not any(one is constraint for one in self._model.rules):
-            raise ModelError(f"{constraint!r} is not a constraint of {self._model!r}", "give what add() returned")
+            raise ModelError(f"{constraint!r} is not a constraint of {self._model!r}", "use a result of add()")
         self._add(Removal(constraint, here()))
 
     def _add(self, step: Step) -> None:

@@ -45,7 +45,7 @@ from robochoc.system.suggestions import did_you_mean
 
 
 class Model(Solvable):
-    """A problem that is made in Python: robots with variables, constraints, costs, and what changes over time."""
+    """A problem in Python: robots with variables, constraints, costs, and changes over time."""
 
     def __init__(self, name: str = "model") -> None:
         self._name = name
@@ -110,7 +110,7 @@ class Model(Solvable):
 
     @property
     def constraints(self) -> tuple[Rule, ...]:
-        """The constraints that were added and not removed, in order."""
+        """The constraints, without removed ones, in the order in which they were added."""
         return tuple(self._constraints)
 
     @property
@@ -143,7 +143,7 @@ class Model(Solvable):
         return self._robots[name]
 
     def add_variable(self, variable: Variable) -> None:
-        """Add a variable of a name that is free. See `ModelRobot.variable`."""
+        """Add a variable; its name must be free. See `ModelRobot.variable`."""
         self._variables[variable.name] = variable
         self.changed()
 
@@ -174,7 +174,7 @@ class Model(Solvable):
             The constraint, under one name.
 
         Raises:
-            ModelError: if they are no conditions over variables of this model, or cannot be restated.
+            ModelError: if one is not a condition over variables of this model, or cannot be restated.
         """
         rule = self.rule(constraints, cost, name, when_absent=when_absent)
         self._constraints.append(rule)
@@ -182,10 +182,10 @@ class Model(Solvable):
         return rule
 
     def remove(self, constraint: Rule) -> None:
-        """Remove a constraint: what `add`, or a robot's `knows`, returned. Others of its name stay.
+        """Remove a constraint, a result of `add` or of a robot's `knows`. Others of its name stay.
 
         Raises:
-            ModelError: if the model does not have it, or only an event adds it.
+            ModelError: if the model does not contain the constraint; one that an event adds does not count.
         """
         if any(one is constraint for one in self._constraints):
             self._constraints.remove(constraint)
@@ -195,7 +195,7 @@ class Model(Solvable):
             if any(one is constraint for one in robot.parts):
                 robot.remove_part(constraint)
                 return
-        raise ModelError(f"{constraint!r} is not a constraint of {self!r}", "give what add() returned")
+        raise ModelError(f"{constraint!r} is not a constraint of {self!r}", "use a result of add()")
 
     def __iadd__(self, constraints: object) -> Self:
         """Add constraints, as `add` does."""

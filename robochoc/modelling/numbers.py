@@ -86,7 +86,7 @@ def places_of(value: Exact, place: Place | None = None) -> int:
 
 
 def check_places(places: object) -> int | None:
-    """Return the number of decimal places to which costs are rounded; None: they are not. Raises `ModelError`."""
+    """Return the number of decimal places to which costs are rounded; None: costs are exact. Raises `ModelError`."""
     whole = whole_number(places)
     if places is not None and (whole is None or not 0 <= whole <= MAX_PLACES):
         raise ModelTypeError(f"places={places!r}", f"expected an integer from 0 to {MAX_PLACES}")
@@ -94,7 +94,7 @@ def check_places(places: object) -> int | None:
 
 
 def rounded(value: Exact, places: int | None) -> Exact:
-    """Return `value`, rounded to so many decimal places unless they are None; of two nearest numbers the even one."""
+    """Return `value`, rounded half to even to `places` decimal places unless these are None."""
     return value if places is None else _whole_if_possible(round(Fraction(value), places))
 
 

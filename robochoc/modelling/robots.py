@@ -43,22 +43,22 @@ class ModelRobot:
 
     @property
     def priority(self) -> float:
-        """Its priority: robots with a higher one come first; of equal ones, those that were made first."""
+        """The priority: robots with a higher priority come first, then those that were made earlier."""
         return self._priority
 
     @property
     def weight(self) -> int:
-        """How much its withdrawal counts."""
+        """The weight of its withdrawal."""
         return self._weight
 
     @property
     def variables(self) -> Mapping[str, Variable]:
-        """Its variables, by the names that they were given."""
+        """The variables, by their names in `variable`."""
         return MappingProxyType(self._variables)
 
     @property
     def parts(self) -> tuple[Rule, ...]:
-        """Its parts of constraints that it shares: what `knows` returned."""
+        """The robot's parts of shared constraints, the results of `knows`."""
         return tuple(self._parts)
 
     @property
@@ -77,7 +77,7 @@ class ModelRobot:
         self._model.changed()
 
     def add_variable(self, name: str, variable: Variable) -> None:
-        """Add a variable of a name that is free. See `variable`."""
+        """Add a variable; its name must be free. See `variable`."""
         self._variables[name] = variable
         self._model.add_variable(variable)
 

@@ -37,7 +37,7 @@ class Rule:
         return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {shown(self.cost)}'}>"
 
     def drafts(self) -> Iterator[Draft]:
-        """Yield what it becomes. Raises `ModelError` if it is to be restated for fewer robots and cannot be."""
+        """Yield the drafts of this rule. Raises `ModelError` if `restate` is not possible."""
         from robochoc.modelling.drafts import conditions, soft_condition  # noqa: PLC0415 - they need the formats
 
         if self.cost is None:
@@ -53,7 +53,7 @@ def conditions_in(given: object, place: Place) -> list[Term]:
     """Return the conditions that a user adds at once: one, or a list of them, which may hold lists.
 
     Raises:
-        ModelError: if one is no condition, or is Python's `False`, as `x is y` is.
+        ModelError: if one is not a condition, or is Python's `False`, as `x is y` is.
     """
     if isinstance(given, Iterable) and not isinstance(given, (Term, str)):
         return [term for one in given for term in conditions_in(one, place)]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class NamedValues(dict[str, object]):
-    """Values by the names of variables. A call gives the values alone: what other mappings call `values()`."""
+    """Values by the names of variables. A call returns only the values, like `values()` of other mappings."""
 
     def __call__(self) -> ValuesView[object]:
         """Return the values without names."""
@@ -50,8 +50,8 @@ class Solution(Outcome, Mapping[str, object]):
     It is a mapping from the names of variables to their values, and true if there is an assignment.
     `solution[variable]` is the value of a variable, of a term of variables, or of the variable of that name.
 
-    `assignment`, of the outcome, its `epochs` and its `optima`, holds the integers that robots compute with: codes of
-    symbols, multiples of a common unit of numbers. `values` holds the user's values.
+    `assignment` of the outcome, of its `epochs` and of its `optima` contains the integers that robots compute with:
+    codes of symbols, multiples of a common unit. `values` contains the user's values.
 
     Attributes:
         epochs: The epochs, if there were several, each with its `values`.
@@ -98,7 +98,7 @@ class Solution(Outcome, Mapping[str, object]):
     def __getitem__(self, what: Term | str) -> object:
         """Return the value of a variable or a term, or of the variable that is called so.
 
-        Variables of a copy of the model, such as one that another process has solved, count as those of this solution.
+        Variables of a copy of the model, such as one solved in another process, count as variables of this solution.
 
         Raises:
             UnknownNameError: if it has none: there is no solution, or its robot is withdrawn.

@@ -69,7 +69,7 @@ def _combinations(scope: Sequence[Variable], place: Place, term: Term) -> Iterat
     size = math.prod(len(variable.codes.ever) for variable in scope)
     if size > MAX_COMBINATIONS:
         raise ModelError(
-            f"{in_short(term)} has {size:,} combinations of values, and no file can say it but as a table",
+            f"{in_short(term)} has {size:,} combinations of values, and files can express it only as a table",
             f"{MAX_COMBINATIONS:,} are computed: split it, or write it with integers",
             place,
         )

@@ -234,7 +234,7 @@ class Linear(Term):
 
     @cached_property
     def parts(self) -> tuple[tuple[Exact, Term], ...]:
-        """The factor of each distinct term; a factor of 0 only with terms that may have no value, as the sum then."""
+        """The factor of each distinct term; 0 only for terms that may have no value, since then the sum has none."""
         merged: dict[Term, Exact] = {}
         for factor, term in self.pairs:
             merged[term] = merged.get(term, 0) + factor

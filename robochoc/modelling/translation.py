@@ -217,7 +217,7 @@ def _times(factor: int, expression: Expression) -> Expression:
 
 
 def _check_size(expression: Expression) -> None:
-    """Raise `UntranslatableError` if `expression` is too large for a file. Shared parts are looked at once."""
+    """Raise `UntranslatableError` if `expression` is too large for a file. Shared parts are visited once."""
     known: dict[int, tuple[int, int]] = {}
 
     def size(one: Expression) -> tuple[int, int]:

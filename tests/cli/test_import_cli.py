@@ -349,9 +349,9 @@ def test_validate_says_what_a_file_is(problem: Path) -> None:
     assert (told["valid"], told["format"]) == (True, "frodo")
     folder = robochoc_within("validate", problem.parent)
     assert folder.returncode == 1
-    assert f"is FRODO's XCSP 2.1, and no file of a robot (robochoc import {problem.parent} -o FOLDER)" in folder.stdout
+    assert f"is FRODO's XCSP 2.1, not a file of a robot (robochoc import {problem.parent} -o FOLDER)" in folder.stdout
     solved = robochoc_within("solve", problem.parent)
-    assert "is FRODO's XCSP 2.1, and no file of a robot" in solved.stderr
+    assert "is FRODO's XCSP 2.1, not a file of a robot" in solved.stderr
     problem.rename(problem.with_suffix(".xcsp"))
     hidden = robochoc_within("solve", problem.parent)
     assert f"'robochoc import {problem.parent} -o FOLDER' makes a team of it" in hidden.stderr

@@ -1,4 +1,4 @@
-"""Opening a file: the browser sends it, a process of its own reads it, and its mistakes are shown."""
+"""Opening a file: the browser uploads the file, a separate process reads it, and the page shows the errors."""
 
 from __future__ import annotations
 

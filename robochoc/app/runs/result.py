@@ -13,13 +13,13 @@ from robochoc.formats.result import MetricsForm, ResultForm
 
 
 class RunResult(ResultForm, frozen=True, kw_only=True):
-    """The answer of a team: all of the JSON result; what it may lack has a default.
+    """The JSON result of a team; fields that may be missing have defaults.
 
     Attributes:
         assignment: The values, by `ROBOT.DECISION`.
-        cost: What they cost, as a float where it is a decimal.
-        bound: No answer costs less, as a float where it is a decimal. None: not known.
-        epochs: One for each change of the problem, if there were some: objects as they are in the JSON result.
+        cost: The cost, as a float where it is a decimal.
+        bound: The lower bound of the cost, as a float where it is a decimal. None: not known.
+        epochs: The epochs, if the problem has changed, as objects of the JSON result.
     """
 
     team: str = ""

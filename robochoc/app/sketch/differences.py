@@ -103,7 +103,7 @@ class _Difference:
         self._added = [*_with_names(_beyond(then_links, [left for _, left in remaining]), taken)]
 
     def _remaining(self, link: Link) -> Link | None:
-        """Return what is left of a link when robots have left: a count is restated, all else is dropped."""
+        """Return a link without the robots that have left: a count is restated, any other link is dropped (None)."""
         if self._stay.issuperset(link.robots):
             return link
         rest = tuple(name for name in link.robots if name in self._stay)

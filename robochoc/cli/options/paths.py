@@ -131,7 +131,7 @@ def foreign_files_told(path: Path) -> list[str]:
 def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | None = None) -> list[Path]:
     """Return the folders of all teams at `paths` or below, each once.
 
-    With `foreign`, files of other tools are teams, too; with `dialect`, all files are in this one.
+    With `foreign`, files of other tools are teams, too; with `dialect`, all files have this format.
 
     Raises `Failure`, which names every path without a team: nothing is done by half.
     """

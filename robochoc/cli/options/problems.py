@@ -48,7 +48,7 @@ class Pattern(click.ParamType[str]):
 
 
 def format_option(command: _Command) -> _Command:
-    """Add `--format`, the dialect of files that are read."""
+    """Add `--format`, the format of the input files."""
     told = "Format of the files, as 'robochoc import --help' lists them."
     return click.option("--format", "dialect", type=click.Choice(READ), metavar="NAME", help=told)(command)
 

@@ -59,7 +59,7 @@ def recording(
         for failure in _failures(recorder):
             failure.show()
         if file:
-            with suppress(OSError):  # what has ended the run counts
+            with suppress(OSError):  # the error that ended the run matters more
                 file.close()
         raise
     else:

@@ -82,7 +82,7 @@ def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
 
 
 def _given_team(journal: Journal) -> Team | None:
-    """Return all robots that take part in a journal's run, as they were first; None if it does not say."""
+    """Return the team of a journal, with all robots in their first state; None if the journal does not contain it."""
     from robochoc.journal.events import Given
     from robochoc.journal.given import GivenProblemError, TeamReader
     from robochoc.model.problem import Team
@@ -103,7 +103,7 @@ def saved_team(
 ) -> tuple[Team | None, Path | None]:
     """Return the team of a saved outcome, and its folder. None if there is none.
 
-    It is the team in `folder`, or that which the journal has (`given`), or the one in the default folder of its name.
+    The team is read from `folder`; without one, it is that of the journal (`given`), or read from the default folder.
 
     Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
     """

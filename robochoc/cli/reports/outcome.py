@@ -24,7 +24,7 @@ WIDTH = 100
 _LARGE = 1 << 16
 """Bytes: messages from this size on are mentioned."""
 _MOST_DROPPED = 3
-"""The number of dropped constraints that are named."""
+"""The maximum number of dropped constraints in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 
@@ -54,7 +54,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
 
 
 def _dropped(outcome: Outcome) -> list[str]:
-    """Return a line on constraints that were dropped, as robots in them are absent; the first few by name."""
+    """Return a line that names the first constraints that were dropped because robots in them are absent."""
     dropped = outcome.dropped_constraints
     if not dropped:
         return []

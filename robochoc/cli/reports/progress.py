@@ -60,7 +60,7 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
 
 @contextmanager
 def elapsed_time(what: str, stage: str) -> Iterator[None]:
-    """Show, on a terminal, how long the work within has taken. For work that reports nothing, and forks nothing."""
+    """Show the elapsed time of the block on a terminal, for work that reports no progress and forks no process."""
     from robochoc.communication.run_result import Progress
 
     with progress_line(what) as show:

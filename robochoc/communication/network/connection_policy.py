@@ -35,7 +35,7 @@ class ConnectionPolicy:
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._admission = admission
-        # Robots give up after their patience: the router's end is to be noticed before.
+        # Robots give up after their patience: the end of the router must be detected earlier.
         self._router = Router(endpoint, identity, refused, lease_ms, scratch, patience_s / 2)
         self._ways = ways
         self.admitted: tuple[str, ...] = ()
@@ -95,7 +95,7 @@ class ConnectionPolicy:
 
     @property
     def failure(self) -> str:
-        """Return why the router no longer works; empty if it works."""
+        """Return why the router has failed; empty if it works."""
         return self._router.failure
 
     def close(self) -> None:

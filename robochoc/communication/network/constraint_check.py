@@ -53,5 +53,5 @@ def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str
 
 
 def _in_force(constraint: Constraint, values: Mapping[str, int]) -> Constraint | None:
-    """Return what is left of `constraint` when robots without values are absent; None: it is dropped."""
+    """Return `constraint` as restated when robots without values are absent; None: it is dropped."""
     return restated(constraint, {name for name in constraint.variables if name not in values})

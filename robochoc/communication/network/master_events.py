@@ -64,7 +64,7 @@ class MasterEvents:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
     def may_report_others(self, name: str) -> bool:
-        """Return whether `name` may report one more refusal or loss of others. That it reports too many is refused."""
+        """Return whether `name` may report another refusal or loss; record a refusal if it reports too many."""
         is_allowed = self._is_within_quota(name, 1, REPORTS_A_SECOND)
         if not is_allowed:
             self.refuse(name, "report others", f"more than {REPORTS_A_SECOND} times a second")

@@ -267,7 +267,7 @@ def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
         return max(others, key=rank.__getitem__, default=None)
 
     def kept(constraints: Iterable[Constraint]) -> Iterator[Constraint]:
-        """Yield what is left of `constraints` and mentions this robot."""
+        """Yield the remaining `constraints` that mention this robot."""
         for constraint in constraints:
             gone = {name for name in constraint.variables if name not in own and name not in owners}
             left = restated(constraint, gone)

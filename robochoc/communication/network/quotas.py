@@ -13,7 +13,7 @@ BURST_S = 60.0
 EVENTS_A_SECOND = 10_000
 """The events that a robot may report to the master, in the long run."""
 REPORTS_A_SECOND = 10
-"""The refusals and losses that a robot may report of others to the master, in the long run."""
+"""The rate at which a robot may report refusals and losses of other robots to the master."""
 NO_LIMIT = 1e15
 
 

@@ -30,7 +30,7 @@ _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _RESPONDING = b"responding\n"
 _CHECK_S = 0.5
-"""The interval at which the router's process is asked whether it still responds, in seconds."""
+"""The interval between checks that the router's process responds, in seconds."""
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
 """With allowed actions as well, the log has several lines for each frame, which cost more than the frames."""
@@ -135,7 +135,7 @@ class Router:
 
     @property
     def failure(self) -> str:
-        """Return why the router no longer works, although nobody has closed it; empty if it works."""
+        """Return why the router has failed; empty if it works or was closed."""
         if self._process is None or self._process.poll() is None:
             return ""
         return f"did not respond for {self._patience_s:g} s" if self._is_silent else "has ended"
@@ -143,13 +143,13 @@ class Router:
     def _watch(self, process: subprocess.Popen[bytes], questions: IO[bytes]) -> None:
         """Kill the process when it no longer responds.
 
-        Time counts in steps of `_CHECK_S`: if this process itself was stopped, the router may respond afterwards.
+        Time is counted in steps of `_CHECK_S`, so that the router can still respond if this process was stopped.
         """
         silent_s = 0.0
         while silent_s < self._patience_s:
             if silent_s == 0:
                 try:
-                    os.write(questions.fileno(), b"\n")  # unbuffered: `close` would write what is left
+                    os.write(questions.fileno(), b"\n")  # unbuffered: `close` would write buffered bytes
                 except (OSError, ValueError):  # it has ended
                     return
             if not self._response.wait(_CHECK_S):

@@ -1,8 +1,8 @@
 """The router's process: `python -m robochoc.communication.network.router_process`, started by `router.py`.
 
-It takes its configuration from standard input, says when it listens, answers each further line, and ends when standard
-input does, so never later than the master, whose scratch folder it removes then. Next to nothing is imported: whoever
-opens the router anew waits for it.
+It reads its configuration from standard input, reports when it listens, answers each further line, and ends at the end
+of standard input: with the master at the latest, whose scratch folder it then removes. It imports very little, because
+opening the router waits for its start.
 """
 
 from __future__ import annotations

@@ -150,14 +150,14 @@ def _global(record: PredicateRecord) -> GlobalPredicate:
     except MistakeError as bad:
         raise SharedConstraintError(f"{shortened(record.name)!r}: {bad.message}") from None
     if made.parameters != record.parameters:
-        raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
+        raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are invalid")
     return made
 
 
 def _in_intension(record: PredicateRecord | FunctionRecord) -> Predicate | Function:
     names = record.parameters
     if len(names) > MOST_TERMS or len(set(names)) < len(names):
-        raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
+        raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are invalid")
     if isinstance(record, PredicateRecord) and record.form:
         return _global(record)
     if isinstance(record, PredicateRecord):

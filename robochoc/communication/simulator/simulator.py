@@ -37,7 +37,7 @@ PROGRESS_EVERY = 256
 PROGRESS_S = 0.25
 """Seconds after which there is one in any case: some packets are much work."""
 LONGEST_STEP_S = 0.3
-"""A step that goes on for so many seconds after the time is over is broken off."""
+"""A step is interrupted if it continues for this many seconds after the time limit."""
 
 
 @dataclass(frozen=True)

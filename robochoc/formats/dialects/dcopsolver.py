@@ -1,4 +1,4 @@
-"""DCOPSolver's part of XDisCSP 1.0, which other readers of XDisCSP read, too.
+"""The part of XDisCSP 1.0 that DCOPSolver reads; other readers of XDisCSP read it, too.
 
 Its parser (czy920/DCOPSolverOld) reads one variable an agent, domains from 1 to n, and one relation of two variables
 for each pair of neighbours, in which each tuple has an integer cost. It has no infinity, and its protocols require a
@@ -28,7 +28,7 @@ from robochoc.solver.encoding import UnsupportedError
 NAME = "dcopsolver"
 TITLE = "DCOPSolver's XDisCSP"
 LIMIT = 2**31 - 1
-"""The integer that DCOPSolver takes for infinity."""
+"""The integer that counts as infinity in DCOPSolver."""
 
 _PAIR = 2
 _Pair = tuple[str, str]
@@ -38,13 +38,13 @@ def _write(team: Team, options: ExportOptions) -> Written:
     """Return the file.
 
     Raises:
-        UnsupportedError: if the team has what DCOPSolver has not.
+        UnsupportedError: if DCOPSolver does not support a part of the team.
     """
     del options
     _check(team)
     tables, constant = exported(team)
     if any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in {constant, *amounts(tables)}):
-        raise UnsupportedError(f"{TITLE} has integer costs of 0 or more; --format frodo and pydcop have others")
+        raise UnsupportedError(f"{TITLE} requires integer costs of 0 or more; --format frodo and pydcop allow others")
     bound = magnitude(tables, constant)
     by_pair = _by_pair(team, tables)
     if bound * len(by_pair) >= LIMIT:
@@ -57,12 +57,14 @@ def _write(team: Team, options: ExportOptions) -> Written:
 
 def _check(team: Team) -> None:
     if team.dynamic:
-        raise UnsupportedError(f"{TITLE} has no problems that change over time: leave scenario.xml out")
+        raise UnsupportedError(f"{TITLE} does not support problems that change over time: leave scenario.xml out")
     if maximises(team):
-        raise UnsupportedError(f"{TITLE} has no utilities: costs are minimised")
+        raise UnsupportedError(f"{TITLE} does not support utilities: costs are minimised")
     for robot in team.robots:
         if len(robot.variables) > 1:
-            raise UnsupportedError(f"{TITLE} has one variable an agent, and {robot.name} has {len(robot.variables)}")
+            raise UnsupportedError(
+                f"{TITLE} allows one variable for each agent, but {robot.name} has {len(robot.variables)}"
+            )
     if len(team.variables) < _PAIR:
         raise UnsupportedError(f"{TITLE} requires two agents or more")
 
@@ -75,7 +77,7 @@ def _by_pair(team: Team, tables: list[Exported]) -> dict[_Pair, list[Exported]]:
     for one in tables:
         if len(one.scope) > _PAIR:
             what = f"the constraint {one.name} has {len(one.scope)} variables"
-            raise UnsupportedError(f"{TITLE} has constraints of two variables, and {what}")
+            raise UnsupportedError(f"{TITLE} allows constraints of two variables only, but {what}")
         if len(one.scope) == _PAIR:
             first, second = sorted(one.scope, key=place.__getitem__)
             pairs[first, second].append(one)
@@ -172,11 +174,13 @@ def _notes(team: Team) -> Iterator[Note]:
         text = f"the values of {len(renamed)} variables are numbered from 1 on; comments in the file name them"
         yield Note("values", text)
     if any(one.private_part for one in held(team)):
-        yield Note("known to more", "both agents of a constraint know it: DCOPSolver has no partially known (PKC) ones")
+        yield Note(
+            "known to more", "both agents of a constraint know it: DCOPSolver does not support partial knowledge (PKC)"
+        )
 
 
 def _recognises(path: Path, beginning: bytes) -> bool:
-    """Return False: such a file is recognised as XDisCSP."""
+    """Return False, since such a file is recognised as XDisCSP."""
     del path, beginning
     return False
 

@@ -82,8 +82,8 @@ class Written(NamedTuple):
     """A team in the format of another tool.
 
     Attributes:
-        files: The contents of the files by their names, the problem first.
-        notes: What the files say otherwise than the team, or what the other tool has to be told.
+        files: The contents of the files by name, beginning with the problem.
+        notes: Differences between the files and the team, and options that the other tool needs.
     """
 
     files: Mapping[str, bytes]

@@ -25,11 +25,11 @@ from robochoc.model.problem import Robot, Team
 from robochoc.solver.encoding import UnsupportedError
 
 CONSTANT = "constant"
-"""The name of a constraint that stands for the constant cost."""
+"""The name of a constraint for the constant cost."""
 
 
 class Held(NamedTuple):
-    """A constraint, the robot in whose file it stands, and whether only this robot knows it."""
+    """A constraint, the robot that holds it, and whether only this robot knows it."""
 
     constraint: Constraint
     robot: Robot
@@ -106,7 +106,7 @@ def exported(team: Team) -> tuple[list[Exported], Fraction]:
 
 
 def free_name(name: str, taken: set[str]) -> str:
-    """Return `name`, with a number where it is in `taken`, and add it to these."""
+    """Return `name`, with a number appended if it is in `taken`, and add the result to `taken`."""
     free, number = name, 1
     while free in taken:
         number += 1

@@ -12,7 +12,7 @@ _SECTIONS = {"robots", "tasks"}
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
-    """Return whether a file is called YAML or JSON, and has robots and tasks; of a long list, robots alone."""
+    """Return whether a YAML or JSON file begins with robots and tasks; in a long file, robots are enough."""
     if path.suffix.lower() not in (".yaml", ".yml", ".json"):
         return False
     found = sections(beginning.decode("utf-8", "replace").lstrip("\ufeff"))

@@ -37,16 +37,16 @@ _MERGE = _CORE + "merge"
 Read = TypeVar("Read")
 _NOTHING_ASKED: frozenset[Scalar] = frozenset()
 _ALIKE = 0.75
-"""Keys that are more alike than this are taken for the same word, misspelt."""
+"""Keys with a higher similarity count as the same word, misspelt."""
 _Path = tuple["_Path", str | int] | None
-"""The way from the root to a value: the way to what holds it, and its key or number there."""
+"""The path from the root to a value: the path to its parent, and its key or number there."""
 
 
 class Node:
     """A value of the file, and a record of its parts that a reader has used.
 
-    A reader gets at the parts by `scalar`, `items`, `get` and `named` alone. Each marks what it returns as read, and
-    `read_yaml` refuses a file of which any part was not read. `skip` marks everything below as left out on purpose.
+    Readers have access to the parts only by `scalar`, `items`, `get` and `named`. Each marks its results as read, and
+    `read_yaml` refuses a file with a part that was not read. `skip` marks everything below as left out on purpose.
 
     Attributes:
         line: The line of its beginning, from 1 on.
@@ -135,7 +135,7 @@ class Node:
             hint: What to write.
 
         Raises:
-            MistakeError: It is not there. A key that may be a misspelling of it is named.
+            MistakeError: if the key is missing. The message names a key that may be a misspelling.
         """
         found = self.get(key)
         if found is not None:
@@ -158,10 +158,10 @@ class Node:
         return self._is_read and self.is_scalar
 
     def unread(self, path: _Path) -> Iterator[MistakeError | tuple[Node, _Path]]:
-        """Yield a mistake for each part that no reader has used, and the other parts, which are to be looked through.
+        """Yield an error for each part that no reader has used, and the other parts, which are still to be checked.
 
         Args:
-            path: The way to this value.
+            path: The path to this value.
         """
         if self._is_skipped:
             return
@@ -175,7 +175,7 @@ class Node:
                 if key in self._asked:
                     if not one.is_done:
                         yield one, (path, shown(key))
-                elif not one.is_named:  # a part that aliases elsewhere in the file repeat needs no reader here
+                elif not one.is_named:  # a part that is repeated by an alias need not be read here
                     yield self._unknown(key, path)
 
     def _unused(self, path: _Path) -> MistakeError:
@@ -222,22 +222,22 @@ def _written(path: _Path) -> str:
 
 _PROBLEM = "a problem has a name, an objective, domains, variables and constraints"
 Repeated = Callable[[int, str], None]
-"""What is done with the line and the name of a key that stands twice in one mapping; the later one counts."""
+"""A function that handles a duplicate key: it gets the line and the key. The later value counts."""
 
 
 def read_yaml(
     text: str, read: Callable[[Node], Read], expected: str = _PROBLEM, repeated: Repeated | None = None
 ) -> Read:
-    """Return what `read` makes of the one document in `text`.
+    """Return the result of `read` for the single document in `text`.
 
     Args:
         text: The file.
-        read: Reads its root, and by that all parts of it.
+        read: Reads the root, with all parts.
         expected: The usual content of such a file.
-        repeated: Called for each key that stands twice. None: such keys are refused.
+        repeated: Called for each duplicate key. None: duplicate keys are refused.
 
     Raises:
-        MistakeError: It is empty, is not such YAML, or has a part that `read` did not use. It has the line.
+        MistakeError: if the text is empty, is not valid YAML, or has a part that `read` did not use; with the line.
     """
     root = _tree(text, expected, repeated or _refuse_repeated)
     found = read(root)
@@ -278,12 +278,12 @@ def root_keys(text: str) -> set[str]:
             if depth > MAX_DEPTH:
                 break
     except (yaml.YAMLError, ValueError):
-        pass  # whoever reads the whole file reports it
+        pass  # reported when the whole file is read
     return keys
 
 
 def _refuse_repeated(line: int, key: str) -> None:
-    raise MistakeError(f"'{shortened(key)}' stands twice", "delete one, or name it otherwise", line)
+    raise MistakeError(f"'{shortened(key)}' stands twice", "delete or rename one of them", line)
 
 
 def _tree(text: str, expected: str, repeated: Repeated) -> Node:

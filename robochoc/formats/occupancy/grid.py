@@ -132,7 +132,7 @@ class _Description:
 
     def __init__(self, root: Node) -> None:
         if not root.is_mapping:
-            raise MistakeError("is no map", f"expected the keys {', '.join(_KEYS)}", root.line)
+            raise MistakeError("is not a map", f"expected the keys {', '.join(_KEYS)}", root.line)
         self._entries = {key: root.needed(key, "the map", _EXPECTED) for key in _KEYS}
         self._given_mode = root.get("mode")
         self.image = self._image()

@@ -79,7 +79,7 @@ def _plain(content: bytes, place: int, count: int, white: int) -> Pixels:
 
 def _refuse_more(content: bytes, count: int) -> None:
     if content.strip():
-        raise MistakeError(f"goes on after its {count} pixels", "one image is a file; check its width and height")
+        raise MistakeError(f"has data after its {count} pixels", "one file has one image: check the width and height")
 
 
 def _number(word: bytes, what: str, least: int, most: int) -> int:

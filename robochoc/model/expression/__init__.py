@@ -1,9 +1,9 @@
 """Functional expressions: what a predicate says, as a tree (docs/reference/format.md; Figure 2).
 
 The vocabulary is XCSP 2.1's. A text is parsed by hand and type-checked, never handed to `eval`; what is computed
-stays within 64 bits, so that no expression can eat the machine; `model/magnitudes.py` refuses teams in which it would
-not. `evaluate` walks the tree and `compile_expression` builds closures: two independent implementations of the same
-meaning, and the tests hold them against each other.
+stays within 64 bits, so that no expression can use up the machine's memory; `model/magnitudes.py` refuses teams whose
+expressions may exceed that. `evaluate` walks the tree and `compile_expression` builds closures: two independent
+implementations of the same meaning, which the tests compare with each other.
 
 All arguments of an operator are evaluated, whatever the others are; only `if` chooses. Booleans are 0 and 1.
 """

@@ -119,7 +119,7 @@ def _square(part: Interval) -> Interval:
 
 def _power(base: Interval, exponent: Interval) -> Interval:
     low, high = _raised(base, exponent)
-    return Interval(max(low, -BOUND), min(high, BOUND))  # what lies beyond is undefined
+    return Interval(max(low, -BOUND), min(high, BOUND))  # results beyond are undefined
 
 
 def _raised(base: Interval, exponent: Interval) -> Interval:

@@ -90,7 +90,7 @@ class Hosting:
 
 
 def agent_names(node: Node | None) -> list[str]:
-    """Return the agents that `node` lists, or maps to their attributes, which concern pyDCOP's distribution alone."""
+    """Return the agents in `node`: a list, or a mapping to attributes that only concern pyDCOP's distribution."""
     if node is None or node.is_empty:
         return []
     if not node.is_mapping:

@@ -40,7 +40,8 @@ MAX_DEPTH = 300
 MAX_STEPS = 5_000_000
 """The maximum number of steps of a function, for all arguments together.
 
-Passes of loops count, longer bodies more, and so do the members of all lists and texts that an operation looks at.
+Each pass of a loop counts, depending on the length of its body, and so does each member of a list or text that an
+operation reads.
 """
 _NODES_A_STEP = 10
 """The number of operators and terms of a loop's body that are done in one step."""
@@ -383,7 +384,7 @@ class _Compiler:
 
 
 def _steps_of(body: Sequence[ast.AST]) -> int:
-    """Return the number of steps that a loop's body takes, what loops within it take apart."""
+    """Return the number of steps of a loop's body, without those of loops within it."""
     return 1 + sum(isinstance(node, ast.expr | ast.stmt) for node in _nodes(body)) // _NODES_A_STEP
 
 

@@ -43,7 +43,7 @@ class _Sized:
     nesting: int
 
     def _measure(self, members: Iterable[Value]) -> None:
-        """Raises `NoValueError` if it is too large."""
+        """Set the size. Raises `NoValueError` if it is too large."""
         size = nesting = 0
         for member in members:
             size += max(1, size_of(member))
@@ -72,7 +72,7 @@ class Entries(dict["Value", "Value"], _Sized):
 
 
 def size_of(value: Value) -> int:
-    """Return the number of steps that one operation on `value` counts: 0 for what has no members."""
+    """Return the number of steps for one operation on `value`: 0 for a value without members."""
     if isinstance(value, (Items, Entries)):
         return value.size
     return len(value) if isinstance(value, str) else 0

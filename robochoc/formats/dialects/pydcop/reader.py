@@ -36,9 +36,9 @@ from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.problem import ProblemKind, ScenarioEvent, Team
 
 _REMARKS = ("description", "inputs")
-"""Sections for people, and of the programs that wrote the file."""
+"""Sections with remarks for people, or about the programs that wrote the file."""
 _WISHES = ("host_with", "may_host")
-"""Hints on distribution that decide nothing about owners."""
+"""Distribution hints that do not affect owners."""
 _OF_DISTRIBUTE = ("inputs", "status", "cost", "duration", "communication_cost", "hosting_cost")
 _OBJECTIVE = "write objective: min, or objective: max"
 _DROPPED = {
@@ -330,7 +330,7 @@ def _leave_out(node: Node, part: str, name: str, found: Mapping[str, list[str]])
 
 
 def _distribute(root: Node, hosting: Hosting) -> None:
-    """Read a distribution; what pyDCOP's `distribute` tells of itself there is left out."""
+    """Read a distribution; leave out the remarks that pyDCOP's `distribute` adds."""
     for key in _OF_DISTRIBUTE:
         if told := root.get(key):
             told.skip()
@@ -338,7 +338,7 @@ def _distribute(root: Node, hosting: Hosting) -> None:
 
 
 def _pass_over(_line: int, _key: str) -> None:
-    """Let the later of two equal keys count, as pyDCOP does."""
+    """Use the later of two equal keys, as pyDCOP does."""
 
 
 @contextmanager

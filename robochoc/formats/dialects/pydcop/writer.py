@@ -30,9 +30,9 @@ from robochoc.model.problem import RemoveAgent, Team
 from robochoc.solver.encoding import UnsupportedError
 
 CAPACITY = 1000
-"""The capacity of an agent for each variable, constraint and value: no algorithm of pyDCOP needs as much."""
+"""The capacity of an agent for each variable, constraint and value: more than any algorithm of pyDCOP needs."""
 LIMIT = 2**31 - 1
-"""The cost that DPOP of pyDCOP takes for the worst of all."""
+"""The cost that counts as the worst in pyDCOP's DPOP."""
 LEAST_INFINITY = 10_000
 """What forbids costs at least so much: pyDCOP's own convention."""
 
@@ -62,9 +62,9 @@ def _problem(team: Team) -> Iterator[str]:
     most, forbids = magnitude(tables, constant), INFINITE in amounts(tables)
     infinity = max(LEAST_INFINITY, 10 * most)
     if (infinity if forbids else most) >= LIMIT:
-        more = ", and what forbids costs ten times more" if forbids else ""
-        what = f"costs add up to as much as {most - 1:,}{more}"
-        raise UnsupportedError(f"{what}: pyDCOP's costs end at {LIMIT:,}; write smaller costs")
+        more = ", and forbidden tuples cost ten times as much" if forbids else ""
+        what = f"costs may add up to {most - 1:,}{more}"
+        raise UnsupportedError(f"{what}: pyDCOP's costs end at {LIMIT:,}; use smaller costs")
     yield f"name: {_quoted(team.name)}"
     yield f"objective: {'max' if maximize else 'min'}"
     if forbids:

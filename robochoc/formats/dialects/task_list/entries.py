@@ -221,7 +221,7 @@ def read_synergies(node: Node | None, tasks: Collection[str], mistakes: Diagnost
 
 @contextmanager
 def _noted(entry: Node, mistakes: DiagnosticCollector) -> Iterator[None]:
-    """Note a mistake in an entry, and leave out the rest of the entry."""
+    """Report an error in an entry, and skip the rest of the entry."""
     with mistakes.at(entry.line):
         try:
             yield

@@ -59,7 +59,7 @@ class _CfnReader:
         self._open("the functions")
         while not _closes(word := self._in.word("a function, or '}'")):
             self._read_function(word)
-        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2's own files may lack the last one
+        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 may omit it
             self._in.refuse(f"'{shortened(last)}' where the problem should end", "write } or ]")
         for place, wanted in self._shared:
             self._functions[place] = self._sharing(self._functions[place], wanted)

@@ -14,7 +14,7 @@ from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError
 
 LIMIT = 2**53
-"""The end of costs in their unit: toulbar2 1.1 reads those of a cfn as floating-point numbers."""
+"""The limit of costs in their unit: toulbar2 1.1 reads costs in a cfn as floating-point numbers."""
 
 
 class _Network(NamedTuple):
@@ -43,8 +43,8 @@ def wcsp(team: Team, options: ExportOptions) -> Written:
     """Return the `.wcsp` of `team`, without any names.
 
     Raises:
-        UnsupportedError: if a cost is negative or no integer, costs are maximised, costs or a constraint's table are
-            too large, or the team changes over time.
+        UnsupportedError: if a cost is negative or not an integer, costs are maximised, costs or the table of a
+            constraint are too large, or the team changes over time.
     """
     del options
     network = _network(team)
@@ -61,8 +61,8 @@ def _network(team: Team) -> _Network:
     places, bound = Scale([constant, *amounts(tables)]).places, magnitude(tables, constant)
     if bound * 10**places >= LIMIT:
         unit = f" in units of {decimal(Fraction(1, 10**places))}" if places else ""
-        what = f"costs add up to as much as {bound * 10**places:,}{unit}"
-        raise UnsupportedError(f"{what}: toulbar2 1.1 reads less than {LIMIT:,} exactly; write smaller costs")
+        what = f"costs may add up to {bound * 10**places:,}{unit}"
+        raise UnsupportedError(f"{what}: toulbar2 1.1 reads only costs below {LIMIT:,} exactly; use smaller costs")
     return _Network(tables, constant, places, bound)
 
 

@@ -2,7 +2,7 @@
 
 As it is shipped, FRODO ignores constraints in intension (only its JaCoP parser reads them) and has costs of 32 bits.
 So constraints become relations, and decimal costs integers of a smaller unit, which the file names. FRODO's default
-parser passes over a constraint's `agent`, or lets that agent alone pay for it, so the attribute is not written.
+parser ignores the `agent` of a constraint, or charges only that agent, so the attribute is not written.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FORMAT = "XCSP 2.1_FRODO"
 TITLE = "FRODO's XCSP 2.1"
 KEEPS_FORMULAS = "--intension keeps predicates and functions, for FRODO's JaCoP parser"
 LIMIT = 2**31 - 1
-"""The integer that FRODO's 32 bits take for infinity."""
+"""The integer that counts as infinity in FRODO's 32 bits."""
 
 _TERM = r"(?:X\d+|-?\d+)"
 _FORMS = {
@@ -91,7 +91,7 @@ class _Writer:
         return document.content()
 
     def notes(self) -> Iterator[Note]:
-        """Yield what differs from the team."""
+        """Yield the differences from the team."""
         if self._places:
             yield Note("scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits")
         if any(one.private_part for one in self._flat.held):
@@ -108,8 +108,8 @@ class _Writer:
     def _check_sizes(self, most: int) -> None:
         if most >= LIMIT:
             unit = f" in units of {self._unit}" if self._places else ""
-            what = f"costs add up to as much as {most:,}{unit}"
-            raise UnsupportedError(f"{TITLE}: {what}, and FRODO's integers end at {LIMIT:,}: write smaller costs")
+            what = f"costs may add up to {most:,}{unit}"
+            raise UnsupportedError(f"{TITLE}: {what}, but FRODO's integers end at {LIMIT:,}: use smaller costs")
         for name, variable in self._flat.team.variables.items():
             far = max(variable.domain, key=abs)
             if abs(far) >= LIMIT:

@@ -13,7 +13,7 @@ from robochoc.formats.dialects.dialect import Note
 from robochoc.model.constraint import Function, Predicate
 
 UNIT = "unit of costs"
-"""The name of the `stats` element of a presentation that tells how much a cost of 1 is, such as 0.01."""
+"""The name of the `stats` element of a presentation with the value of a cost of 1, such as 0.01."""
 
 Price = Decimal | float
 """A cost: exact, or `INFINITE` for what is forbidden."""

@@ -59,7 +59,7 @@ def _range(word: str) -> range:
 
 
 def finite_cost(word: str, places: int = 0) -> Decimal:
-    """Return the cost that `word` is in units of 10 to the power of minus `places`. Raises `MistakeError`."""
+    """Return the cost in `word`, in units of 10 to the power of minus `places`. Raises `MistakeError`."""
     if not _COST.fullmatch(word):
         raise MistakeError(f"'{shortened(word)}' is no cost", "a number, 'infinity' or '-infinity'")
     cost = Decimal(word).scaleb(-places).normalize()
@@ -74,7 +74,7 @@ def finite_cost(word: str, places: int = 0) -> Decimal:
 
 
 class CostReader:
-    """Reads costs: what is infinite, or as large as `infinity` or the file's `bound` says, forbids.
+    """Reads costs. A cost that is infinite, or reaches `infinity` or the file's `bound`, forbids.
 
     A finite cost is a number of units of 10 to the power of minus `places`.
     """

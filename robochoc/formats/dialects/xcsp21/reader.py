@@ -1,4 +1,4 @@
-"""From an XML file of XCSP 2.1 with agents to an `Instance`. Counts that it states are not compared with its contents.
+"""Read an XML file of XCSP 2.1 with agents. Counts that the file states are not compared with its contents.
 
 The file is read through views of its elements: a part that is not read here is an error.
 """
@@ -42,7 +42,7 @@ _DESCRIPTIONS = (
     "maxConstraintArity", "minViolatedConstraints", "nbSolutions", "solution", "format", "benchmark", "model",
     "description",
 )  # fmt: skip
-"""Attributes of the presentation that say nothing of the problem."""
+"""Attributes of the presentation that do not concern the problem."""
 
 
 def read_instance(path: Path, options: ImportOptions, knower: Knower) -> Instance:

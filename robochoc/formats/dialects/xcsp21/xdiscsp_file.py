@@ -102,7 +102,7 @@ class _Writer:
             return False
         if len(scope) != 2:  # noqa: PLR2004 - a cost for each of two variables
             what = f"the partially known constraint {one.constraint.name} has {len(scope)} variables"
-            raise UnsupportedError(f"{FORMAT} has asymmetric costs of two variables, and {what}")
+            raise UnsupportedError(f"{FORMAT} allows asymmetric costs of two variables only, but {what}")
         return True
 
     def _add_sides(self) -> None:
@@ -129,7 +129,7 @@ class _Writer:
 
     def _cost(self, cost: Amount, name: str) -> str:
         if cost < 0 or (cost != INFINITE and Fraction(cost) % 1):
-            raise UnsupportedError(f"{FORMAT} has integer costs of 0 or more, and {name} has {cost_text(cost)}")
+            raise UnsupportedError(f"{FORMAT} requires integer costs of 0 or more, but {name} has {cost_text(cost)}")
         return cost_text(cost)
 
 

@@ -1,6 +1,6 @@
-"""The document of an XCSP3 instance: how it is recognised, and attributes that say nothing about the problem.
+"""The document of an XCSP3 instance: its root element, and attributes that do not concern the problem.
 
-pycsp3 has a parser of its own. docs/explanation/design.md says why it is not used here.
+docs/explanation/design.md explains why pycsp3's parser is not used here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def check_root(root: ElementView) -> None:
 
 
 def ignore_remarks(view: ElementView) -> None:
-    """Count the attributes of an element as read that are remarks for readers and other programs."""
+    """Ignore attributes that are remarks for readers and other programs."""
     view.ignore_attributes("id", "class", "note")
 
 

@@ -31,9 +31,9 @@ from robochoc.formats.dialects.xcsp3.variables import lists, values_of
 from robochoc.model.expression import Apply, Constant, Expression, Name
 
 Vector = tuple[Expression, ...]
-"""Members of lists that are compared as a whole."""
+"""The members of a list, compared as a whole."""
 Row = tuple[int, ...]
-"""Values of as many variables."""
+"""Values of a vector of the same length."""
 ORDERS = ("lt", "le", "ge", "gt")
 
 
@@ -354,12 +354,12 @@ def excepted(element: Element, groups: Sequence[Sequence[Vector]]) -> list[Row]:
 
 
 def same(one: Vector, other: Vector) -> Expression:
-    """Return that two rows have the same values."""
+    """Return the expression that two rows have the same values."""
     return every([compare("eq", *pair) for pair in zip(one, other, strict=True)])
 
 
 def differ(one: Vector, other: Vector) -> Expression:
-    """Return that two rows have different values."""
+    """Return the expression that two rows have different values."""
     return some([compare("ne", *pair) for pair in zip(one, other, strict=True)])
 
 
@@ -394,7 +394,7 @@ def _products(factors: Sequence[Expression], members: Sequence[Expression], what
 
 
 def _is_one_of(member: Vector, rows: Sequence[Row]) -> list[Expression]:
-    """Return that `member` is one of `rows`, as a list of cases."""
+    """Return the cases in which `member` is one of `rows`, one expression for each."""
     if len(member) == 1:
         return [inside(member[0], [value for (value,) in rows])] if rows else []
     return [same(member, tuple(map(Constant, row))) for row in rows]

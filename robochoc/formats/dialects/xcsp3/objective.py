@@ -17,7 +17,7 @@ MAX_TOGETHER = 10_000
 """The extremum, or the number of values, of a list with more combinations of values gets auxiliary variables."""
 
 _BOUND = "the bound that the objective minimises or maximises"
-_USED = "whether a value is used, of which the objective minimises the number"
+_USED = "whether a value is used; the objective minimises the number of used values"
 _NEW = "whether a variable has a value that no variable before it has; the objective maximises their number"
 
 
@@ -79,7 +79,7 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
 def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximize: bool) -> Expression:
     """Return the number of different values of `members`; of many, as a sum of auxiliary variables.
 
-    In the best solution the sum is that number, otherwise no better.
+    In an optimal solution the sum equals that number; in other solutions the sum is no better.
     """
     if posting.size({name for member in members for name in names(member)}) <= MAX_TOGETHER:
         return distinct(members)
@@ -108,9 +108,9 @@ def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximi
 
 
 def split(expression: Expression) -> list[Expression]:
-    """Return terms whose sum is `expression`, one for each set of variables that stand together in its terms.
+    """Return terms whose sum is `expression`, one for each set of variables of its terms.
 
-    The terms without variables are one of them, and the last.
+    The last one is the sum of the terms without variables.
     """
     by_scope: dict[frozenset[str], list[Expression]] = {}
     for factor, term in _terms(as_integer(expression), 1):

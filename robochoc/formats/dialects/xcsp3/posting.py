@@ -57,7 +57,7 @@ Item = Expression
 
 
 class Auxiliary(NamedTuple):
-    """A variable that is not in the instance: its values, its use, and the variable whose robot has it, if any."""
+    """A variable that is not in the instance: its values, its purpose, and the variable whose robot owns it, if any."""
 
     values: tuple[int, ...]
     purpose: str
@@ -164,10 +164,10 @@ class Posting:
         """Return a new auxiliary variable.
 
         Args:
-            name: A name for the variable, to be extended where it is not free.
+            name: The name of the variable; a suffix is added if it is not free.
             values: The values of the variable.
-            purpose: The use of the variable, for users.
-            beside: The variable, by our name, whose robot gets the new one. None: a robot of its own does.
+            purpose: The purpose of the variable, for messages.
+            beside: The variable, by our name, whose robot owns the new one. None: the new variable gets its own robot.
 
         Raises:
             MistakeError: if there are too many values or variables.
@@ -300,7 +300,7 @@ class Posting:
 
 
 def _constant(expression: Expression) -> int | None:
-    """Return the value of an expression without variables; None: it has none. Raises `MistakeError` beyond 64 bits."""
+    """Return the value of an expression without variables, if it has one. Raises `MistakeError` beyond 64 bits."""
     try:
         return evaluate(expression, {})
     except ExcessiveValueError:

@@ -1,4 +1,4 @@
-"""The constraint kinds of XCSP3-core that are tables, or become such: extension, element, regular, mdd."""
+"""The constraint kinds of XCSP3-core that become tables: extension, element, regular, mdd."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _cells(text: str, scope: Sequence[Item]) -> Iterator[list[str]]:
 
 
 def _squeezed(text: str) -> str:
-    """Return `text` without blanks around commas and parentheses. Others are mistakes."""
+    """Return `text` without blanks around commas and parentheses. Raises `MistakeError` for other blanks."""
     return re.sub(r"\s*([(),])\s*", r"\1", text)
 
 

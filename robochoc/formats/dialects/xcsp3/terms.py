@@ -301,7 +301,7 @@ def _applied(operator: str, arguments: list[Expression]) -> Expression:
 
 
 _MANY = 10**9
-"""More arguments than any operator can have in a file."""
+"""A number of arguments that no operator in a file can reach."""
 
 
 def _plain(operator: str) -> Callable[[list[Expression]], Expression]:

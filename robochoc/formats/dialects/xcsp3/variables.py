@@ -29,7 +29,7 @@ _MANY_TIMES = re.compile(r"([+-]?[0-9]{1,18})x([0-9]{1,9})")
 Values = tuple[range, ...] | tuple[str, ...]
 """A domain as it is written: ranges of integers, or symbols."""
 _Domains = Mapping[str, Values]
-"""The domains of a variable or an array, by the text that says for which of its variables; empty: for all."""
+"""The domains of a variable or an array, by the text that names the variables; an empty text names all."""
 
 
 @dataclass
@@ -149,7 +149,7 @@ def lists(text: str) -> list[list[str]]:
     """Return the words of `(1,2)(3,4)`, list by list. Raises `MistakeError`."""
     text = text.strip()
     if not text.startswith("(") or not text.endswith(")"):
-        raise MistakeError(f"'{shortened(text)}' are not lists in parentheses", "write (1,2)(3,4)")
+        raise MistakeError(f"'{shortened(text)}' is not a sequence of lists in parentheses", "write (1,2)(3,4)")
     return [row.split(",") for row in re.split(r"\)\s*\(", text[1:-1])]
 
 
@@ -166,9 +166,9 @@ def read_variables(view: ElementView | None) -> Variables:
             name = child.attribute("id")
             if not _ID.fullmatch(name) or name in declared:
                 raise MistakeError(f"the id '{shortened(name)}' is not allowed", "ids are words, each used once")
-            declared[name] = {}  # for `as`: it has a mistake, unless its domains are set below
+            declared[name] = {}  # for `as`; invalid unless its domains are set below
             if declared.get(child.attribute("as")) == {} and child.attribute("as") != name:
-                continue  # a consequence of the mistake there
+                continue  # a consequence of an error reported there
             domains = _domains(child, name, declared)
             if child.tag == "var":
                 if list(domains) != [""]:
