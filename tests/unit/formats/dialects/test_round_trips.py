@@ -116,11 +116,11 @@ def test_dcopsolver_refuses_by_name_what_it_has_not() -> None:
         return assemble("t", variables, [constraint], kind=ProblemKind.DISWCSP, costs=CostUnits(**units))
 
     for wrong, message in (
-        (team(together, ("x", "z"), 1), "one variable an agent, and a has 2"),
+        (team(together, ("x", "z"), 1), "one variable for each agent, but a has 2"),
         (team(apart, names, 1), "the constraint c has 3 variables"),
         (team(apart, ("x", "y"), -1), "integer costs of 0 or more"),
         (team(apart, ("x", "y"), 1, places=1), "integer costs of 0 or more"),
-        (team(apart, ("x", "y"), 1, maximize=True), "no utilities"),
+        (team(apart, ("x", "y"), 1, maximize=True), "does not support utilities"),
         (team(apart, ("x", "y"), 2**30), "too large for integers of 32 bits"),
         (team({"a": [Variable("x", bit)]}, ("x",), 1), "requires two agents"),
     ):

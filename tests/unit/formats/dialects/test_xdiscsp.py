@@ -140,8 +140,8 @@ def test_what_cannot_be_written_is_refused_by_name() -> None:
     function = Function("f", names, parse("add(X,Y,Z)", names, Type.INTEGER))
     scope = ("xa", "xb", "xc")
     for team, message in (
-        (team_with(_soft(-1)), "integer costs of 0 or more, and c has -1"),
-        (team_with(_soft(1), CostUnits(places=1)), "integer costs of 0 or more, and c has 0.1"),
+        (team_with(_soft(-1)), "integer costs of 0 or more, but c has -1"),
+        (team_with(_soft(1), CostUnits(places=1)), "integer costs of 0 or more, but c has 0.1"),
         (team_with(_soft(1), CostUnits(maximize=True)), "has no utilities"),
         (team_with(Constraint("c", function, scope, scope)), "c over xa xb xc has 8,000,000 combinations"),
     ):
