@@ -166,7 +166,7 @@ def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
 
     Args:
         options: The options, with the user's names of robots.
-        called: The names of robots in the team, by the user's.
+        called: The names of robots in the team, by the user's names.
     """
     order = options.order
     if isinstance(order, tuple):

@@ -147,7 +147,7 @@ class TeamSecrets:
     def _between(self, view: View, shared: Sequence[_Entries]) -> list[Secret]:
         """Return the secrets in those of these constraints whose robots are all in `view`.
 
-        Constraints that are dropped, as one of the robots is withdrawn, have none.
+        Constraints that are dropped because a robot is withdrawn have no secrets.
         """
         found = []
         for one in shared:
@@ -198,7 +198,7 @@ class TeamSecrets:
             self.entries[owner].update(dict.fromkeys(entries, knowing))
 
     def _in_absence(self, constraint: Constraint, places: Sequence[tuple[str, int]]) -> Iterator[tuple[Value, Secret]]:
-        """Yield the values of a scope, None for withdrawn robots, for which `constraint` is restated, and its cost."""
+        """Yield the values of a scope with withdrawn robots (None), and the cost of the restated `constraint`."""
         names = constraint.variables
         owners = dict.fromkeys(robot for robot, _ in places)
         for many in range(1, len(owners) + 1):

@@ -14,7 +14,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
 
 BREAKABLE = "a constraint that is restated when a robot is absent"
-"""The end of the text on such a constraint."""
+"""The end of the error text on such a constraint."""
 _TWO = 2
 
 

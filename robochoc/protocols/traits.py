@@ -48,8 +48,8 @@ class Traits:
         allocates: It takes task allocations only: teams that share nothing but that some things are done by one robot
             at most, and in which each robot can do without (`solver/exclusions.py`).
         congestion: Of those it also takes such in which several robots may do a task, each pair of them at a cost.
-        drops_only: It takes only constraints that are dropped when a robot is absent (`model/absence.py`): its robots
-            withdraw one after the other, so one that is restated could be broken by robots that have decided before.
+        drops_only: The protocol accepts only constraints that are dropped when a robot is absent (`model/absence.py`).
+            Its robots withdraw one after the other, so earlier decisions could break a restated constraint.
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
     """

@@ -76,12 +76,12 @@ def decided(team: Team, options: Options, *, environment: bool = False, ordered:
 
 
 def decided_at_once(team: Team, options: Options) -> Choice:
-    """Return how to run a team when there is no time to look at it: with the usual protocol, in the given order."""
+    """Return the choice when there is no time to analyse a team: the default protocol and the given order."""
     order = None if options.order == Order.GIVEN else options.order
     if options.protocol != AUTO:
         return Choice(replace(options, order=order))
     usual = DEFAULT_COST_PROTOCOL if team.kind == ProblemKind.DISWCSP else DEFAULT_PROTOCOL
-    chosen = {"protocol": "there was no time to look at the team"}
+    chosen = {"protocol": "there was no time to analyse the team"}
     return Choice(replace(options, protocol=usual, order=order, chosen=chosen))
 
 

@@ -1,4 +1,4 @@
-"""Conversion of the values of options: from texts, numbers of other libraries, lists; and errors for other values."""
+"""Convert the values of options from texts, numbers of other libraries and lists; refuse other values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.run.defaults import AUTO
 from robochoc.system.suggestions import member
 
 Converter = Callable[[str, object], object]
-"""It gets the name of an option and a value, and returns the value in the type of the option.
+"""A function of the name of an option and a value; it returns the value in the type of the option.
 
 It raises `TypeError` for a value of a wrong type, and `ValueError` for one that is not allowed.
 """
@@ -40,7 +40,7 @@ def instance_of(kind: type) -> Converter:
 
 
 def optional(convert: Converter) -> Converter:
-    """Return a converter that accepts None besides."""
+    """Return a converter that also accepts None."""
     return lambda name, value: None if value is None else convert(name, value)
 
 
@@ -86,7 +86,7 @@ def real(name: str, value: object, expected: str = "a number") -> float:
 
 
 def seconds(name: str, value: object) -> float:
-    """Convert a number of seconds, which is finite and not negative."""
+    """Convert a number of seconds. Raises `ValueError` unless it is finite and not negative."""
     number = real(name, value, "seconds")
     if not 0 <= number < math.inf:
         raise ValueError(_refusal(name, number, "0 or more seconds"))
@@ -113,7 +113,7 @@ def items_of(convert: Converter, expected: str) -> Converter:
 
 
 def texts_by_name(name: str, value: object) -> Mapping[str, str]:
-    """Convert a mapping of names to values, which become texts."""
+    """Convert a mapping of names to values; values become texts."""
     if not isinstance(value, Mapping):
         raise TypeError(_refusal(name, value, "a mapping of names to values"))
     return {text(f"a name in {name}", key): str(one) for key, one in value.items()}

@@ -98,8 +98,8 @@ class CentralSolverName(StrEnum):
 class Options:
     """The options of a run. `run/compatibility` decides which of them can be combined.
 
-    Every value is converted and checked: members of enums may be given as texts ("minimum"), numbers in any type of
-    number, lists instead of tuples.
+    Every value is converted and checked: members of enums may be given as texts ("minimum"), numbers in any numeric
+    type, and tuples as lists.
 
     Raises:
         TypeError: if a value has a wrong type.

@@ -64,7 +64,7 @@ def protocol_names() -> tuple[str, ...]:
 
 
 _SPELLINGS = {CENTRAL, AUTO}
-"""Names that are spelt as in their packages: each look at what is installed takes 0.1 ms."""
+"""A cache of names spelt as in their packages: each look-up of installed protocols takes 0.1 ms."""
 
 
 def installed_spelling(name: str) -> str:

@@ -278,8 +278,7 @@ class ScenarioRun:
     def _remaining(self) -> Team:
         """Return the team without the withdrawn robots.
 
-        Where the constraints that they hold are lost too, these are the constraints that they hold in the order that
-        the run began with.
+        If the constraints that they hold are lost too, the initial order of the run determines which ones they hold.
         """
         order = self._held_in
         if order is None or not self.withdrawn:

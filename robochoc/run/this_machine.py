@@ -108,7 +108,7 @@ class ThisMachine(Deployment):
         """See `Deployment.solve`. The problem may change, but not while it is decided which robots withdraw."""
         if not phase.withdrawal:
             return self._solve_epochs(phase)
-        answer = replace(super().solve(phase), witness=None)  # the witness is that of a team without a solution
+        answer = replace(super().solve(phase), witness=None)  # `witness` is for the whole team's no-solution
         return replace(answer, reason=answer.reason or self._absence_reason(answer, withdrawal=True))
 
     def search(self, phase: Phase) -> Search:
@@ -177,7 +177,7 @@ class ThisMachine(Deployment):
         return replace(answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._done))
 
     def _absence_reason(self, answer: Answer, *, withdrawal: bool) -> str | None:
-        """Return the constraints that no robot is left to satisfy, where there is no solution."""
+        """Return the reason for a missing solution: constraints that the remaining robots cannot satisfy."""
         if answer.verdict != Verdict.NO_SOLUTION:
             return None
         from robochoc.verification.absence_reason import absence_reason  # noqa: PLC0415 - start-up: seldom asked for

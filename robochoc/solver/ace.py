@@ -143,13 +143,13 @@ class AceProcess:
         costs: Costs = (),
         deadline: float | None = None,
     ) -> bool:
-        """Give the solver a task, whose `answer` is to be asked for before the next.
+        """Give the solver a task. Call `answer` before the next task.
 
-        With `costs`, the answer is one solution with the least sum of these codes.
+        With `costs`, the answer is one solution that minimises the sum of these codes.
 
         Returns:
-            False when there was nothing left to ask ACE, and so nothing to wait for: propagation had the answer, or
-            the network was enumerated here.
+            False if ACE was not needed, so that there is nothing to wait for: propagation or enumeration has found the
+            answer.
 
         Raises:
             SolverMissingError: if there is no Java.
@@ -304,7 +304,7 @@ class AceProcess:
                 self._socket.settimeout(_left_s(deadline))
                 self._socket.sendall(LENGTH.pack(len(body)) + body)
                 self._socket.settimeout(None)
-        except TimeoutError:  # it starts, and does not read yet
+        except TimeoutError:  # the process is starting and does not read yet
             self._question = None
             raise self.give_up() from None
         except OSError:  # it has hung up: perhaps it has said why
@@ -364,7 +364,7 @@ class AceProcess:
 
 
 def _left_s(deadline: float | None) -> float | None:
-    """Return how many seconds to wait at most, more than 0. None: for ever."""
+    """Return the maximum waiting time in seconds, more than 0. None: no limit."""
     return None if deadline is None else min(max(1e-3, deadline - time.monotonic()), LONGEST_WAIT_S)
 
 

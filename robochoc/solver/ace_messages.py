@@ -39,8 +39,8 @@ class EncodedTable(msgspec.Struct, frozen=True, array_like=True):
 class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Solve this network: all solutions up to `limit`, or only their number, or one that costs least.
 
-    `domains` holds each variable's codes, `different` scopes on which all differ. A solution costs the sum of
-    the codes of the variables at the places in `costs`, each times the unit there; without any, nothing is minimised.
+    `domains` holds each variable's codes, `different` scopes on which all differ. The cost of a
+    solution is the sum of the codes at the places in `costs`, each times its unit; `costs` may be empty.
     `formulas` are predicates of XCSP3 over `x0`, `x1`, ...
     """
 

@@ -42,7 +42,7 @@ from robochoc.system.time_limit import TimeLimitError, computed_by
 NAME = "OR-Tools"
 INSTALL = "pip install 'robochoc[ortools]'"
 LAST_WORDS_S = 0.6
-"""The seconds after its time in which CP-SAT may report the best that it has found."""
+"""The time after the deadline in which CP-SAT may report its best solution, in seconds."""
 _TICK_S = 0.2
 _LONGEST_WAIT_S = 1e6
 _CHUNK = 1 << 20
@@ -210,7 +210,7 @@ class CpSatSolver:
             buffer += chunk
 
     def _left_s(self) -> float | None:
-        """Return the seconds until no answer is waited for. None: there is no limit."""
+        """Return the time to wait for an answer, in seconds. None: no limit."""
         return (
             None if self._deadline is None else min(self._deadline + LAST_WORDS_S - time.monotonic(), _LONGEST_WAIT_S)
         )
@@ -222,7 +222,7 @@ def _task(network: Network, costs: Costs, deadline: float | None) -> CpSatTask:
 
 
 def _message(formula: Formula) -> CpSatComparison | CpSatJunction:
-    """Return `formula` as it is sent."""
+    """Return `formula` as a message."""
     if isinstance(formula, Junction):
         return CpSatJunction(formula.every, tuple(map(_message, formula.parts)))
     terms = tuple([(int(place), factor) for place, factor in formula.terms])

@@ -18,7 +18,7 @@ class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
 
 
 class CpSatComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """The sum of `terms`, places of variables with their factors, is `sign` ("le", "eq" or "ne") `bound`."""
+    """The sum of `terms` (places of variables with factors) compared by `sign` ("le", "eq", "ne") with `bound`."""
 
     terms: tuple[tuple[int, int], ...]
     sign: str
@@ -26,7 +26,7 @@ class CpSatComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class CpSatJunction(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """All of `parts` hold (`every`), or at least one."""
+    """A conjunction (`every`) or disjunction of `parts`."""
 
     every: bool
     parts: tuple[CpSatComparison | CpSatJunction, ...]

@@ -58,8 +58,8 @@ class Table:
 class Network:
     """A constraint network over codes: a domain for each variable, in ascending order, and tables.
 
-    `different` lists scopes on which all values differ. It may repeat what tables say, never add to it. `formulas` are
-    constraints that are no tables, over places.
+    `different` lists scopes on which all values differ; it may repeat tables, but adds no constraint. `formulas` are
+    constraints over places that are not tables.
     """
 
     domains: tuple[Codes, ...]
@@ -76,7 +76,7 @@ class Network:
 
     @property
     def constrained(self) -> set[int]:
-        """Return the places of the variables that a constraint is on."""
+        """Return the places of all variables with constraints."""
         places = {place for table in self.tables for place in table.scope}.union(*self.different)
         return places.union(int(place) for formula in self.formulas for place in operands(formula))
 
@@ -85,8 +85,8 @@ class Network:
 class Component:
     """Variables that constraints connect, as a network; `values[code]` is the value that a code stands for.
 
-    `names` are the variables, in their given order, and behind them the further ones of split constraints. Where the
-    network has formulas, `values` is a range, so that codes can be added up.
+    `names` are the variables in their given order, followed by additional ones of split constraints. If the network has
+    formulas, `values` are ranges, so that codes can be added up.
     """
 
     names: tuple[str, ...]
@@ -144,7 +144,7 @@ def components(
 
 
 def _is_small(part: Component) -> bool:
-    """Return whether solvers can compute with the codes of `part`, if it has formulas."""
+    """Return whether codes of `part` are small enough for the solvers; always true without formulas."""
     return all(is_small(formula, len(part.values)) for formula in part.network.formulas)
 
 

@@ -1,8 +1,8 @@
-"""Predicates as comparisons of sums: for solvers, in the place of tables that would be too large.
+"""Predicates as comparisons of sums, for solvers, instead of tables that would be too large.
 
 A predicate on two tasks of a job shop, `or(le(add(x,50),y),le(add(y,61),x))`, has as many rows as the square of the
-horizon. Solvers read its comparisons in no time. They get nothing but comparisons of sums with a constant, joined by
-`and` and `or`: ACE computes wrongly with products and negative numbers, and here is neither.
+horizon. Solvers handle its comparisons quickly. They get only comparisons of sums with a constant, joined by `and`
+and `or`, without products and negative numbers, for which ACE computes wrong results.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from robochoc.model.expression.bounds import Interval
 from robochoc.solver.splitting import collect_terms, largest_value, with_arguments
 
 LARGEST = 2**29
-"""Nothing that is computed is larger, so that solvers with 32 bits are right."""
+"""The maximum of all intermediate results, so that solvers with 32 bits are correct."""
 MAX_PARTS = 1000
-"""The maximum number of comparisons that one predicate is made of."""
+"""The maximum number of comparisons in one predicate."""
 
 Operand = str | int
 """A variable: its name, or its place in a network."""
@@ -39,7 +39,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Junction:
-    """Formulas all of which hold (`every`), or at least one of which holds."""
+    """A conjunction (`every`) or disjunction of formulas."""
 
     every: bool
     parts: tuple[Formula, ...]
@@ -50,7 +50,7 @@ TRUE, FALSE = Junction(every=True, parts=()), Junction(every=False, parts=())
 
 
 class _NotLinearError(Exception):
-    """The predicate computes more than sums."""
+    """The predicate does not consist of comparisons of sums."""
 
 
 def linear(constraint: Constraint, domains: Mapping[str, Sequence[int]]) -> Formula | None:
@@ -94,7 +94,7 @@ def comparisons(formula: Formula) -> list[Comparison]:
 
 
 def conjuncts(formula: Formula) -> tuple[Formula, ...]:
-    """Return formulas that hold together exactly where `formula` does."""
+    """Return formulas whose conjunction is equivalent to `formula`."""
     return formula.parts if isinstance(formula, Junction) and formula.every else (formula,)
 
 
@@ -110,9 +110,9 @@ def renamed(
 
     Args:
         formula: The formula.
-        names: The new names of variables. Those that have none keep theirs.
+        names: The new names of variables. Others keep their names.
         fixed: The values of variables that are left out.
-        shift: A variable of the result is smaller by this than that of `formula`.
+        shift: The amount by which a variable of the result is smaller than that of `formula`.
     """
     match formula:
         case Comparison(terms, sign, bound):
@@ -126,7 +126,7 @@ def renamed(
 
 
 def compared(terms: tuple[tuple[Operand, int], ...], sign: Sign, bound: int) -> Formula:
-    """Return a comparison, or its truth where it has no terms."""
+    """Return a comparison, or a constant truth value if it has no terms."""
     if terms:
         return Comparison(terms, sign, bound)
     holds = {"le": bound >= 0, "eq": bound == 0, "ne": bound != 0}[sign]
@@ -184,7 +184,7 @@ def _compared(left: Expression, operator: str, right: Expression) -> Formula:
     for one in (left, right):
         pieces = _pieces(one)
         if pieces is not None:
-            # The largest of some is at most a number if all are, and at least as large if any is.
+            # A maximum is at most a number if all arguments are, and at least a number if any argument is.
             smallest_first = pieces[0] == "min"
             every = (one is left) != smallest_first
             sides = [(piece, right) if one is left else (left, piece) for piece in pieces[1]]
@@ -197,7 +197,7 @@ def _is_piecewise(expression: Expression) -> bool:
 
 
 def _pieces(expression: Expression) -> tuple[str, tuple[Expression, ...]] | None:
-    """Return the expressions of which `expression` is the largest ("max") or smallest ("min"); None: it is a sum."""
+    """Return "max" or "min" and the arguments if `expression` is a maximum or minimum; None: it is a sum."""
     match expression:
         case Apply("min" | "max" as operator, parts):
             return operator, parts

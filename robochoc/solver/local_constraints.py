@@ -49,7 +49,7 @@ class LocalConstraints:
         self._domain = part.domain
         self.values: tuple[Value, ...] = self._domain.values
         self.charges: tuple[Cost, ...] = self._domain.costs
-        # Values are distinct: a robot that shows nothing looks the same withdrawn, which is never cheaper.
+        # Values must be distinct: a robot that shows nothing looks the same when withdrawn, which is never cheaper.
         if part.parameters.withdrawal_cost is not None and (robot.interface or not self.values):
             self.values = (*self.values, (None,) * len(robot.interface))
             must_stay = any(one.when_absent == WhenAbsent.FAIL for one in robot.private)

@@ -47,7 +47,7 @@ def propagate(network: Network) -> Network:
 
 
 def _simplified(formulas: Sequence[Formula], domains: Sequence[Codes]) -> tuple[tuple[Formula, ...], list[Table]]:
-    """Return `formulas` without variables that have one value, those on one variable as tables."""
+    """Return `formulas` without variables that have one value; formulas on one variable become tables."""
     fixed: dict[Operand, int] = {place: domain[0] for place, domain in enumerate(domains) if len(domain) == 1}
     parts = [part for formula in formulas for part in conjuncts(renamed(formula, {}, fixed))]
     wider = tuple([part for part in parts if len(operands(part)) != 1])

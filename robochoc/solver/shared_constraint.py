@@ -25,7 +25,7 @@ Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
 
 UNKNOWN = -1
-"""No mask: a value that a constraint looks at is unknown, or it is dropped as a robot is withdrawn."""
+"""No mask: a value in the scope is unknown, or the constraint is dropped because a robot is withdrawn."""
 
 OtherValues = tuple[int | None, ...]
 """The values of other robots' variables in a constraint, in its order. None: the robot is withdrawn."""
@@ -109,10 +109,10 @@ class SharedConstraint:
         self._conflicts: dict[OtherValues, Conflict] = {}
         self._bears_absence = False
         self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
-        """What it costs when the owners of these variables are absent; None: it is dropped."""
+        """The costs of the constraint when the owners of these variables are absent; None: it is dropped."""
 
     def allow_absence(self) -> None:
-        """From now on values that are None mean that a robot is withdrawn: see `model/absence.py`."""
+        """Treat values that are None as those of withdrawn robots from now on: see `model/absence.py`."""
         self._bears_absence = bears_absence(self._constraint)
 
     def compile(self, own: OwnValues) -> None:
@@ -125,7 +125,7 @@ class SharedConstraint:
         self.codes, self._distinct = own.codes(self._places)
 
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
-        """Return what the constraint sees in `view`; None: a value is unknown, or it is dropped as a robot withdrew."""
+        """Return the values of the scope in `view`; None: one is unknown, or the constraint is dropped."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
@@ -173,15 +173,15 @@ class SharedConstraint:
         return [self._holds((*others, *own)) for own in self._distinct]
 
     def _holds(self, values: Sequence[int | None]) -> bool:
-        """Return whether the constraint holds on `values`, some of which may be None: robots are withdrawn."""
+        """Return whether the constraint holds on `values`, which are None for withdrawn robots."""
         return self._cost_for_some(values) < INFINITE if None in values else self._test(values)  # type: ignore[arg-type]
 
     def _cost(self, values: Sequence[int | None]) -> Cost:
-        """Return what the constraint costs on `values`, some of which may be None: robots are withdrawn."""
+        """Return the cost of the constraint on `values`, which are None for withdrawn robots."""
         return self._cost_for_some(values) if None in values else self._price(values)  # type: ignore[arg-type]
 
     def _cost_for_some(self, values: Sequence[int | None]) -> Cost:
-        """Return what the constraint costs when robots are withdrawn; 0 if it is dropped."""
+        """Return the cost of the constraint when robots are withdrawn; 0 if it is dropped."""
         if not self._bears_absence:
             return 0
         paired = list(zip(self._all_names, values, strict=True))
@@ -213,7 +213,7 @@ class SharedConstraint:
         return prices
 
     def costs_in(self, view: Mapping[str, Value]) -> list[Cost] | None:
-        """Return what each own value pays in `view`; None: a value is unknown, or it is dropped as a robot withdrew."""
+        """Return the cost of each own value in `view`; None: a value is unknown, or the constraint is dropped."""
         if self._only is None:
             others = self.other_values(view)
             return None if others is None else self.costs(others)

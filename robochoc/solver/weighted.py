@@ -32,11 +32,11 @@ from robochoc.solver.propagation import propagate
 MAX_COST_ROWS = 1_000_000
 """The maximum number of combinations of values in a cost table."""
 MAX_TOTAL_COST = 2**53
-"""The maximum of all costs together, in units of their greatest common divisor: solvers add them up in 64 bits."""
+"""The maximum sum of costs, in units of their greatest common divisor: solvers add them up in 64 bits."""
 MAX_CODE = 2**30
-"""Costs up to this are one code each; ACE's codes are small. Larger costs are two codes."""
+"""The maximum cost with a single code, since ACE's codes are small; larger costs have two codes."""
 DIGIT = 2**27
-"""The unit of the higher one of two codes."""
+"""The unit of the higher code of a cost."""
 
 CostRows = dict[Codes, float]
 """The costs of combinations of codes. Combinations that are not in it are forbidden."""
@@ -238,7 +238,7 @@ def _forbidden_by_absence(part: Component, network: Network, constraint: Constra
 
 
 def _prices_in_absence(part: Component, network: Network, scope: Codes, charging: Sequence[Constraint]) -> CostRows:
-    """Return what constraints cost in each row in which a robot is absent. Rows that they forbid are left out."""
+    """Return the costs of constraints in each row with absent robots. Forbidden rows are left out."""
     absent = len(part.values)
     names = [part.names[place] for place in scope]
     known: dict[tuple[str, ...], list[Callable[[Sequence[int]], Cost]]] = {}

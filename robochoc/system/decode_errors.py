@@ -103,7 +103,7 @@ def _one_of(values: Sequence[str]) -> str:
 
 
 def _nearest(name: str, known: Sequence[str]) -> str:
-    """Return the name that looks like `name`, or all of them, in words."""
+    """Return a hint that names the known name nearest to `name`, or lists all of them."""
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
 
     close = difflib.get_close_matches(name[:40], known, n=1)

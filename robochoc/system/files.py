@@ -15,9 +15,9 @@ from pathlib import Path
 from robochoc.system.streams import BackgroundWriter
 
 MAX_AHEAD = 64 << 20
-"""The number of bytes that may wait for the reader of a pipe to which a file grows."""
+"""The number of bytes that may be buffered for the reader of a pipe."""
 READER_PATIENCE_S = 5.0
-"""Closing such a file waits for its reader as long as that reads something within this time."""
+"""Closing a pipe waits for its reader until the reader has read nothing for this time, in seconds."""
 _HIDDEN = (".part", ".new", ".old")
 """The endings of hidden files and folders that are being written."""
 _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
@@ -26,9 +26,9 @@ _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
 
 @contextmanager
 def errors_naming(path: Path) -> Iterator[None]:
-    """Let errors of the system name the file at `path`, where they name none, or a hidden one that takes its place.
+    """Add the file name `path` to errors of the system that name no file, or a hidden temporary file.
 
-    A full disk is noticed by a write, which does not know what it writes to.
+    A write fails on a full disk, but its error does not name the file.
 
     Raises:
         OSError: as raised within, with a `filename`.

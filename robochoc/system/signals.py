@@ -10,12 +10,12 @@ from contextlib import contextmanager
 
 _STOPPING = {signal.SIGINT, signal.SIGTERM}
 _holding: set[int] = set()
-"""The threads in which signals are held."""
+"""The threads in which signals are delayed."""
 
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) wait meanwhile: what is half done would be lost.
+    """Delay Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) in the block: unfinished work would be lost.
 
     A process that is started meanwhile holds them as well, until it calls `leave_ctrl_c_to_the_parent`: they would
     break off the start of Python with an error of its own.
@@ -35,7 +35,7 @@ def signals_held() -> Iterator[None]:
 
 
 def are_held(thread: int) -> bool:
-    """Return whether signals are held in a thread."""
+    """Return whether signals are delayed in a thread."""
     return thread in _holding
 
 

@@ -1,7 +1,7 @@
-"""Output that does not wait for its reader: a pipe that nobody reads, or a stopped terminal, delays no run.
+"""Output that does not wait for its reader: a pipe without a reader, or a stopped terminal, does not delay a run.
 
-Bytes that cannot be written at once wait in memory, and a thread writes them. The thread exists only while something
-waits, so a program whose output is read never has one.
+Bytes that cannot be written at once are buffered in memory, and a thread writes them. The thread exists only while the
+buffer is not empty, so a program whose output is read never has this thread.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 MAX_WAITING = 1 << 20
-"""The number of bytes of standard error that may wait. Further lines are dropped and counted."""
+"""The maximum number of buffered bytes of standard error. Further lines are dropped and counted."""
 PATIENCE_S = 2.0
-"""The program's end waits for the reader of standard error as long as it reads something within this time."""
+"""The program ends if the reader of standard error has read nothing for this time, in seconds."""
 _PIECE = 4096
 
 
 class BackgroundWriter:
     """Writes to the descriptor `target` without waiting, up to `limit` bytes ahead of the reader.
 
-    A forked process begins with nothing that waits.
+    In a forked process, the buffer is empty at first.
     """
 
     def __init__(self, target: int, limit: int) -> None:
@@ -48,7 +48,7 @@ class BackgroundWriter:
         self._changed = threading.Condition()
 
     def write(self, content: bytes) -> bool:
-        """Write `content`, now or later. Return False if too much waits already: then none of it is written.
+        """Write `content` now or later. Return False without writing if the buffer is full.
 
         Raises:
             OSError: if this or earlier content cannot be written.
@@ -73,7 +73,7 @@ class BackgroundWriter:
         """Wait until everything is written, or nothing was read for `patience_s` seconds. Return whether it is.
 
         Raises:
-            OSError: if it cannot be written.
+            OSError: if the content cannot be written.
         """
         if self._owner != os.getpid():
             return True
@@ -85,7 +85,7 @@ class BackgroundWriter:
             return not self._waiting
 
     def close(self) -> None:
-        """Close the `target`, once nothing waits."""
+        """Close the `target` as soon as the buffer is empty."""
         with self._changed:
             self._is_closed = True
             if not self._has_thread:
@@ -107,7 +107,7 @@ class BackgroundWriter:
         return done
 
     def _write_waiting(self) -> None:
-        """Write all that waits, in small pieces so that each one read counts as progress."""
+        """Write the buffer in small pieces, so that the reader's progress is noticed."""
         while True:
             error = None
             with self._changed:
@@ -139,7 +139,7 @@ class BackgroundWriter:
 def _not_blocking(target: int) -> int | None:
     """Return a descriptor of the same file, pipe or terminal whose writes do not block; None if there is none.
 
-    The descriptor `target` of a pipe is shared with other processes, which would not expect that of it.
+    Making `target` itself non-blocking would affect the other processes that share it.
     """
     try:
         if stat.S_ISREG(os.fstat(target).st_mode):  # opened again, it would be written from its beginning
@@ -150,7 +150,7 @@ def _not_blocking(target: int) -> int | None:
 
 
 class _StandardError(io.RawIOBase):
-    """Standard error by a `BackgroundWriter`. Lines for which there is no room are dropped and counted."""
+    """Standard error by a `BackgroundWriter`. Lines that exceed the buffer are dropped and counted."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -175,13 +175,13 @@ class _StandardError(io.RawIOBase):
         return len(data)
 
     def finish(self) -> None:
-        """Wait for a reader that reads."""
+        """Wait as long as the reader makes progress."""
         with suppress(OSError):  # the reader is gone
             self._writer.finish(PATIENCE_S)
 
 
 class _StandardOutput(io.FileIO):
-    """Standard output, whose first error names it. Then nothing is written: Python tries again at its end."""
+    """Standard output. Its first error names it. Later writes do nothing, since Python flushes again at exit."""
 
     _has_failed = False
 
@@ -197,11 +197,11 @@ class _StandardOutput(io.FileIO):
 
 
 _REPLACED: list[object] = []
-"""Streams that Python made. Their descriptors are closed with them."""
+"""Python's original streams: deleting them would close their descriptors."""
 
 
 def prepare_standard_streams() -> None:
-    """Let errors of `sys.stdout` name it, and `sys.stderr` not wait for the reader of a pipe, socket or terminal."""
+    """Make errors of `sys.stdout` name it, and writes to `sys.stderr` independent of its reader."""
     _REPLACED.extend((sys.stdout, sys.stderr))
     with suppress(OSError, ValueError):
         old = sys.stdout

@@ -1,8 +1,8 @@
-"""Time limits for computations that look at no clock: preparation with many nested loops, all in Python.
+"""Time limits for computations that do not check the clock, such as preparation with many nested loops in Python.
 
-A look at the clock in each loop would be forgotten in one. Here a second thread raises `TimeLimitError` in the thread
-that computes, wherever that is, as Ctrl-C raises `KeyboardInterrupt`. Where signals are held (`system/signals.py`), it
-waits.
+A check of the clock could be forgotten in some loop. Instead, a second thread raises `TimeLimitError` in the computing
+thread at any point, as Ctrl-C raises `KeyboardInterrupt`. While signals are delayed (`system/signals.py`), so is the
+error.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import ParamSpec, TypeVar
 from robochoc.system.signals import are_held
 
 AGAIN_S = 0.05
-"""The error is raised again after so many seconds: Python drops an exception in a destructor."""
+"""The interval at which the error is raised again, in seconds: Python drops an exception in a destructor."""
 _LONGEST_WAIT_S = 1e6
-"""Locks refuse longer waits."""
+"""The maximum waiting time of a lock, in seconds."""
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -32,13 +32,13 @@ class TimeLimitError(Exception):
 def computed_by(
     deadline: float | None, function: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
 ) -> Result:
-    """Return the result of `function`, which holds nothing that has to be released by more than `with` and `finally`.
+    """Return the result of `function`, which must release its resources by `with` or `finally`.
 
     Args:
-        deadline: The end of the time, on the monotonic clock. None: there is none.
+        deadline: The end of the time, on the monotonic clock. None: no limit.
         function: The computation.
         args: Its arguments.
-        kwargs: Its arguments with names.
+        kwargs: Its keyword arguments.
 
     Raises:
         TimeLimitError: when the deadline has passed.
@@ -90,7 +90,7 @@ def _ignore_where_dropped() -> None:
 
 
 def _raise_in(thread: int, error: type[Exception] | None) -> None:
-    """Raise an error in a thread; None: take back the one that it has not seen yet."""
+    """Raise an error in a thread; None: cancel an error that is still pending there."""
     import ctypes  # noqa: PLC0415 - start-up: few runs come to the end of their time
 
     raised = None if error is None else ctypes.py_object(error)

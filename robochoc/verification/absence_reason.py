@@ -13,7 +13,7 @@ _MOST_NAMED = 3
 
 
 def absence_reason(team: Team, *, withdrawal: bool = False) -> str:
-    """Return which constraints keep `team` from a solution because robots are absent; empty if none does.
+    """Return a text on the constraints that leave no solution because robots are absent; empty if there are none.
 
     Args:
         team: The team without the robots that were lost or removed.

@@ -71,7 +71,7 @@ class Objective:
                 self._pay(number, self._price_for_some(number) if self._withdrawal_cost is not None else 0)
 
     def _price_for_some(self, number: int) -> float:
-        """Return what a constraint costs when robots of its scope are absent."""
+        """Return the cost of a constraint when robots of its scope are absent."""
         constraint = self._constraints[number]
         absent = tuple([name for name in constraint.variables if name not in self._values])
         if (number, absent) not in self._restated:

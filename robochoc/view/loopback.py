@@ -27,9 +27,9 @@ _LONGEST_MESSAGE_BYTES = 1024
 """Browsers have nothing to send."""
 _LONGEST_REQUEST_BYTES = 1 << 16
 REQUEST_S = 30.0
-"""The time within which a request must have come. A connection that waits longer for one is closed."""
+"""The time limit for receiving a request; a connection without one is then closed."""
 MAX_CONNECTIONS = 200
-"""The number of connections beyond which further ones are closed at once."""
+"""The maximum number of open connections; more are closed at once."""
 
 
 def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) -> Application:
@@ -44,7 +44,7 @@ def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) 
 
 
 class _Server(HTTPServer):
-    """Closes connections that are too many."""
+    """An HTTP server that closes connections beyond the limit."""
 
     def handle_stream(self, stream: IOStream, address: tuple[Any, ...]) -> None:
         if len(self._connections) >= MAX_CONNECTIONS:

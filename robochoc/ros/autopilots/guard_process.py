@@ -201,8 +201,8 @@ class GuardProcess:
                 raise BrokenPipeError
             os.write(self._process.stdin.fileno(), content)
         except (OSError, ValueError):
-            self.check()  # the guard may have said why
-            raise self._lost("the guard process has ended") from None  # which the reader has not seen yet
+            self.check()  # a report of the guard may state the reason
+            raise self._lost("the guard process has ended") from None  # the reader has not noticed it yet
 
     def _read(self) -> None:
         stdout = self._process.stdout

@@ -87,7 +87,7 @@
       this.handlers.scrolled();
     }
 
-    /* Keep the window within the run. What is newest is followed no longer, unless that is where the window is. */
+    /* Keep the window within the run. Stop following the newest messages if the window is not at them. */
     clamp() {
       const { view, shape } = this;
       shape.clamp();

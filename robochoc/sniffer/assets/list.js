@@ -13,7 +13,7 @@
       this.table = Sniffer.byId("table");
       this.rows = [];
       this.said = new Map(); // chunk -> its details, for those in the window
-      this._placed = 0; // where the table was put by the page; anywhere else the user has scrolled it
+      this._placed = 0; // the position set by the page; any other position was set by the user
       this._build();
     }
 

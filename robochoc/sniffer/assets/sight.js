@@ -29,7 +29,7 @@
       if (chosen) chart.reveal(row, lanes.of[model.messages.sender[message]]);
     }
 
-    /* One of the windows was scrolled: the other has the same row on top, as far as it goes. */
+    /* After one window was scrolled, show the same top row in the other one, as far as possible. */
     scrolled(window) {
       const { view, list, chart } = this.page;
       if (view.layout !== "both" || !list.grid.clientHeight) return;

@@ -125,7 +125,7 @@ def test_the_choice_of_a_protocol_ends_with_the_time(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("robochoc.run.orchestrator.decided", endless)
     outcome = solve(SMALL, Options(protocol="auto", runtime=Runtime.SIMULATOR, timeout=SOON_S))
     assert (outcome.verdict, outcome.protocol) == (Verdict.UNKNOWN, "sfb")
-    assert outcome.chosen == {"protocol": "there was no time to look at the team"}
+    assert outcome.chosen == {"protocol": "there was no time to analyse the team"}
 
 
 def test_a_process_that_does_not_read_its_task_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
