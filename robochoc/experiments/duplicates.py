@@ -37,7 +37,7 @@ def without_duplicates(
     for settings in alike.values():
         first.update(dict.fromkeys(settings, settings[0]))
     kept = [row for row in rows if first[setting := _setting(row, parameters)] == setting]
-    return kept, [_told(settings) for settings in alike.values() if len(settings) > 1]
+    return kept, [_sentence(settings) for settings in alike.values() if len(settings) > 1]
 
 
 def _setting(row: Mapping[str, Any], parameters: Sequence[str]) -> Setting:
@@ -46,7 +46,7 @@ def _setting(row: Mapping[str, Any], parameters: Sequence[str]) -> Setting:
     return (("problems", row.get("problems")), *given)
 
 
-def _told(settings: Sequence[Setting]) -> str:
+def _sentence(settings: Sequence[Setting]) -> str:
     """Return a sentence about settings with the same problems."""
     several = [name for place, (name, _) in enumerate(settings[0]) if len({one[place] for one in settings}) > 1]
     words = [", ".join(f"{name} {value}" for name, value in one if name in several) for one in settings]

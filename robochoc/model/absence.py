@@ -97,7 +97,7 @@ def can_be_restated(constraint: Constraint) -> bool:
     return True
 
 
-def bears_absence(constraint: Constraint) -> bool:
+def may_count_when_absent(constraint: Constraint) -> bool:
     """Return whether `constraint` may cost or forbid something when one of its robots is absent."""
     if constraint.when_absent == WhenAbsent.FAIL:
         return True

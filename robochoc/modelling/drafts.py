@@ -64,7 +64,7 @@ class Draft:
     is_penalty: bool = False
     when_absent: WhenAbsent | None = None
 
-    def when_absent_is(self, when_absent: WhenAbsent | None) -> Draft:
+    def with_when_absent(self, when_absent: WhenAbsent | None) -> Draft:
         """Return this draft with the meaning `when_absent`. Raises `ModelError` if it cannot be restated."""
         if when_absent == WhenAbsent.RESTATE:
             names = tuple(variable.name for variable in self.scope)

@@ -46,7 +46,7 @@ class Rule:
         else:
             drafts = iter([soft_condition(self.term, self.cost, self.name, self.place)])
         for draft in drafts:
-            yield draft.when_absent_is(self.when_absent)
+            yield draft.with_when_absent(self.when_absent)
 
 
 def conditions_in(given: object, place: Place) -> list[Term]:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from robochoc.model.absence import bears_absence, restated
+from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.disclosure import View
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
@@ -189,7 +189,7 @@ class TeamSecrets:
             for values in itertools.product(*columns)
         }
         entries = tuple(secrets.values())
-        if self._may_withdraw and bears_absence(constraint):
+        if self._may_withdraw and may_count_when_absent(constraint):
             secrets.update(self._in_absence(constraint, places))
         added = _Entries(places, owners, knowing, secrets)
         for owner in sorted(owners | {holder}):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.model.absence import bears_absence
+from robochoc.model.absence import may_count_when_absent
 from robochoc.model.problem import ConstraintModel, Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
@@ -36,6 +36,6 @@ def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -
             return f"{robot.name} holds a constraint over more than two robots ({constraint.name})"
     if traits.drops_only:
         for constraint in robot.constraints():
-            if bears_absence(constraint):
+            if may_count_when_absent(constraint):
                 return f"{robot.name} holds {constraint.name}, {BREAKABLE}"
     return ""

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from robochoc.model.absence import bears_absence, restated
+from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Constraint, Domain
 from robochoc.solver.agent_problem import TeamKnowledge
@@ -107,13 +107,13 @@ class SharedConstraint:
         self._costs_by: dict[int, list[Cost]] = {}
         """Where it sees one variable of others: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
-        self._bears_absence = False
+        self._counts_when_absent = False
         self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
         """The costs of the constraint when the owners of these variables are absent; None: it is dropped."""
 
     def allow_absence(self) -> None:
         """Treat values that are None as those of withdrawn robots from now on: see `model/absence.py`."""
-        self._bears_absence = bears_absence(self._constraint)
+        self._counts_when_absent = may_count_when_absent(self._constraint)
 
     def compile(self, own: OwnValues) -> None:
         """Get ready for the own compiled domain."""
@@ -132,7 +132,7 @@ class SharedConstraint:
             return None
         except IndexError:
             raise self._refusal_of_width(view) from None
-        return None if None in seen and not self._bears_absence else tuple(seen)
+        return None if None in seen and not self._counts_when_absent else tuple(seen)
 
     def combined(self, sets: Mapping[str, Sequence[Value]]) -> Iterator[OtherValues]:
         """Yield all that the constraint may see where each other robot has any of its values in `sets`.
@@ -182,7 +182,7 @@ class SharedConstraint:
 
     def _cost_for_some(self, values: Sequence[int | None]) -> Cost:
         """Return the cost of the constraint when robots are withdrawn; 0 if it is dropped."""
-        if not self._bears_absence:
+        if not self._counts_when_absent:
             return 0
         paired = list(zip(self._all_names, values, strict=True))
         absent = tuple([name for name, value in paired if value is None])
@@ -226,7 +226,7 @@ class SharedConstraint:
         except IndexError:
             raise self._refusal_of_width(view) from None
         if part is None:
-            return self.costs((None,)) if self._bears_absence else None
+            return self.costs((None,)) if self._counts_when_absent else None
         prices = self._costs_by.get(part)
         if prices is None:
             prices = self._costs_by[part] = self.costs((part,))
@@ -320,7 +320,7 @@ class SharedConstraint:
         except IndexError:
             raise self._refusal_of_width(view) from None
         if part is None:
-            return self.mask((None,)) if self._bears_absence else UNKNOWN
+            return self.mask((None,)) if self._counts_when_absent else UNKNOWN
         mask = self._looks.get(part)
         if mask is None:
             mask = self._looks[part] = self.mask((part,))

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.absence import bears_absence, restated
+from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable, WhenAbsent
 from robochoc.solver.encoding import (
@@ -189,7 +189,7 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
     constraints = list(team.constraints())
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     shared = [one for robot in team.robots for one in robot.shared]
-    bearing = [one for one in shared if bears_absence(one)]
+    bearing = [one for one in shared if may_count_when_absent(one)]
     own = {robot.name: tuple(variable.name for variable in robot.variables) for robot in team.robots}
     scopes = [*own.values(), *(one.variables for one in (*soft, *bearing))]
     parts = components(team.variables.values(), constraints, scopes)

@@ -370,7 +370,7 @@ def test_export_in_every_format(kind: str, four: Path) -> None:
     assert "V1.1" in done.stdout or kind == "wcsp"
 
 
-def test_export_reports_what_a_file_says_otherwise(problem: Path, four: Path, tmp_path: Path) -> None:
+def test_export_reports_differences_between_file_and_team(problem: Path, four: Path, tmp_path: Path) -> None:
     out = tmp_path / "team.xml"
     done = robochoc_within("export", problem, "--format", "frodo", "-o", out)
     assert "\n  scale: costs are integers, in units of 0.1:" in done.stdout

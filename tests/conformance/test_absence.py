@@ -33,7 +33,7 @@ def test_as_few_as_possible_withdraw(models: int) -> None:
         aside += bool(outcome.withdrawn)
         assert outcome.verdict in {"optimal", "solution"}, seed
         assert sum(case.weights[name] for name in outcome.withdrawn) == weight, seed
-        assert case.price(case.told(outcome.values)) == cost, seed
+        assert case.price(case.values_by_robot(outcome.values)) == cost, seed
         assert not case.has_costs or outcome.cost == cost, seed
         assert not outcome.dropped_constraints or outcome.withdrawn, seed
     assert aside > models // 8
@@ -54,7 +54,7 @@ def test_robots_withdraw_one_after_the_other_where_constraints_are_dropped(model
             continue
         ran += 1
         present = tuple(name for name in case.names if name not in outcome.withdrawn)
-        values = case.told(outcome.values)
+        values = case.values_by_robot(outcome.values)
         assert case.price(values) == 0, seed
         for name in outcome.withdrawn:
             assert min(case.price({**values, name: value}) for value in case.domains[name]) == math.inf, seed
@@ -89,7 +89,7 @@ def test_robots_are_lost(models: int) -> None:
 
 
 @pytest.mark.slow
-def test_robots_come_back_under_their_constraints(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_robots_that_come_back_have_their_constraints_again(tmp_path_factory: pytest.TempPathFactory) -> None:
     for seed in range(100):
         chance = Random(seed)
         case = AbsenceModel(chance)
@@ -111,7 +111,7 @@ def test_as_few_as_possible_withdraw_on_other_runtimes() -> None:
             assert (outcome.verdict == "no-solution") is (weight == math.inf), (seed, runtime)
             if weight < math.inf:
                 assert sum(case.weights[name] for name in outcome.withdrawn) == weight, (seed, runtime)
-                assert case.price(case.told(outcome.values)) == cost, (seed, runtime)
+                assert case.price(case.values_by_robot(outcome.values)) == cost, (seed, runtime)
 
 
 def check(case: AbsenceModel, outcome: robochoc.Solution, gone: tuple[str, ...] | list[str], seed: int) -> None:
@@ -120,4 +120,4 @@ def check(case: AbsenceModel, outcome: robochoc.Solution, gone: tuple[str, ...] 
     assert (outcome.verdict == "no-solution") is (best == math.inf), seed
     if best < math.inf:
         assert outcome.verdict in {"optimal", "solution"}, seed
-        assert case.price(case.told(outcome.values)) == best, seed
+        assert case.price(case.values_by_robot(outcome.values)) == best, seed

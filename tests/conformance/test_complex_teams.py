@@ -12,7 +12,7 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.absence import bears_absence
+from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
@@ -135,7 +135,7 @@ def fits(team: Team, assignment: dict[str, int]) -> bool:
 
 
 def is_restated(team: Team) -> bool:
-    return any(bears_absence(constraint) for constraint in team.constraints())
+    return any(may_count_when_absent(constraint) for constraint in team.constraints())
 
 
 @pytest.mark.parametrize("teams", [60, pytest.param(300, marks=pytest.mark.slow)])

@@ -276,9 +276,7 @@ def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
         assert not any("offboard lost" in vehicle.log for vehicle in vehicles)
 
 
-def test_an_order_to_a_guard_that_is_gone_says_what_vehicles_do(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_order_to_an_ended_guard_reports_what_vehicles_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also before the reader of its messages has seen the end."""
     monkeypatch.setattr(GuardProcess, "_read", lambda _: None)
     with field(tmp_path) as (_, fleet), guarded(fleet) as guard:

@@ -69,7 +69,7 @@ class AbsenceModel:
                     found = min(found, (sum(self.weights[name] for name in self._of if name not in present), cost))
         return found
 
-    def told(self, values: Mapping[str, object]) -> dict[str, int]:
+    def values_by_robot(self, values: Mapping[str, object]) -> dict[str, int]:
         """Return the values of an outcome by the robots' names."""
         return {name.split(".")[0]: int(str(value)) for name, value in values.items()}
 

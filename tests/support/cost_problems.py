@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
-from robochoc.model.absence import bears_absence, restated
+from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.problem import (
     INFINITE,
     Assignment,
@@ -95,8 +95,8 @@ def cost_of(assignment: Assignment, constraints: Sequence[Constraint]) -> float:
 def minimum_withdrawal(team: Team) -> int:
     """The least weight of robots that have to withdraw so that the others have a solution, by brute force."""
     own = {robot.name: {variable.name for variable in robot.variables} for robot in team.robots}
-    dropped = [c for c in team.constraints() if not bears_absence(c)]
-    counted = [c for c in team.constraints() if bears_absence(c)]
+    dropped = [c for c in team.constraints() if not may_count_when_absent(c)]
+    counted = [c for c in team.constraints() if may_count_when_absent(c)]
 
     def place(left: Sequence[Robot], assignment: Assignment, aside: int, best: int) -> int:
         if aside >= best:

@@ -10,7 +10,7 @@ import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Given
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
-from robochoc.model.absence import bears_absence
+from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import Order
 from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.run import Options, Withdrawal, solve
@@ -69,7 +69,7 @@ def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
     parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     fewest = not parts and (traits.complete or not traits.costs)
     maximal = team.kind is ProblemKind.DISCSP and not any(
-        one.model is ConstraintModel.PKC or bears_absence(one) for one in team.constraints()
+        one.model is ConstraintModel.PKC or may_count_when_absent(one) for one in team.constraints()
     )
     return chance.choice([None, None, *([Withdrawal.MINIMUM] * fewest), *([Withdrawal.MAXIMAL] * maximal)])
 

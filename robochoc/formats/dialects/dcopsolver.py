@@ -18,7 +18,7 @@ from lxml import etree
 
 from robochoc.formats.dialects import xdiscsp
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Note, Written
-from robochoc.formats.dialects.exported import Exported, amounts, exported, held, magnitude, maximises
+from robochoc.formats.dialects.exported import Exported, amounts, exported, held_constraints, magnitude, maximises
 from robochoc.formats.dialects.tables import Amount
 from robochoc.formats.dialects.xcsp21.xdiscsp_file import FORMAT
 from robochoc.model.constraint import INFINITE
@@ -173,7 +173,7 @@ def _notes(team: Team) -> Iterator[Note]:
     if renamed := [name for name in team.variables if _is_renamed(team, name)]:
         text = f"the values of {len(renamed)} variables are numbered from 1 on; comments in the file name them"
         yield Note("values", text)
-    if any(one.private_part for one in held(team)):
+    if any(one.private_part for one in held_constraints(team)):
         yield Note(
             "known to more", "both agents of a constraint know it: DCOPSolver does not support partial knowledge (PKC)"
         )

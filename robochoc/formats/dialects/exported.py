@@ -28,7 +28,7 @@ CONSTANT = "constant"
 """The name of a constraint for the constant cost."""
 
 
-class Held(NamedTuple):
+class HeldConstraint(NamedTuple):
     """A constraint, the robot that holds it, and whether only this robot knows it."""
 
     constraint: Constraint
@@ -51,14 +51,14 @@ class Exported:
     table: CostTable
 
 
-def held(team: Team) -> Iterator[Held]:
+def held_constraints(team: Team) -> Iterator[HeldConstraint]:
     """Yield the constraints of `team`, each part of a partially known one by itself."""
     for robot in team.robots:
         for constraint in (*robot.private, *robot.shared):
-            yield Held(constraint, robot, constraint.model == ConstraintModel.PKC)
+            yield HeldConstraint(constraint, robot, constraint.model == ConstraintModel.PKC)
         for child in robot.children:
             for constraint in child.constraints:
-                yield Held(constraint, robot, private_part=True)
+                yield HeldConstraint(constraint, robot, private_part=True)
 
 
 class Tabulator:
@@ -68,7 +68,7 @@ class Tabulator:
         self._domains = {name: variable.domain for name, variable in team.variables.items()}
         self._known: dict[object, CostTable] = {}
 
-    def table(self, one: Held, name: str = "", most: int = MAX_TUPLES) -> Exported | None:
+    def table(self, one: HeldConstraint, name: str = "", most: int = MAX_TUPLES) -> Exported | None:
         """Return the costs of a constraint. None: they need more than `most` tuples."""
         constraint = one.constraint
         scope, definition = constraint.variables, constraint.definition
@@ -97,7 +97,7 @@ def exported(team: Team) -> tuple[list[Exported], Fraction]:
     tabulator = Tabulator(team)
     taken = {*team.variables, CONSTANT}  # pyDCOP has one set of names for both
     found = []
-    for one in held(team):
+    for one in held_constraints(team):
         table = tabulator.table(one, free_name(one.constraint.name, taken))
         if table is None:
             raise UnsupportedError(too_large(team, one.constraint))

@@ -55,7 +55,7 @@ def _asked(
     return answers
 
 
-def test_a_body_that_does_not_come_on_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_with_a_late_body_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guard, "PART_S", 0.01)
     answers: list[dict[str, Any]] = []
 

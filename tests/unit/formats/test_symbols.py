@@ -273,7 +273,7 @@ def test_an_empty_relation_may_be_over_a_symbol_and_an_integer(tmp_path: Path) -
         assert read_team(tmp_path / f"{semantics}-again")["RB"].shared == (constraint,)
 
 
-def test_two_symbols_are_not_told_as_tasks(tmp_path: Path) -> None:
+def test_two_symbols_are_not_reported_as_tasks(tmp_path: Path) -> None:
     team = read_team(files(tmp_path))
     binary = Domain("D", (range(2),), ("red", "green"))
     alone = replace(team["RA"], variables=(Variable("RA.A", binary),), private=(), children=())

@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from robochoc.formats.global_constraints import check_global, read_form
-from robochoc.model.absence import bears_absence, can_be_restated, restated
+from robochoc.model.absence import can_be_restated, may_count_when_absent, restated
 from robochoc.model.constraint import (
     INFINITE,
     Constraint,
@@ -75,7 +75,7 @@ COUNT = "le(add(if(eq(X,1),1,0),if(eq(Y,1),1,0),if(eq(Z,1),1,0)),2)"
         ("le(add(mul(X,Y),mul(Y,Z)),3)", None),
     ],
 )
-def test_what_is_left_without_b(body: str, left: str | None) -> None:
+def test_remaining_constraints_without_b(body: str, left: str | None) -> None:
     whole = predicate(body, "A", "B", "C")
     found = restated(whole, {"B", "elsewhere"})
     assert body_of(found) == left
@@ -97,7 +97,7 @@ def test_actual_numbers_count_as_numbers() -> None:
     assert restated(predicate("le(add(X,Y),Z)", "A", "B", "C"), {"A"}) is None
 
 
-def test_who_is_not_absent_changes_nothing() -> None:
+def test_robots_that_are_not_absent_have_no_effect() -> None:
     whole = predicate(COUNT, "A", "B", "C")
     assert restated(whole, {"Z"}) is whole
     assert restated(whole, set()) is whole
@@ -160,13 +160,13 @@ def test_the_author_may_choose_another_meaning() -> None:
     assert nobody.price({}) == INFINITE
 
 
-def test_what_can_be_restated() -> None:
+def test_constraints_that_can_be_restated() -> None:
     assert can_be_restated(predicate(COUNT, "A", "B", "C"))
     assert can_be_restated(predicate("ne(X,Y)", "A", "B"))
     assert not can_be_restated(predicate("lt(X,Y)", "A", "B"))
-    assert not bears_absence(predicate("ne(X,Y)", "A", "B"))
-    assert bears_absence(replace(predicate("ne(X,Y)", "A", "B"), when_absent=WhenAbsent.FAIL))
-    assert bears_absence(predicate(COUNT, "A", "B", "C"))
+    assert not may_count_when_absent(predicate("ne(X,Y)", "A", "B"))
+    assert may_count_when_absent(replace(predicate("ne(X,Y)", "A", "B"), when_absent=WhenAbsent.FAIL))
+    assert may_count_when_absent(predicate(COUNT, "A", "B", "C"))
     assert not can_be_restated(replace(predicate(COUNT, "A", "B", "C"), model=ConstraintModel.PKC))
     table = Relation("R", 2, Semantics.SUPPORTS, ((1, 2),))
     assert not can_be_restated(Constraint("C", table, ("A", "B"), ("A", "B")))

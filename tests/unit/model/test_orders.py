@@ -15,7 +15,7 @@ from robochoc.formats import read_team, write_team
 from robochoc.formats.global_constraints import read_form
 from robochoc.formats.labels import with_names_apart
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.absence import bears_absence
+from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import Order, OrderError, compute_order, constraint_graph, with_order, with_priorities
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, ScenarioEvent, Semantics
@@ -212,7 +212,7 @@ def test_global_constraints_are_of_the_same_kind_in_every_order() -> None:
     given = [Constraint("C", read_form(kind, row), scope, scope) for row, scope in zip(rows, scopes, strict=True)]
     turned = with_priorities(team_of(dict.fromkeys("ABCD", (1, 2)), given), ["RD", "RC", "RB", "RA"])
     assert [one.definition.name for one in turned["RA"].shared] == [kind, kind]
-    assert all(bears_absence(one) for one in turned.constraints())
+    assert all(may_count_when_absent(one) for one in turned.constraints())
 
 
 def test_a_partially_known_constraint_stays_as_it_is_held() -> None:

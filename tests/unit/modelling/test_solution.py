@@ -54,7 +54,7 @@ def test_a_solution_is_a_mapping() -> None:
     assert {**found} == found.values
 
 
-def test_it_is_true_if_there_is_an_assignment() -> None:
+def test_a_solution_is_true_if_there_is_an_assignment() -> None:
     model, (x, y) = coloured()
     assert solved(model)
     model.add(x == y)

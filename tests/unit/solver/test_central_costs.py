@@ -94,7 +94,7 @@ def test_costs_with_many_digits_are_exact(batch: int, solver: AceProcess) -> Non
     assert highest > 2**45
 
 
-def test_costs_that_are_too_high_are_told_in_the_users_numbers() -> None:
+def test_costs_that_are_too_high_are_reported_in_the_users_numbers() -> None:
     high = Relation("H", 2, Semantics.SOFT, ((0, 0), (0, 1)), (2**52, 3), 0)
     domains = dict.fromkeys("ABCD", (0, 1))
     constraints = [Constraint("".join(pair), high, pair, pair) for pair in itertools.combinations(domains, 2)]

@@ -80,7 +80,7 @@ def test_an_error_of_a_full_disk_names_the_file(
     assert [file.name for file in tmp_path.iterdir()] == (["place"] if write is journal else [])
 
 
-def test_a_command_whose_output_cannot_be_written_says_so() -> None:
+def test_a_command_whose_output_cannot_be_written_reports_an_error() -> None:
     command = [sys.executable, "-m", "robochoc", "protocols"]
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=HERE)

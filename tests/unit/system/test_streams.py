@@ -25,7 +25,7 @@ def all_of(descriptor: int) -> bytes:
         return read.read()
 
 
-def test_what_is_written_ahead_of_the_reader_comes_complete_and_in_order() -> None:
+def test_output_ahead_of_the_reader_arrives_complete_and_in_order() -> None:
     read, write = os.pipe()
     writer = BackgroundWriter(write, 1 << 20)
     assert all(writer.write(line) for line in LINES)
@@ -70,7 +70,7 @@ def test_a_file_that_grows_into_a_pipe_names_a_reader_that_is_too_slow(
     os.close(reader)  # the writer's thread ends, and closes the pipe
 
 
-def test_standard_error_that_nobody_reads_holds_up_neither_a_run_nor_its_end() -> None:
+def test_unread_standard_error_delays_neither_a_run_nor_its_end() -> None:
     """Four megabytes of lines; then the reader gets what there was room for, and the number of other lines."""
     code = (
         "import sys\n"

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 from robochoc.formats.dialects.exported import (
     Exported,
-    Held,
+    HeldConstraint,
     Tabulator,
     constant_of,
-    held,
+    held_constraints,
     maximises,
     too_large,
 )
@@ -39,10 +39,10 @@ class FlatTeam:
         self.weighted = team.kind == ProblemKind.DISWCSP
         self.constant = constant_of(team)
         self.domains, self.domain_of = _domains(team)
-        self.held = list(held(team))
+        self.held = list(held_constraints(team))
         self._tabulator = Tabulator(team)
 
-    def table(self, one: Held, hint: str = "") -> Exported:
+    def table(self, one: HeldConstraint, hint: str = "") -> Exported:
         """Return a constraint as a table.
 
         Raises:
@@ -53,7 +53,7 @@ class FlatTeam:
             raise UnsupportedError(f"{self.title}: {too_large(self.team, one.constraint)}{hint}")
         return table
 
-    def small_table(self, one: Held) -> Exported | None:
+    def small_table(self, one: HeldConstraint) -> Exported | None:
         """Return a constraint as a table. None: it is so large that a predicate or function should be kept."""
         return self._tabulator.table(one, most=MAX_LISTED)
 

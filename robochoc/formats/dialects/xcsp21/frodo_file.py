@@ -14,7 +14,7 @@ from fractions import Fraction
 from lxml import etree
 
 from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
-from robochoc.formats.dialects.exported import Exported, Held, amounts, constant_table, decimal, magnitude
+from robochoc.formats.dialects.exported import Exported, HeldConstraint, amounts, constant_table, decimal, magnitude
 from robochoc.formats.dialects.tables import Amount, Scale
 from robochoc.formats.dialects.xcsp21.document import Document, cost_text
 from robochoc.formats.dialects.xcsp21.flat import FlatTeam, plain
@@ -116,7 +116,7 @@ class _Writer:
                 what = f"the value {far:,} of {name} is beyond FRODO's integers, which end at {LIMIT:,}"
                 raise UnsupportedError(f"{TITLE}: {what}")
 
-    def _in_intension(self, one: Held) -> Predicate | Function | None:
+    def _in_intension(self, one: HeldConstraint) -> Predicate | Function | None:
         """Return the definition of a constraint by FRODO's operators. None: it should be a relation."""
         definition, cost = one.constraint.definition, one.constraint.cost
         if isinstance(definition, Relation):
@@ -130,7 +130,7 @@ class _Writer:
             return Predicate(definition.name, definition.parameters, body)
         return self._as_function(one, definition, body)
 
-    def _as_function(self, one: Held, definition: Predicate | Function, body: Expression) -> Function | None:
+    def _as_function(self, one: HeldConstraint, definition: Predicate | Function, body: Expression) -> Function | None:
         """Return a definition whose costs are finite as a function. None: it should be a relation."""
         if any(robot.costs.places for robot in self._flat.team.robots):  # the costs of a function have no unit
             return None
@@ -140,7 +140,7 @@ class _Writer:
             body = Apply("if", (body, Constant(0), Constant(int(one.constraint.cost))))
         return Function(definition.name, definition.parameters, body)
 
-    def _add_formula(self, one: Held, definition: Predicate | Function) -> None:
+    def _add_formula(self, one: HeldConstraint, definition: Predicate | Function) -> None:
         constraint = one.constraint
         if isinstance(definition, GlobalPredicate):
             element = self._document.constraint(constraint.name, constraint.variables, definition.name)

@@ -10,7 +10,7 @@ from fractions import Fraction
 from lxml import etree
 
 from robochoc.formats.dialects.dialect import ExportOptions, Written
-from robochoc.formats.dialects.exported import Exported, Held
+from robochoc.formats.dialects.exported import Exported, HeldConstraint
 from robochoc.formats.dialects.tables import Amount, CostTable
 from robochoc.formats.dialects.xcsp21.document import Document, cost_text
 from robochoc.formats.dialects.xcsp21.flat import FlatTeam, plain
@@ -70,7 +70,7 @@ class _Writer:
             document.constraints.set("initialCost", constant)
         return document.content()
 
-    def _add(self, one: Held) -> None:
+    def _add(self, one: HeldConstraint) -> None:
         constraint, definition = one.constraint, one.constraint.definition
         model = {"model": "TKC"}
         if one.private_part:
@@ -85,7 +85,7 @@ class _Writer:
         table = self._flat.table(one)
         self._document.constraint(constraint.name, table.scope, self._relation(table, one), **model)
 
-    def _relation(self, exported: Exported, one: Held) -> str:
+    def _relation(self, exported: Exported, one: HeldConstraint) -> str:
         table, name = exported.table, one.constraint.name
         listed = {" ".join(map(str, values)): cost for values, cost in table.rows.items()}
         if not self._flat.weighted:
@@ -95,7 +95,7 @@ class _Writer:
         tuples = "|".join(f"{self._cost(cost, name)}:{values}" for values, cost in listed.items())
         return self._document.relation(exported, attributes, tuples)
 
-    def _is_side(self, one: Held) -> bool:
+    def _is_side(self, one: HeldConstraint) -> bool:
         """Return whether a constraint becomes one side of an asymmetric one. Raises `UnsupportedError`."""
         scope = one.constraint.variables
         if not self._asymmetric or not one.private_part or len({self._flat.team.owner[name] for name in scope}) == 1:

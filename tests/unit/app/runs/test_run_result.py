@@ -28,6 +28,6 @@ def test_no_field_is_dropped() -> None:
         assert msgspec.json.encode(found.epochs) == msgspec.json.encode(msgspec.json.decode(content)["epochs"])
 
 
-def test_a_result_that_lacks_much_is_read() -> None:
+def test_a_result_with_many_missing_fields_is_read() -> None:
     assert decoded(b'{"verdict":"solution"}\n') == RunResult(Verdict.SOLUTION)
     assert decoded(b'{"verdict":"none"}\n') is None

@@ -196,7 +196,7 @@ def read_or_refused(path: Path) -> tuple[Team | None, str]:
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(2_000, marks=pytest.mark.slow)])
-def test_a_random_list_means_what_the_guide_says_or_is_refused(count: int, tmp_path: Path) -> None:
+def test_random_lists_have_the_meaning_of_the_guide_or_are_refused(count: int, tmp_path: Path) -> None:
     chance, solved, refused = Random(f"lists {count}"), 0, 0
     for number in range(count):
         told = random_list(chance)

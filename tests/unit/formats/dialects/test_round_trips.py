@@ -79,7 +79,7 @@ def test_asymmetric_costs_of_three_variables_are_refused_in_xdiscsp() -> None:
         written("xdiscsp", team)
 
 
-def test_dcopsolver_has_what_its_parser_requires() -> None:
+def test_dcopsolver_files_satisfy_its_parser() -> None:
     chance = Random("form")
     for _ in range(20):
         _, team = random_problem(chance, plain=True, simple=True)
@@ -105,7 +105,7 @@ def test_dcopsolver_has_what_its_parser_requires() -> None:
             }
 
 
-def test_dcopsolver_refuses_by_name_what_it_has_not() -> None:
+def test_dcopsolver_refuses_unsupported_parts_by_name() -> None:
     bit, names = Domain("bit", (range(2),)), ("x", "y", "z")
     apart: dict[str, list[Variable]] = {name: [Variable(name, bit)] for name in names}
     together = {"a": [Variable("x", bit), Variable("y", bit)], "b": [Variable("z", bit)]}

@@ -90,7 +90,7 @@ def test_what_is_refused(name: str, text: str, message: str, tmp_path: Path) -> 
     assert message in str(error.value)
 
 
-def test_an_export_is_what_every_toulbar2_reads_exactly() -> None:
+def test_an_export_has_only_costs_that_every_toulbar2_reads_exactly() -> None:
     def team_of(cost: int, places: int) -> Team:
         relation = Relation("r", 1, Semantics.SOFT, ((0,), (1,)), (cost, INFINITE), 0)
         variables = {"a": [Variable("x", Domain("bit", (range(2),)))]}

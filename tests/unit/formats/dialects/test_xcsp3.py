@@ -50,7 +50,7 @@ def rows(*domains: range) -> Iterator[Row]:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_each_form_means_what_it_says(form: str, tmp_path: Path) -> None:
+def test_each_form_has_the_meaning_of_the_specification(form: str, tmp_path: Path) -> None:
     xml, truth = FORMS[form]
     assert solutions(csp(tmp_path, xml)) == {row for row in rows() if truth(*row)}
 
