@@ -96,7 +96,7 @@ def read_study(path: Path) -> Study:
         tables = toml_tables(text)
     except ValueError as wrong:
         raise invalid_input(
-            path, f"is no TOML file: {shortened(str(wrong))}", "docs/guides/experiments.md shows one"
+            path, f"is not a valid TOML file: {shortened(str(wrong))}", "docs/guides/experiments.md shows one"
         ) from None
     return study_of(tables, Place(path, text))
 

@@ -77,8 +77,8 @@ def test_a_file_needs_a_latency_only(tmp_path: Path) -> None:
 
 BAD = {
     "": "the field 'latency_ms' is missing",
-    "latency_ms": "is no TOML file",
-    "latency_ms = 1\nlatency_ms = 2": "is no TOML file",
+    "latency_ms": "is not a valid TOML file",
+    "latency_ms = 1\nlatency_ms = 2": "is not a valid TOML file",
     "latency_ms = 5\nlos = 0.1": "there is no field 'los'; did you mean 'loss'?",
     "latency_ms = -1": "latency_ms: expected a number from 0 to 60,000, got -1",
     "latency_ms = nan": "latency_ms: expected a number from 0 to 60,000, got nan",
@@ -97,8 +97,8 @@ BAD = {
     "latency_ms = 5\ncheck_ns = 1000000000000000000000000": "check_ns: ",
     "latency_ms = 5\nmessage_loss = 0.95": "message_loss: ",
     f"latency_ms = 1{'0' * 400}": "latency_ms: ",
-    f"latency_ms = 1{'0' * 5000}": "is no TOML file",
-    f"latency_ms = {'[' * 20000}": "is no TOML file",
+    f"latency_ms = 1{'0' * 5000}": "is not a valid TOML file",
+    f"latency_ms = {'[' * 20000}": "is not a valid TOML file",
     "latency_ms = 5\nname = 'a b'": "name: expected up to 40",
     "latency_ms = 5\nname = 'wlan'": "name: wlan is the name of a shipped model",
     "latency_ms = 5\nname = ['wlan']": "name: expected a text, found a list",
@@ -200,7 +200,7 @@ def test_what_is_lost_depends_on_where_robots_are(tmp_path: Path) -> None:
         (("--channel", "wlam", "--runtime", "simulator"), 2, "did you mean 'wlan'?"),
         (("--channel", "", "--runtime", "simulator"), 2, "channels: wlan"),
         (("--channel", "wlan", "--runtime", "simulator", "--protocol", "central"), 2, "not for --protocol central"),
-        (("--channel", ROOT / "README.md", "--runtime", "simulator"), 1, "is no TOML file"),
+        (("--channel", ROOT / "README.md", "--runtime", "simulator"), 1, "is not a valid TOML file"),
         (("--channel", ROOT, "--runtime", "simulator"), 1, "is no file"),
     ],
 )

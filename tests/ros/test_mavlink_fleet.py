@@ -73,8 +73,8 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
         ("a: !!python/object:os.system x", "the tag .* is not allowed"),
         (FENCE, "has no vehicles"),
         (f"vehicles: {{Nose: {LINK}}}", "has no fence"),
-        (f"{GOOD}fence: [[0, 0, 0], [60, 60, 60]]", "fleet.yaml:4: 'fence' stands twice"),
-        (f"vehicles:\n  A: {LINK}\n  A: {LINK}0\n{FENCE}", "fleet.yaml:3: 'A' stands twice"),
+        (f"{GOOD}fence: [[0, 0, 0], [60, 60, 60]]", "fleet.yaml:4: duplicate key 'fence'"),
+        (f"vehicles:\n  A: {LINK}\n  A: {LINK}0\n{FENCE}", "fleet.yaml:3: duplicate key 'A'"),
         (
             f"{GOOD}fance: 3",
             r"fleet.yaml:4: unknown key 'fance'; did you mean 'fence'",

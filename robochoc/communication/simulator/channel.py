@@ -216,7 +216,7 @@ def read_channel(path: Path) -> ChannelModel:
     try:
         fields = toml_tables(text)
     except ValueError as wrong:  # also numbers of too many digits
-        raise _invalid(path, f"is no TOML file: {shortened(str(wrong))}") from None
+        raise _invalid(path, f"is not a valid TOML file: {shortened(str(wrong))}") from None
     fields.setdefault("name", path.stem)
     if fields["name"] in (*CHANNELS,):
         raise _invalid(path, f"name: {fields['name']} is the name of a shipped model", "name it otherwise")

@@ -283,7 +283,7 @@ def root_keys(text: str) -> set[str]:
 
 
 def _refuse_repeated(line: int, key: str) -> None:
-    raise MistakeError(f"'{shortened(key)}' stands twice", "delete or rename one of them", line)
+    raise MistakeError(f"duplicate key '{shortened(key)}'", "delete or rename one of them", line)
 
 
 def _tree(text: str, expected: str, repeated: Repeated) -> Node:

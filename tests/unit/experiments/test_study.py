@@ -106,7 +106,7 @@ def test_a_study_of_tables_has_the_text_of_its_file() -> None:
 
 WRONG = {
     "no file": (None, 0, "cannot be read"),
-    "no TOML": ("[problems", 0, "is no TOML file"),
+    "no TOML": ("[problems", 0, "is not a valid TOML file"),
     "no problems": ('[runs]\nprotocol = "abt"\n', 0, "problems: expected a table"),
     "no runs": (SMALL.partition("[runs]")[0], 0, "runs: expected a table"),
     "unknown table": (f"{SMALL}[limit]\n", 12, "limit: there is no such key (did you mean 'limits'?)"),

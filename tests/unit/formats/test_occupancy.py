@@ -137,7 +137,7 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
         ("0.25", "0.7", "plan.yaml:6: has a wrong free_thresh .*from 0 to 0.65"),
         ("negate: 0", "negate: 0\nmode: [raw]", "plan.yaml:5: has a list or mapping as its mode .*are read"),
         ("negate: 0", "negate: 0\nmode: rare", "plan.yaml:5: has the mode rare .*trinary, scale, raw are read"),
-        ("negate: 0", "negate: 0\nnegate: 1", "plan.yaml:5: 'negate' stands twice"),
+        ("negate: 0", "negate: 0\nnegate: 1", "plan.yaml:5: duplicate key 'negate'"),
         ("negate: 0", "negate: !!python/object:os.system 0", "plan.yaml:4: the tag"),
         ("negate: 0", "negate: 0\nmood: raw", "plan.yaml:5: unknown key 'mood' .*did you mean 'mode'"),
         ("negate: 0", "negate: 0\nmode:\n- raw", "plan.yaml:6: has a list or mapping"),

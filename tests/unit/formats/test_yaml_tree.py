@@ -59,7 +59,7 @@ def test_aliases_and_merged_mappings_are_read_in_place() -> None:
         ),
         ("robots:", "robot:", 2, "unknown key 'robot' in the file", "did you mean 'robots'?"),
         ("robots:", "people:", 1, "the file has no robots", "write robots:"),
-        ("name: n", "name: n\nname: m", 2, "'name' stands twice", "delete or rename one"),
+        ("name: n", "name: n\nname: m", 2, "duplicate key 'name'", "delete or rename one"),
     ],
 )
 def test_parts_that_no_reader_uses_are_refused(now: str, then: str, line: int, message: str, hint: str) -> None:

@@ -28,7 +28,7 @@ class Part:
     text: str
 
     def read(self, read: Callable[[Node], Read], repeated: Repeated) -> Read:
-        """Return what `read` makes of the files. Raises `InvalidInputError` for a part of them that it does not use."""
+        """Return the result of `read` for the files. Raises `InvalidInputError` for a part that `read` does not use."""
         with self.blamed():
             return read_yaml(self.text, read, repeated=repeated)
 

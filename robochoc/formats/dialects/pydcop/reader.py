@@ -59,7 +59,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
 
     def repeated(line: int, key: str) -> None:
         path, number = parts.problem.place(line)
-        notes.append(Note("repeated", f"{path}:{number}: {shortened(key)} stands twice; the later one counts"))
+        notes.append(Note("repeated", f"{path}:{number}: duplicate key {shortened(key)}; the later value counts"))
 
     return parts.problem.read(lambda root: _Reader(parts, options, root, notes).imported(), repeated)
 
@@ -219,7 +219,9 @@ class _Reader:
         agents = agent_names(self._root.get("agents"))
         return part.read(
             lambda root: read_scenario(root, team, self._robot_names, agents, self._notes),
-            lambda _, key: self._notes.append(Note("repeated", f"{shortened(key)} stands twice; the later one counts")),
+            lambda _, key: self._notes.append(
+                Note("repeated", f"duplicate key {shortened(key)}; the later value counts")
+            ),
         )
 
 

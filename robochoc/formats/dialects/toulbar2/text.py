@@ -74,7 +74,7 @@ class Reader:
 
 
 def read_words(words: Words, read: Callable[[Reader], Found]) -> Found:
-    """Return what `read` makes of the words of a file. Raises `MistakeError` where it leaves some."""
+    """Return the result of `read` for the words of a file. Raises `MistakeError` if words remain."""
     source = Reader(words)
     found = read(source)
     left = source.more()

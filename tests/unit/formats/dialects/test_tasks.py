@@ -110,7 +110,7 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
         (", worth: 10", ", wort: 10", "6: unknown key 'wort' in the task 'survey' (did you mean 'worth'?)"),
         ("distance: streets", "model: assignment", "may do 2 tasks, and the model is assignment"),
         ("distance: streets", "places: 10", "has 10 places"),
-        ("  bob:", "  ann:", "3: 'ann' stands twice"),
+        ("  bob:", "  ann:", "3: duplicate key 'ann'"),
         ("tasks:\n", "task:\n", "5: unknown key 'task' in the file (did you mean 'tasks'?)"),
         ("robots:\n", "robots: []\nrobot:\n", "1: robots is not a mapping"),
         ("fetch: {", "fetch: !!python/object:os.system {", "8: the tag"),
