@@ -29,6 +29,8 @@ AGGREGATES = frozenset({"add", "min", "max", "and", "or"})
 """The operators whose arguments are terms of an aggregate."""
 _COMPARING = AGGREGATES | {"eq", "ne", "lt", "le", "gt", "ge", "in", "not", "sub", "neg", "mul", "if"}
 """The operators that may compare an aggregate with numbers, or combine it with numbers before that."""
+_CONNECTIVES = frozenset({"and", "or"})
+"""The operators that join conditions."""
 _NUMBERS = frozenset({"add", "min", "max"})
 """Aggregates of numbers: the numbers in their terms may differ from robot to robot."""
 _ALL_DIFFERENT, _CUMULATIVE = "global:allDifferent", "global:cumulative"
@@ -153,19 +155,38 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
         return None
     terms = [one for one in _flat(expression) if names(one)]
     if len(terms) >= _TWO:
-        if expression.operator not in AGGREGATES or not _alike(expression.operator, terms):
+        if _is_about_one(expression, terms):
+            left = [without_terms(one, lost) for one in _flat(expression)]
+        elif expression.operator in AGGREGATES and _alike(expression.operator, terms):
+            left = [_term(one, lost) for one in _flat(expression)]
+        else:
             raise NotAnAggregateError
-        kept = [left for one in _flat(expression) if (left := _term(one, lost)) is not None]
+        kept = [one for one in left if one is not None]
         if not any(names(one) for one in kept):
             return None
         return kept[0] if len(kept) == 1 else Apply(expression.operator, tuple(kept))
     if expression.operator not in _COMPARING:
         raise NotAnAggregateError
     (term,) = terms
-    left = without_terms(term, lost)
-    if left is None:
+    remaining = without_terms(term, lost)
+    if remaining is None:
         return None
-    return Apply(expression.operator, tuple(left if one is term else one for one in _flat(expression)))
+    return Apply(expression.operator, tuple(remaining if one is term else one for one in _flat(expression)))
+
+
+def _is_about_one(expression: Apply, terms: Iterable[Expression]) -> bool:
+    """Return whether `expression` joins conditions on one aggregate: it lies between numbers, or is one of a set."""
+    return expression.operator in _CONNECTIVES and len({_compared(one) for one in terms}) == 1
+
+
+def _compared(expression: Expression) -> Expression:
+    """Return the part of `expression` that is compared with numbers."""
+    while isinstance(expression, Apply):
+        terms = [one for one in _flat(expression) if names(one)]
+        if len(terms) != 1 and not _is_about_one(expression, terms):
+            break
+        expression = terms[0]
+    return expression
 
 
 def _term(term: Expression, lost: Collection[str]) -> Expression | None:
@@ -200,32 +221,39 @@ def _alike(operator: str, terms: Iterable[Expression]) -> bool:
 
 def _shape(expression: Expression, *, loose: bool) -> Hashable:
     """Return the form of a term without names; with `loose`, also without numbers, except the signs of factors."""
-    match expression:
+    if loose and not names(expression):
+        return "number"
+    sign, part = _without_numbers(expression) if loose else (1, expression)
+    if sign < 0:
+        return "minus", _shape(part, loose=True)
+    match part:
         case Name():
             return "name"
         case Constant(value):
-            return "number" if loose else value
-        case Apply("neg", (part,)) if loose:
-            return _signed(-1, _shape(part, loose=True))
-        case Apply("mul", arguments) if loose and any(isinstance(one, Constant) for one in arguments):
-            sign, others = 1, []
-            for one in arguments:
-                if isinstance(one, Constant):
-                    sign = sign if one.value >= 0 else -sign
-                else:
-                    others.append(_shape(one, loose=True))
-            return _signed(sign, others[0] if len(others) == 1 else ("mul", *others))
+            return value
         case Apply("if", (test, Constant(then), Constant(otherwise))) if loose:
             return "if", _shape(test, loose=True), _sign(then), _sign(otherwise)
         case Apply(operator, _):
-            parts = [_shape(one, loose=loose) for one in _flat(expression)]
+            parts = [_shape(one, loose=loose) for one in _flat(part)]
             return parts[0] if operator in {"and", "or"} and len({*parts}) == 1 else (operator, *parts)
 
 
-def _signed(sign: int, shape: Hashable) -> Hashable:
-    if sign > 0:
-        return shape
-    return shape[1] if isinstance(shape, tuple) and shape[0] == "minus" else ("minus", shape)
+def _without_numbers(expression: Expression) -> tuple[int, Expression]:
+    """Return the sign of a term's factor, and the term without the numbers that are added to it or multiply it."""
+    sign = 1
+    while isinstance(expression, Apply) and expression.operator in {"neg", "add", "sub", "mul"}:
+        terms = [one for one in _flat(expression) if names(one)]
+        if expression.operator == "mul":
+            factors = [one.value for one in expression.arguments if isinstance(one, Constant)]
+            sign *= (-1) ** sum(factor < 0 for factor in factors)
+            if factors and len(terms) > 1:
+                return sign, Apply("mul", tuple(terms))
+        if len(terms) > 1:
+            break
+        if expression.operator == "neg" or (expression.operator == "sub" and expression.arguments[1] is terms[0]):
+            sign = -sign
+        (expression,) = terms
+    return sign, expression
 
 
 def _sign(value: int) -> int:

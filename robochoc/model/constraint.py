@@ -214,6 +214,7 @@ class Constraint:
         when_absent: Its meaning when a robot is absent. None: as its form implies.
         original: The original form of a constraint that was restated for the robots that stay.
         absent: The variables of `original` whose robots are absent.
+        robots: The robots of `original`, in priority order, in a team that some of them have left.
     """
 
     name: str
@@ -227,6 +228,7 @@ class Constraint:
     when_absent: WhenAbsent | None = None
     original: Constraint | None = field(default=None, compare=False, repr=False)
     absent: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    robots: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @cached_property
     def variables(self) -> tuple[str, ...]:

@@ -81,28 +81,35 @@ class Absence:
         self._gone = {variable.name for name in absent if name in team for variable in team[name].variables}
         self.restated: list[Constraint] = []
         self.dropped: list[DroppedConstraint] = []
-        rank = {name: place for place, name in enumerate(team.order)}
+        self._team = team
+        self._rank = {name: place for place, name in enumerate(team.order)}
         for robot in team.robots:
             is_unknown = with_files and robot.name in absent
             for constraint in robot.private if robot.name in absent and not is_unknown else ():
-                if constraint.when_absent == WhenAbsent.FAIL:
-                    self._add(constraint)
+                if constraint.when_absent == WhenAbsent.FAIL or constraint.robots:
+                    self._restate_or_drop(constraint)
             for constraint in (*robot.shared, *(part for child in robot.children for part in child.constraints)):
                 if self._gone.isdisjoint(constraint.variables):
                     continue
-                if is_unknown or not self._add(constraint, robot if with_files else None):
-                    owners = {team.owner[name] for name in constraint.variables if name in team.owner}
-                    robots = tuple(sorted(owners, key=rank.__getitem__))
-                    self.dropped.append(DroppedConstraint(constraint.name, robots))
+                if is_unknown:
+                    self.dropped.append(DroppedConstraint(constraint.name, self._robots(constraint)))
+                else:
+                    self._restate_or_drop(constraint, robot if with_files else None)
 
-    def _add(self, constraint: Constraint, holder: Robot | None = None) -> bool:
-        """Add the rest of `constraint`. Return whether there is one, which mentions the `holder` if one is given."""
+    def _restate_or_drop(self, constraint: Constraint, holder: Robot | None = None) -> None:
+        """Restate `constraint`. Drop it if nothing remains, or nothing that mentions the `holder`, if given."""
         left = restated(constraint, self._gone)
         if left is not None and holder is not None and left.when_absent != WhenAbsent.FAIL:
             left = left if any(variable.name in left.variables for variable in holder.variables) else None
-        if left is not None:
-            self.restated.append(left)
-        return left is not None
+        if left is None:
+            self.dropped.append(DroppedConstraint(constraint.name, self._robots(constraint)))
+        else:
+            self.restated.append(replace(left, robots=self._robots(constraint)))
+
+    def _robots(self, constraint: Constraint) -> tuple[str, ...]:
+        """Return the robots of `constraint`, those included that have left before, in priority order."""
+        owners = {self._team.owner[name] for name in constraint.variables if name in self._team.owner}
+        return constraint.robots or tuple(sorted(owners, key=self._rank.__getitem__))
 
     def untouched(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         """Return those of `constraints` that mention no absent robot."""

@@ -97,6 +97,7 @@ MEANINGS: dict[str, Meaning] = {
     ),
     "eq": Meaning(BOOLEAN, _equal, "=="),
     "ne": Meaning(BOOLEAN, lambda x, y: not _equal(x, y), "!="),
+    "in": Meaning(BOOLEAN, lambda x, *members: any(_equal(x, one) for one in members), "is_in"),
     "lt": Meaning(BOOLEAN, lambda x, y: exact(x) < exact(y), "<"),
     "le": Meaning(BOOLEAN, lambda x, y: exact(x) <= exact(y), "<="),
     "gt": Meaning(BOOLEAN, lambda x, y: exact(x) > exact(y), ">"),

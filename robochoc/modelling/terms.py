@@ -57,7 +57,11 @@ class Term:
 
     def is_in(self, values: Iterable[object]) -> Term:
         """Return the condition that this has one of `values`."""
-        return any_of([self == value for value in values])
+        equations = [condition(self == value) for value in values]
+        members = [one.arguments[1] for one in equations]
+        if len(members) > 1 and all(isinstance(one, Constant) for one in members):
+            return Applied("in", self, *members)
+        return any_of(equations)
 
     def __add__(self, other: object) -> Term:
         return linear(((1, self), (1, _operand(other))))

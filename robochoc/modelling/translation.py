@@ -79,8 +79,8 @@ class Translator:
                 pairs = [("ne", one, other) for n, one in enumerate(arguments) for other in arguments[:n]]
                 found = tuple(self._comparison(*pair) for pair in pairs)
                 return found[0] if len(found) == 1 else Apply("and", found)
-            case Applied(operator=operator, arguments=(one, other)) if operator in _COMPARISONS:
-                return self._comparison(operator, one, other)
+            case Applied(operator=operator, arguments=arguments) if operator in _COMPARISONS:
+                return self._comparison(operator, *arguments)
             case _:
                 raise UntranslatableError
 
@@ -170,11 +170,11 @@ class Translator:
             raise UntranslatableError
         return Scaled(Apply("pow", (base.expression, exponent.expression)))
 
-    def _comparison(self, operator: str, one: Term, other: Term) -> Expression:
-        symbolic = next((side for side in (one, other) if isinstance(side, Variable) and side.codes.symbolic), None)
+    def _comparison(self, operator: str, *sides: Term) -> Expression:
+        symbolic = next((side for side in sides if isinstance(side, Variable) and side.codes.symbolic), None)
         if symbolic is not None:
-            return Apply(operator, (self._symbol(one, symbolic), self._symbol(other, symbolic)))
-        found, _ = _together((self.number(one), self.number(other)))
+            return Apply(operator, tuple([self._symbol(side, symbolic) for side in sides]))
+        found, _ = _together([self.number(side) for side in sides])
         return Apply(operator, tuple(found))
 
     def _symbol(self, term: Term, variable: Variable) -> Expression:
@@ -190,7 +190,7 @@ class Translator:
         return bounds(expression, self._limits)
 
 
-_COMPARISONS = {"eq", "ne", "lt", "le", "gt", "ge"}
+_COMPARISONS = {"eq", "ne", "in", "lt", "le", "gt", "ge"}
 
 
 def _interval(variable: Variable) -> Interval:

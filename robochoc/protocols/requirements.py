@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.model.absence import may_count_when_absent
-from robochoc.model.problem import ConstraintModel, Robot
+from robochoc.model.problem import ConstraintModel, Robot, WhenAbsent
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
 
@@ -26,7 +26,7 @@ def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -
         traits: The protocol's capabilities.
         owners: The names of the robots that own the variables, by the variables' names.
     """
-    held_for_children = (constraint for child in robot.children for constraint in child.constraints)
+    held_for_children = [constraint for child in robot.children for constraint in child.constraints]
     for constraint in (*robot.shared, *held_for_children):
         if constraint.model == ConstraintModel.PKC and is_soft(constraint) and not traits.asymmetric:
             return f"{robot.name} has costs of its own for a partially known constraint (PKC, {constraint.name})"
@@ -35,7 +35,8 @@ def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -
         if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > _TWO:
             return f"{robot.name} holds a constraint over more than two robots ({constraint.name})"
     if traits.drops_only:
-        for constraint in robot.constraints():
+        private = [one for one in robot.private if one.when_absent == WhenAbsent.FAIL]  # others leave with the robot
+        for constraint in (*private, *robot.shared, *held_for_children):
             if may_count_when_absent(constraint):
                 return f"{robot.name} holds {constraint.name}, {BREAKABLE}"
     return ""

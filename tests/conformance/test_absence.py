@@ -121,3 +121,29 @@ def check(case: AbsenceModel, outcome: robochoc.Solution, gone: tuple[str, ...] 
     if best < math.inf:
         assert outcome.verdict in {"optimal", "solution"}, seed
         assert case.price(case.values_by_robot(outcome.values)) == best, seed
+
+
+def test_constraints_are_listed_when_their_robots_leave_one_after_the_other() -> None:
+    model = robochoc.Model("leaving")
+    a, b, _ = (model.robot(name).variable("x", [1, 2]) for name in "abc")
+    model.add(a + b <= 3, name="sum")
+    for name in "ab":
+        model.after_solution().remove_robot(name)
+    outcome = model.solve("sfb", runtime="simulator")
+    assert [(one.name, one.robots) for one in outcome.dropped_constraints] == [("sum", ("a", "b"))]
+    assert [len(epoch.dropped_constraints) for epoch in outcome.epochs] == [0, 0, 1]
+
+
+def test_members_of_sets_are_restated_and_private_constraints_allow_first_fit() -> None:
+    model = robochoc.Model("sets")
+    posts = [model.robot(name).variable("post", [1, 2, 3]) for name in "abc"]
+    one, two, three = (post.is_in([1, 3]) for post in posts)
+    model.add((one + two + three).is_in([0, 3]), name="together")
+    model.add(robochoc.any_of(post.is_in([2, 3]) for post in posts), when_absent="restate")
+    model.add(posts[0] != posts[1], posts[1] != posts[2], posts[0] != posts[2])
+    model.add(sum(posts) >= 3)
+    assert model.solve("dpop", runtime="simulator", withdraw="minimum").withdrawn == ("a", "b", "c")
+    private = robochoc.Model("private")
+    left, right = (private.robot(name).variable("x", [1, 2]) for name in "ab")
+    private.add(left + 0 <= 1, right <= 1, left != right)
+    assert len(private.solve("abt", runtime="simulator", withdraw="maximal").withdrawn) == 1
