@@ -8,6 +8,7 @@ solvers and changes of a team all use `restated`.
 
 from __future__ import annotations
 
+import itertools
 import re
 import zlib
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
@@ -157,7 +158,9 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
     if len(terms) >= _TWO:
         if _is_about_one(expression, terms):
             left = [without_terms(one, lost) for one in _flat(expression)]
-        elif expression.operator in AGGREGATES and _alike(expression.operator, terms):
+        elif _is_all_different(expression) or (
+            expression.operator in AGGREGATES and _alike(expression.operator, terms)
+        ):
             left = [_term(one, lost) for one in _flat(expression)]
         else:
             raise NotAnAggregateError
@@ -172,6 +175,17 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
     if remaining is None:
         return None
     return Apply(expression.operator, tuple(remaining if one is term else one for one in _flat(expression)))
+
+
+def _is_all_different(expression: Apply) -> bool:
+    """Return whether `expression` says of each pair of some terms and numbers that the two differ."""
+    if expression.operator != "and" or any(
+        not isinstance(one, Apply) or one.operator != "ne" for one in _flat(expression)
+    ):
+        return False
+    pairs = {frozenset(one.arguments) for one in _flat(expression) if isinstance(one, Apply)}
+    listed = dict.fromkeys(one for pair in pairs for one in pair)
+    return all(frozenset(pair) in pairs or not any(map(names, pair)) for pair in itertools.combinations(listed, 2))
 
 
 def _is_about_one(expression: Apply, terms: Iterable[Expression]) -> bool:

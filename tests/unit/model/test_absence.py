@@ -57,6 +57,7 @@ COUNT = "le(add(if(eq(X,1),1,0),if(eq(Y,1),1,0),if(eq(Z,1),1,0)),2)"
         ("ge(add(mul(3,X),mul(Y,5),Z),10)", "ge(add(mul(3,A),C),10)"),
         ("eq(sub(add(neg(X),neg(Y),mul(-2,Z)),1),-4)", "eq(sub(add(neg(A),mul(-2,C)),1),-4)"),
         ("in(add(X,Y,Z),set(2,4))", "in(add(A,C),set(2,4))"),
+        ("not(and(ne(X,Y),ne(X,Z),ne(Y,Z),ne(X,3),ne(Y,3),ne(Z,3)))", "not(and(ne(A,C),ne(A,3),ne(C,3)))"),
         ("and(ge(add(X,Y,Z),2),le(add(X,Y,Z),4))", "and(ge(add(A,C),2),le(add(A,C),4))"),
         ("not(or(eq(min(X,Y,Z),1),gt(min(X,Y,Z),3)))", "not(or(eq(min(A,C),1),gt(min(A,C),3)))"),
         ("le(max(add(X,4),Y,sub(Z,2)),5)", "le(max(add(A,4),sub(C,2)),5)"),
