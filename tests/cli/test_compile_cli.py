@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import pytest
 from lxml import etree
 
+from robochoc import Model
 from robochoc.formats import PREDEFINED, read_team, write_team
 from robochoc.model.problem import Constraint
 from robochoc.verification.checker import violations
@@ -291,6 +292,16 @@ def test_export_writes_who_owns_what(four_rows: tuple[Path, str], tmp_path: Path
     written = tmp_path / "rows.xml"
     assert robochoc_within("export", four_rows[0], "-o", written).returncode == 0
     assert written.read_text() == done.stdout
+
+
+def test_export_names_constraints_with_a_meaning_for_absent_robots(tmp_path: Path) -> None:
+    model = Model("absent")
+    one, two = (model.robot(name).variable("x", [1, 2]) for name in "ab")
+    model.add(one != two, name="apart", when_absent="fail")
+    model.add(one <= two, name="sorted", when_absent="drop")
+    model.save(tmp_path / "absent")
+    done = robochoc_within("export", tmp_path / "absent")
+    assert (done.returncode, done.stderr.count("left out: when_absent of apart and 1 other constraint:")) == (0, 1)
 
 
 def test_a_broken_file_is_named_with_its_line(rows: Path, tmp_path: Path) -> None:

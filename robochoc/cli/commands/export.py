@@ -70,12 +70,14 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
 
 def _written(team: Team, kind: str, options: ExportOptions) -> Written:
     """Return the files of `team` in the format `kind`."""
+    from robochoc.formats.dialects.dialect import notes_on_absence
     from robochoc.formats.dialects.registry import dialect_called
 
     dialect = dialect_called(kind)
     if dialect is None or dialect.write is None:
         raise Failure(USAGE, f"this version does not write {kind}")
-    return dialect.write(team, options)
+    written = dialect.write(team, options)
+    return written._replace(notes=(*written.notes, *notes_on_absence(team)))
 
 
 def _ending(team: Team, name: str) -> str:

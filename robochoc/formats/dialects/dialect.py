@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from robochoc.formats.names import MAX_NAME, RESERVED, is_name
 from robochoc.model.problem import Team
+from robochoc.model.wording import counted
 
 MAX_FILE = 256 * 1024 * 1024
 """The maximum size of a file, in bytes."""
@@ -145,3 +146,10 @@ class Names:
 def notes_on_names(changed: Collection[tuple[str, str]]) -> list[Note]:
     """Return a note for each pair of a name and its original."""
     return [Note("renamed", f"{original} is {name}") for name, original in changed]
+
+
+def notes_on_absence(team: Team) -> list[Note]:
+    """Return a note on the chosen meanings of constraints for absent robots, which other formats do not have."""
+    first, *more = [*dict.fromkeys(one.name for one in team.constraints() if one.when_absent is not None), ""]
+    others = f" and {counted(len(more) - 1, 'other constraint')}" if len(more) > 1 else ""
+    return [Note("left out", f"when_absent of {first}{others}: the format has no absent robots")] if first else []
