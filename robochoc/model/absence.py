@@ -206,7 +206,8 @@ def _compared(expression: Expression) -> Expression:
 def _term(term: Expression, lost: Collection[str]) -> Expression | None:
     """Return a term of an aggregate without the names `lost`; None: the term is lost.
 
-    A term that mentions several robots is restated if it is an aggregate of its own and mentions two that stay.
+    A term that mentions several robots is restated if it is an aggregate of its own and mentions two that stay, or if
+    the last one that stays is mentioned in each of its parts (the load at the start of one task).
     """
     if not any(name in lost for name in names(term)):
         return term
@@ -214,7 +215,11 @@ def _term(term: Expression, lost: Collection[str]) -> Expression | None:
         left = without_terms(term, lost)
     except NotAnAggregateError:
         return None
-    return left if left is not None and len(names(left)) >= _TWO else None
+    if left is None or len(names(left)) >= _TWO:
+        return left
+    whole = _compared(term)
+    parts = [one for one in _flat(whole) if names(one)] if isinstance(whole, Apply) else []
+    return left if all({*names(left)} <= {*names(one)} for one in parts) else None
 
 
 def _flat(expression: Apply) -> Sequence[Expression]:

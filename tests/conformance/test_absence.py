@@ -147,3 +147,15 @@ def test_members_of_sets_are_restated_and_private_constraints_allow_first_fit() 
     left, right = (private.robot(name).variable("x", [1, 2]) for name in "ab")
     private.add(left + 0 <= 1, right <= 1, left != right)
     assert len(private.solve("abt", runtime="simulator", withdraw="maximal").withdrawn) == 1
+
+
+def test_a_soft_cumulative_holds_for_the_last_task() -> None:
+    model = robochoc.Model("tasks")
+    starts = [model.robot(name).variable("start", [1, 2]) for name in "abc"]
+    model.add(robochoc.cumulative(starts, [2, 1, 1], [2, 1, 1], 1), cost=4, name="crane")
+    model.minimize(sum(starts))
+    event = model.after_solution()
+    event.remove_robot("b")
+    event.remove_robot("c")
+    outcome = model.solve("dpop", runtime="simulator")
+    assert (outcome.cost, outcome.dropped_constraints) == (5, ())
