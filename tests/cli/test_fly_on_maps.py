@@ -135,7 +135,7 @@ def test_what_is_wrong_with_a_map_is_said_with_its_file(team: Path, result: Path
     whole = json.loads(ground.read_text())
     for walls, why in (
         ({**whole["walls"], "free": "AAAA"}, "its walls have 63 pixels, and free has flags for 24"),
-        ({**whole["walls"], "resolution": "x"}, "Expected `float`"),
+        ({**whole["walls"], "resolution": "x"}, "walls.resolution: expected a number, found a text"),
     ):
         ground.write_text(json.dumps({**whole, "walls": walls}))
         for words in (

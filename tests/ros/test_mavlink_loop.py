@@ -7,6 +7,7 @@ import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,7 @@ def openings(done: subprocess.CompletedProcess[str]) -> list[str]:
     assert "opened by" in done.stdout, done.stderr
     lines = done.stdout.splitlines()
     table = lines[next(n for n, line in enumerate(lines) if "opened by" in line) + 1 :]
-    return [" ".join(line.split()[1:-4]) for line in table if line.split()[0].isdigit()]
+    return [" ".join(line.split()[1:-4]) for line in takewhile(lambda line: line.split()[0].isdigit(), table)]
 
 
 def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) -> None:
