@@ -23,6 +23,8 @@ MAX_DEPTH = 50
 TRUE: Expression = Apply("eq", (Constant(0), Constant(0)))
 FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
 
+_LARGEST_SET = 64
+"""Larger sets are written as the ranges in them."""
 _TOKEN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*|[+-]?[0-9]{1,18}(?![0-9.])|%[0-9]{1,6}|[(),])")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _RANGE = re.compile(r"([+-]?[0-9]{1,18})\.\.([+-]?[0-9]{1,18})")
@@ -125,6 +127,8 @@ def inside(expression: Expression, values: Collection[int]) -> Expression:
             runs[-1] = runs[-1][0], value
         else:
             runs.append((value, value))
+    if len(runs) > 1 and len(values) <= _LARGEST_SET:  # one operation: alike in each term of an aggregate
+        return Apply("in", (expression, *(Constant(value) for value in sorted(set(values)))))
     return some([_between(expression, low, high) for low, high in runs])
 
 

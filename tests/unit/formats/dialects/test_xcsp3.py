@@ -19,6 +19,7 @@ from robochoc.formats.dialects.xcsp3 import DIALECT
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized, told_cost
 from robochoc.model.problem import Team
+from robochoc.model.team_edits import without_robots
 from robochoc.solver.central import CentralSolver
 from tests.support import brute_force
 from tests.support.cost_problems import cost_of, random_cost_team
@@ -53,6 +54,13 @@ def rows(*domains: range) -> Iterator[Row]:
 def test_each_form_has_the_meaning_of_the_specification(form: str, tmp_path: Path) -> None:
     xml, truth = FORMS[form]
     assert solutions(csp(tmp_path, xml)) == {row for row in rows() if truth(*row)}
+
+
+def test_terms_with_sets_are_alike_when_a_robot_is_absent(tmp_path: Path) -> None:
+    """`docs/reference/absence.md`: a disjunction of alike conditions stays in force for the others."""
+    at_an_end = "or(in(x[0],set(0,2)),in(x[1],set(0,2)),in(x[2],set(0,2)))"
+    team = without_robots(csp(tmp_path, f"<intension> {at_an_end} </intension>"), ["x_2"])
+    assert solutions(team) == {row for row in rows(range(3), range(3)) if row != (1, 1)}
 
 
 def test_domains_of_arrays_holes_and_copies(tmp_path: Path) -> None:
