@@ -60,7 +60,7 @@ def computed_by(
         finally:
             with raising:
                 if raised:
-                    _raise_in(threading.get_ident(), None)
+                    _drop_pending_error()
 
 
 def _watch(
@@ -89,9 +89,28 @@ def _ignore_where_dropped() -> None:
     sys.unraisablehook = print_others
 
 
-def _raise_in(thread: int, error: type[Exception] | None) -> None:
-    """Raise an error in a thread; None: cancel an error that is still pending there."""
+def _drop_pending_error() -> None:
+    """Make sure that this thread has no `TimeLimitError` left to be raised later: raise one more, and catch it.
+
+    `PyThreadState_SetAsyncExc` can also remove the error. But then Python up to 3.12 looks for it again before each
+    function, for ever, which is slow, and does not end where the functions are traced (`sys.setprofile`).
+    """
+    interruption: BaseException | None = None
+    while True:
+        try:
+            _raise_in(threading.get_ident(), TimeLimitError)
+            while True:
+                time.sleep(0)
+        except TimeLimitError:
+            break
+        except BaseException as error:  # noqa: BLE001 - Ctrl-C, raised again below
+            interruption = error
+    if interruption is not None:
+        raise interruption
+
+
+def _raise_in(thread: int, error: type[Exception]) -> None:
+    """Raise an error in a thread."""
     import ctypes  # noqa: PLC0415 - start-up: few runs come to the end of their time
 
-    raised = None if error is None else ctypes.py_object(error)
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), raised)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(error))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -117,3 +119,20 @@ def test_nothing_is_raised_after_the_computation() -> None:
             continue
     threading.Event().wait(0.1)
     assert sum(range(10_000)) == 49_995_000
+
+
+def test_traced_functions_end_after_a_time_limit() -> None:
+    """In Python up to 3.12, removing a pending error makes traced functions wait for ever. A process can be ended."""
+    program = """
+import sys, time
+from robochoc.system.time_limit import TimeLimitError, computed_by
+try:
+    computed_by(time.monotonic() + 0.05, lambda: [time.sleep(0) for _ in iter(int, 1)])
+except TimeLimitError:
+    sys.setprofile(lambda *_: None)
+    (lambda: None)()
+    sys.setprofile(None)
+    print("ended")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=HANG_S)
+    assert (done.stdout, done.stderr) == ("ended\n", "")
