@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
@@ -124,11 +125,10 @@ class Simulation(Session):
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
         if self._verdict is None:
-            with garbage_frozen(), collection_seldom():  # robots' problems are no garbage, and most of what there is
-                if timeout is None:
-                    self._play(began, timeout, messages)
-                else:
-                    self._play_until(began + timeout + LONGEST_STEP_S, began, timeout, messages)
+            end = None if timeout is None else began + timeout + LONGEST_STEP_S
+            # Robots' problems are no garbage, and they are most of what there is.
+            with garbage_frozen(), collection_seldom(), suppress(TimeLimitError):
+                computed_by(end, self._play, began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
         result = RunResult.of(
@@ -143,13 +143,6 @@ class Simulation(Session):
         self._limits = _left(self._limits, metrics)
         findings = {name: host.protocol.findings for name, host in self._hosts.items()}
         return replace(result, metrics=metrics, findings=findings)
-
-    def _play_until(self, end: float, began: float, timeout: float, messages: int | None) -> None:
-        """Play until the time limit; a step that continues beyond `end` is interrupted."""
-        try:
-            computed_by(end, self._play, began, timeout, messages)
-        except TimeLimitError:
-            return
 
     def change(self, epoch: Epoch) -> None:
         """See `Session.change`."""
