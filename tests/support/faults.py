@@ -152,7 +152,8 @@ class Run:
     def left_behind(self) -> list[str]:
         """Files that nobody asked for: temporary ones, shared memory, unfinished outputs."""
         unfinished = [path for path in self.home.rglob("*") if path.name.startswith(".") or path.suffix == ".part"]
-        return [*map(str, (*self.temporary.iterdir(), *unfinished)), *(_shared_memory() - self._shared_before)]
+        shared = _shared_memory() - self._shared_before
+        return [*map(str, (*self.temporary.iterdir(), *unfinished)), *(shared and shared - _mapped_memory())]
 
     def ports(self) -> set[int]:
         """TCP ports at which processes of this run listen."""
@@ -271,3 +272,12 @@ def _listening() -> Iterator[tuple[int, str]]:
 def _shared_memory() -> set[str]:
     """Names in /dev/shm as Python makes them; browsers of other tests put theirs there too."""
     return {str(path) for path in _SHARED_MEMORY.iterdir() if path.name.startswith(("psm_", "sem.mp", "pym-", "robo"))}
+
+
+def _mapped_memory() -> set[str]:
+    """Names in /dev/shm that a living process has mapped, such as the semaphores of another worker's tests."""
+    found: set[str] = set()
+    for maps in Path("/proc").glob("[0-9]*/maps"):
+        with suppress(OSError):
+            found.update(line.split()[-1] for line in maps.read_text().splitlines() if str(_SHARED_MEMORY) in line)
+    return found

@@ -26,6 +26,7 @@ from robochoc.solver.encoding import Network, Table
 from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.weighted import weighted_components
 from robochoc.verification.checker import assignment_cost, robots_without_values, violations
+from tests.support.compiled import plain_python_only
 from tests.support.cost_problems import with_costs
 from tests.support.limits import HANG_S, wait_until
 from tests.support.moved_clock import MovedClock
@@ -114,6 +115,7 @@ def test_compilation_without_an_end_ends_with_the_time(monkeypatch: pytest.Monke
     assert outcome.reason == "the time was over while Robot1 was compiled"
 
 
+@plain_python_only
 @pytest.mark.parametrize("step", ["start", "receive", "__init__"])
 def test_a_step_of_a_robot_without_an_end_ends_with_the_time(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ABT, step, endless)

@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,7 +23,6 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
 from robochoc.modelling.places import ModelError, Place, UnknownNameError
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.services.descriptions import Reason
-from tests.support.program import ROOT
 
 ARGUMENTS: dict[str, object] = {
     "str": "a word",
@@ -49,9 +49,10 @@ def exceptions() -> Iterator[type[BaseException]]:
     """Yield the exception classes in modules in which one has a constructor: others are copied by their message."""
     header = r"^class (\w*Error|\w*Exception|\w+(?=\(.*(?:Error|Exception|Exit|Interrupt)\)))\(.*\n"
     declared = re.compile(header + r"(?:(?: .*)?\n)*? +def __init__", re.MULTILINE)
-    for path in sorted((ROOT / "robochoc").rglob("*.py")):
+    sources = Path(robochoc.__file__).parent
+    for path in sorted(sources.rglob("*.py")):
         if declared.search(path.read_text()):
-            name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+            name = ".".join(path.relative_to(sources.parent).with_suffix("").parts).removesuffix(".__init__")
             for value in vars(importlib.import_module(name)).values():
                 if isinstance(value, type) and issubclass(value, BaseException) and value.__module__ == name:
                     yield value
