@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
+.PHONY: demo demo-11 docs test test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -48,9 +48,14 @@ SEED := $(shell date +%s)
 endif
 test-slow: $(READY)  ## the rest: random batches in length, faults in all variants
 	@echo "seed $(SEED): make test-slow SEED=$(SEED) draws the same examples"
-	$(PYTEST) -m 'slow or hypothesis' --hypothesis-profile=new --hypothesis-seed=$(SEED)
+	$(PYTEST) -m 'slow or (hypothesis and not more)' --hypothesis-profile=new --hypothesis-seed=$(SEED)
 
-test-all: test test-slow
+# Browsers, machines in networks of their own, vehicles, and other whole programs. The seed draws new random problems.
+test-more: $(READY)  ## whole programs: pages in a browser, networks, vehicles
+	@echo "seed $(SEED): make test-more SEED=$(SEED) draws the same examples"
+	$(PYTEST) -m more --hypothesis-profile=fresh --hypothesis-seed=$(SEED)
+
+test-all: test test-more test-slow
 
 # One of PART slow tests, the same ones with the same problems each time: what CI has time for (six minutes, 2 cores).
 PART ?= 16

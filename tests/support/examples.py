@@ -1,7 +1,7 @@
 """How many random examples there are, and which Hypothesis draws.
 
-`make test` draws the same ones each time (profile `same`). `make test-slow` draws more, and others each time (profile
-`new`), and says the seed that repeats them.
+`make test` draws the same ones each time (profile `same`), `make test-more` as many new ones (`fresh`), `make test-slow`
+ten times as many new ones (`new`). Both print the seed that repeats them.
 """
 
 from __future__ import annotations
@@ -9,22 +9,23 @@ from __future__ import annotations
 import pytest
 from hypothesis import HealthCheck, settings
 
-SAME, NEW = "same", "new"
+SAME, FRESH, NEW = "same", "fresh", "new"
 _BUSY = (HealthCheck.too_slow,)  # how long an example takes says something of the machine alone
 
 
 def register_profiles() -> None:
-    """Make `--hypothesis-profile` know both; `same` is loaded."""
+    """Register the profiles for `--hypothesis-profile`; load `same`."""
     settings.register_profile(
         SAME, deadline=None, derandomize=True, database=None, max_examples=50, suppress_health_check=_BUSY
     )
+    settings.register_profile(FRESH, deadline=None, print_blob=True, max_examples=50, suppress_health_check=_BUSY)
     settings.register_profile(NEW, deadline=None, print_blob=True, max_examples=500, suppress_health_check=_BUSY)
     settings.load_profile(SAME)
 
 
 def examples(fast: int, slow: int = 0, also_suppress: tuple[HealthCheck, ...] = ()) -> settings:
-    """Return a decorator: draw `fast` examples in `make test` and `slow` (ten times as many) in `make test-slow`."""
-    count = fast if settings.get_current_profile_name() == SAME else slow or 10 * fast
+    """Return a decorator: draw `fast` examples, or `slow` (ten times as many) in `make test-slow`."""
+    count = (slow or 10 * fast) if settings.get_current_profile_name() == NEW else fast
     return settings(max_examples=count, suppress_health_check=(*_BUSY, *also_suppress))
 
 
