@@ -1,7 +1,7 @@
 """How many random examples there are, and which Hypothesis draws.
 
-`make test` draws the same ones each time (profile `same`), `make test-more` as many new ones (`fresh`), `make test-slow`
-ten times as many new ones (`new`). Both print the seed that repeats them.
+`make test` draws the same ones each time (profile `same`), `make test-more` as many new ones (`fresh`), and
+`make test-slow` ten times as many new ones (`new`). The last two print the seed that repeats them.
 """
 
 from __future__ import annotations
