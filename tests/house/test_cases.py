@@ -1,8 +1,11 @@
 """The tool for tests of many cases."""
 
+import os
+from pathlib import Path
+
 import pytest
 
-from tests.support.cases import cases
+from tests.support.cases import cases, looped
 
 
 def test_all_failing_cases_are_named() -> None:
@@ -27,3 +30,29 @@ def test_an_empty_table_is_an_error() -> None:
 def test_passing_cases_pass() -> None:
     with cases() as each, each("a"):
         pass
+
+
+@looped(("text", "length"), [("one", 3), ("three", 5)])
+def test_rows_have_folders_of_their_own(tmp_path: Path, text: str, length: int) -> None:
+    assert not list(tmp_path.iterdir())
+    (tmp_path / text).touch()
+    assert len(text) == length
+
+
+def test_a_failing_row_is_named() -> None:
+    tried = []
+
+    @looped("number", lambda: [1, 2, 3])
+    def is_odd(number: int) -> None:
+        tried.append(number)
+        assert number % 2
+
+    with pytest.raises(ExceptionGroup, match="1 of 3 cases failed: 1 2"):
+        is_odd()
+    assert tried == [1, 2, 3]
+
+
+@looped("value", ["first", "second"])
+def test_what_a_row_replaces_is_put_back(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    assert os.environ.get("ROW") is None
+    monkeypatch.setenv("ROW", value)
