@@ -1,12 +1,9 @@
-"""Resources of the operating system for a run: enough descriptors and cheap forks."""
+"""Resources of the operating system for a run: enough descriptors, and its memory."""
 
 from __future__ import annotations
 
-import gc
 import os
 import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from robochoc.solver.encoding import UnsupportedError
@@ -58,16 +55,3 @@ def read_text(path: str) -> str:
         return ""
     finally:
         os.close(fd)
-
-
-@contextmanager
-def garbage_frozen() -> Iterator[None]:
-    """Processes forked meanwhile do not look through what they inherit for garbage.
-
-    To look is to write, and so to copy every page: without this 256 robots take twice as long to start.
-    """
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()

@@ -35,7 +35,6 @@ from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, rehearse
 from robochoc.communication.processes.stopped import LONGEST_STEP_S, StoppedRobots
-from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import Epoch, Session, over
@@ -45,6 +44,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.system.garbage import garbage_frozen
 
 CHECK_S = 0.001
 """The time between two checks of which processes are there, for each robot: so they take a small part of it."""

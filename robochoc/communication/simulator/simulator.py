@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
-from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.search_watch import SearchWatch, snapshot_of
 from robochoc.communication.session import Epoch, Session, over
@@ -28,7 +27,7 @@ from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunP
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.team_compiler import OutOfTimeError
 from robochoc.system.compiling import answer_signals, mypyc_attr
-from robochoc.system.garbage import collection_paused, collection_seldom
+from robochoc.system.garbage import collection_paused, collection_seldom, garbage_frozen
 from robochoc.system.stopping import stop_requested
 from robochoc.system.time_limit import TimeLimitError, computed_by
 

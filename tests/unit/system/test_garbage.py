@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robochoc.system.garbage import SELDOM, collection_paused, collection_seldom
+from robochoc.system.garbage import SELDOM, collection_paused, collection_seldom, garbage_frozen
 
 
 class Looped:
@@ -44,6 +44,18 @@ def test_frozen_objects_stay_frozen() -> None:
         assert gc.get_freeze_count()
     finally:
         gc.unfreeze()
+
+
+def test_frozen_objects_are_not_counted_while_a_search_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To count them is to visit each: it would be done for every improvement of a search."""
+    gc.enable()
+    monkeypatch.setattr("robochoc.system.garbage.gc.get_freeze_count", lambda: pytest.fail("counted"))
+    made = Looped()
+    with garbage_frozen():
+        with collection_paused():
+            pass
+        assert not any(each is made for each in gc.get_objects()), "still frozen"
+    assert any(each is made for each in gc.get_objects())
 
 
 def test_where_it_is_off_it_stays_off() -> None:
