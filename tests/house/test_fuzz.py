@@ -24,12 +24,13 @@ from tests.fuzz.foreign_targets import TARGETS as FOREIGN
 from tests.fuzz.harness import Findings, Target, TooDearError, spoilt, tried
 from tests.fuzz.mutations import spoilt_bytes
 from tests.fuzz.wire_targets import TARGETS as WIRE
+from tests.support.cases import looped
 
 INPUTS = 12
 """Spoilt inputs of each target: enough to see that it works."""
 
 
-@pytest.mark.parametrize("target", [*FILES, *FOREIGN, *WIRE], ids=lambda target: target.name)
+@looped("target", [*FILES, *FOREIGN, *WIRE])
 def test_valid_inputs_are_accepted_and_spoilt_ones_do_no_harm(target: Target) -> None:
     corpus = target.corpus()
     assert tried(target, corpus[0]) == (True, None)

@@ -66,7 +66,7 @@ def looped(
             with cases() as each:
                 for number, row in enumerate(table):
                     values = (row,) if isinstance(names, str) else row
-                    with each(f"{number} {values[0]!s}"[:NAME_LENGTH]), own_fixtures(fixtures, number) as own:
+                    with each(row_name(number, values)), own_fixtures(fixtures, number) as own:
                         test(**own, **dict(zip(columns, values, strict=True)))
 
         fixtures = [one for name, one in signature.parameters.items() if name not in columns]
@@ -74,6 +74,11 @@ def looped(
         return run
 
     return decorate
+
+
+def row_name(number: int, values: Iterable[object]) -> str:
+    """Return the number of a row and its first values."""
+    return " ".join([str(number), *(str(value) for value in values if not callable(value))])[:NAME_LENGTH]
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from robochoc.formats import InvalidInputError, find_teams, read_robot, read_tea
 from robochoc.model.problem import Robot, Team
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, Broken, write_files
+from tests.support.cases import looped
 from tests.support.examples import examples
 
 FUZZ = examples(80, slow=3000, also_suppress=(HealthCheck.function_scoped_fixture,))
@@ -22,7 +23,7 @@ def read_all(path: Path) -> list[Team]:
     return [read_team(team) for team in find_teams(path)]
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+@looped("case", CASES)
 def test_broken_input(case: Broken, tmp_path: Path) -> None:
     case.write(tmp_path)
     expected = case.expected(tmp_path)

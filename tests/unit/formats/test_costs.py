@@ -14,6 +14,7 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import text
 from robochoc.model.problem import INFINITE, AddAgent, AddConstraint, ConstraintModel, Function, Relation, Semantics
 from tests.support.broken_case import write_files
+from tests.support.cases import looped
 
 FILE = """\
 <instance>
@@ -79,8 +80,8 @@ def test_minus_infinity_forbids_when_maximising(tmp_path: Path) -> None:
     assert read.costs == (INFINITE, 2000)
 
 
-@pytest.mark.parametrize("maximize", [False, True])
-@pytest.mark.parametrize("places", [0, 1, 9])
+@looped("maximize", [False, True])
+@looped("places", [0, 1, 9])
 def test_a_cost_is_written_as_it_is_read(places: int, *, maximize: bool) -> None:
     units = CostUnits(maximize, places)
     for cost in (0, 1, -1, 10, -10, 123456789012, 10**18 - 1, 1 - 10**18, INFINITE):

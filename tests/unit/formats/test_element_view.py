@@ -11,6 +11,7 @@ import pytest
 
 from robochoc.formats.diagnostics import InvalidInputError, MistakeError
 from robochoc.formats.element_view import MAX_DEPTH, ElementView, open_xml
+from tests.support.cases import looped
 
 SHOP = """<shop open='yes'>
   <item price='3'> bread </item>
@@ -46,7 +47,7 @@ def test_a_file_whose_parts_are_all_read_has_no_mistake(tmp_path: Path) -> None:
     assert mistakes(tmp_path, SHOP, read_shop) == []
 
 
-@pytest.mark.parametrize(
+@looped(
     ("old", "new", "expected"),
     [
         ("price='4'", "price='4' colour='red'", (3, "the attribute 'colour' is not supported in <item>", "known")),

@@ -18,6 +18,7 @@ from robochoc.model.constraint import GlobalPredicate
 from robochoc.model.expression import Apply, Name
 from robochoc.model.problem import Constraint, Domain, Robot, Team, Variable
 from tests.support.broken_case import write_files
+from tests.support.cases import looped
 from tests.support.examples import examples
 
 FILE = """\
@@ -79,7 +80,7 @@ MEANINGS: list[tuple[str, Callable[[int, int, int], bool]]] = [
 ]
 
 
-@pytest.mark.parametrize(("constraint", "meaning"), MEANINGS, ids=[str(number) for number in range(len(MEANINGS))])
+@looped(("constraint", "meaning"), MEANINGS)
 def test_what_it_says(constraint: str, meaning: Callable[[int, int, int], bool], tmp_path: Path) -> None:
     read = held(constraint, tmp_path)
     assert isinstance(read.definition, GlobalPredicate)
@@ -101,7 +102,7 @@ def test_symbols_may_all_differ(tmp_path: Path) -> None:
     assert read.allows({"R": 1, "T": 2})
 
 
-@pytest.mark.parametrize(
+@looped(
     ("constraint", "told"),
     [
         (stated("allEqual", "[ A B C ]"), "the global constraint 'global:allEqual' is not known (known are global:all"),

@@ -20,6 +20,7 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.occupancy.grid import OccupancyGrid, read_occupancy_grid
 from robochoc.formats.occupancy.images import read_image
 from robochoc.formats.occupancy.pgm import MAX_PIXELS
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.maps import write_map
 
@@ -41,8 +42,8 @@ def read(folder: Path, image: bytes, mode: str = "trinary", negate: int = 0) -> 
     return read_occupancy_grid(path)
 
 
-@pytest.mark.parametrize("kind", ["PNG", "BMP"])
-@pytest.mark.parametrize("mode", ["L", "RGB", "P", "1"])
+@looped("kind", ["PNG", "BMP"])
+@looped("mode", ["L", "RGB", "P", "1"])
 def test_an_image_means_what_the_same_one_as_pgm_means(tmp_path: Path, kind: str, mode: str) -> None:
     shades = SHADES if mode != "1" else np.where(SHADES > 100, 255, 0).astype(np.uint8)
     image = Pillow.fromarray(shades).convert(mode)
@@ -102,7 +103,7 @@ def png(width: int, height: int, content: bytes, colour: int = 0) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", content) + chunk(b"IEND", b"")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("content", "said"),
     [
         (b"", "is no PGM, PNG or BMP image"),

@@ -15,6 +15,7 @@ from robochoc.formats import InvalidInputError
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.occupancy.grid import MAX_YAML, read_occupancy_grid
 from robochoc.formats.occupancy.pgm import MAX_PIXELS, read_pgm
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.maps import write_map
 
@@ -33,7 +34,7 @@ def test_plain_and_raw_images_are_read_with_their_comments() -> None:
     assert (wide.tolist(), white) == ([[1000, 1]], 1000)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("content", "said"),
     [
         (b"", "is no PGM image"),
@@ -77,8 +78,8 @@ def test_whatever_is_in_a_file_is_an_image_or_refused(content: bytes, begin: byt
     assert 0 <= pixels.min() <= pixels.max() <= white
 
 
-@pytest.mark.parametrize("negate", [False, True])
-@pytest.mark.parametrize(
+@looped("negate", [False, True])
+@looped(
     "thresholds",
     [
         ("0.65", "0.25"),
@@ -118,7 +119,7 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
     assert read_occupancy_grid(path).free.tolist() == [[True, False]]
 
 
-@pytest.mark.parametrize(
+@looped(
     ("old", "new", "said"),
     [
         ("image: plan.pgm\n", "", "plan.yaml:1: the map has no image"),

@@ -25,6 +25,7 @@ from robochoc.formats.occupancy.grid import OccupancyGrid
 from robochoc.formats.octomap import octree
 from robochoc.formats.octomap.octree import read_octree
 from robochoc.formats.octomap.voxels import VoxelGrid, read_voxels
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.limits import HANG_S
 from tests.support.octomaps import FREE, MIDDLE, OCCUPIED, Voxel, Voxels, drawn_voxels, write_octomap
@@ -148,7 +149,7 @@ def test_odds_that_are_no_number_are_not_known() -> None:
 CHAIN = b"\x03\x00"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("content", "said"),
     [
         (b"", "is no OctoMap file"),

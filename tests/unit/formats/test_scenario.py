@@ -25,6 +25,7 @@ from robochoc.model.problem import (
 )
 from tests.support.broken_case import TEAM, write_files
 from tests.support.broken_scenarios import ADD_9, LATE, ROBOT_9, add, constraint, scenario
+from tests.support.cases import looped
 
 
 def team_with(folder: Path, text: str, **more: str) -> Team:
@@ -39,7 +40,7 @@ def only_change(folder: Path, text: str) -> Change:
     return change
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "change"),
     [
         ('<remove_agent name="Robot2"/>', RemoveAgent("Robot2")),

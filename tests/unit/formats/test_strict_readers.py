@@ -33,6 +33,7 @@ from robochoc.formats.occupancy.grid import read_occupancy_grid
 from robochoc.formats.octomap.octree import read_octree
 from robochoc.formats.order_file import read_order
 from robochoc.ros.autopilots.fleet import FleetError, read_fleet
+from tests.support.cases import looped
 
 REFUSED = (InvalidInputError, MistakeError, FleetError, ValueError)
 
@@ -238,7 +239,7 @@ def mappings_in(content: object, *way: Any) -> Iterator[tuple[Any, ...]]:  # noq
         yield from mappings_in(one, *way, key)
 
 
-@pytest.mark.parametrize("reader", MAPPINGS, ids=lambda reader: reader.name)
+@looped("reader", MAPPINGS)
 def test_an_unknown_key_in_any_mapping_is_refused(reader: Reader, tmp_path: Path) -> None:
     path = tmp_path / reader.name
     path.write_text(written(reader.name, reader.content))

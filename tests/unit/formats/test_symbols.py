@@ -26,6 +26,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from tests.support.broken_case import write_files
+from tests.support.cases import looped
 
 A = """\
 <instance>
@@ -140,7 +141,7 @@ def test_a_scenario_names_symbols(tmp_path: Path) -> None:
         assert told in str(caught.value)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("file", "old", "new", "told"),
     [
         ("RA.xml", "dark-blue</", "dark-blue red</", "RA.xml:4: the symbol 'red' stands twice"),

@@ -7,12 +7,11 @@ import tomllib
 import pytest
 
 from robochoc.formats.toml import MAX_PARTS, toml_tables
+from tests.support.cases import looped
 
 
-@pytest.mark.parametrize(
-    "line", ["{key} = 1", "[{key}]", "[[{key}]]", "x = {{ y = 1, {key} = 2 }}", "x = [{{{key} = 2}}]"]
-)
-@pytest.mark.parametrize("part", ["a", '"a.b\\""', "'a b'", "a "])
+@looped("line", ["{key} = 1", "[{key}]", "[[{key}]]", "x = {{ y = 1, {key} = 2 }}", "x = [{{{key} = 2}}]"])
+@looped("part", ["a", '"a.b\\""', "'a b'", "a "])
 def test_keys_of_many_parts_are_refused_at_once(line: str, part: str) -> None:
     with pytest.raises(ValueError, match=r"a key of more than 16 parts \(at line 2\)"):
         toml_tables("\n" + line.format(key=".".join([part] * 50_000)))

@@ -51,6 +51,7 @@ from robochoc.run.options import Options, Runtime
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, write_files
 from tests.support.broken_objects import AS_IN_FILES, OF_OBJECTS, breakages
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.examples import examples
 from tests.support.problems import random_team, team_of
@@ -83,7 +84,7 @@ def told(invalid: InvalidInputError) -> list[str]:
 # Each rule
 
 
-@pytest.mark.parametrize("name", AS_IN_FILES)
+@looped("name", AS_IN_FILES)
 def test_the_messages_are_those_for_files(name: str, team: Team, tmp_path: Path) -> None:
     case = FILE_CASES[name]
     case.write(tmp_path)
@@ -94,7 +95,7 @@ def test_the_messages_are_those_for_files(name: str, team: Team, tmp_path: Path)
     assert all(one.file.startswith("robot ") and not one.line for one in of_objects.diagnostics)
 
 
-@pytest.mark.parametrize("name", OF_OBJECTS)
+@looped("name", OF_OBJECTS)
 def test_what_only_objects_can_get_wrong(name: str, team: Team) -> None:
     case = OF_OBJECTS[name]
     found = refused(case.breakage(team)).diagnostics
@@ -292,7 +293,7 @@ def test_what_is_valid_is_written_and_read_back(tmp_path_factory: pytest.TempPat
     assert read_team(folder).robots == again.robots
 
 
-@pytest.mark.parametrize("name", breakages())
+@looped("name", breakages())
 def test_nothing_is_written_of_what_is_not_valid(name: str, team: Team, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError):
         write_team(breakages()[name](team), tmp_path / "team")

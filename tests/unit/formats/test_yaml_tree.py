@@ -6,6 +6,7 @@ import pytest
 
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.dialects.yaml_tree import Node, read_yaml, root_keys
+from tests.support.cases import looped
 
 TEXT = """name: n
 robots:
@@ -40,7 +41,7 @@ def test_aliases_and_merged_mappings_are_read_in_place() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@looped(
     ("now", "then", "line", "message", "hint"),
     [
         ("name: n", "nam: n", 1, "unknown key 'nam'", "did you mean 'name'?"),

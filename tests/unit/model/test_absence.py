@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
-import pytest
-
 from robochoc.formats.global_constraints import check_global, read_form
 from robochoc.model.absence import can_be_restated, may_count_when_absent, restated
 from robochoc.model.constraint import (
@@ -23,6 +21,7 @@ from robochoc.model.constraint import (
     WhenAbsent,
 )
 from robochoc.model.expression import Type, parse, text
+from tests.support.cases import looped
 
 NAMES = ("A", "B", "C", "D")
 
@@ -47,7 +46,7 @@ def body_of(constraint: Constraint | None) -> str | None:
 COUNT = "le(add(if(eq(X,1),1,0),if(eq(Y,1),1,0),if(eq(Z,1),1,0)),2)"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("body", "left"),
     [
         (COUNT, "le(add(if(eq(A,1),1,0),if(eq(C,1),1,0)),2)"),
@@ -124,7 +123,7 @@ def test_the_order_of_departures_does_not_matter() -> None:
                 assert restated(whole, gone[:many]) == one_by_one
 
 
-@pytest.mark.parametrize(
+@looped(
     ("reference", "form", "left"),
     [
         ("global:allDifferent", "[ X0 X1 X2 ]", "[ X0 X2 ]"),

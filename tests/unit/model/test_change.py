@@ -28,6 +28,7 @@ from robochoc.model.problem import (
 )
 from robochoc.model.rejoin import rejoin
 from robochoc.model.team_edits import ChangeError, without_robots
+from tests.support.cases import looped
 from tests.support.problems import team_of
 from tests.support.small_teams import differ, named_constraint, newcomer, triangle
 
@@ -101,7 +102,7 @@ def test_a_robot_can_come_again() -> None:
     assert team.order == ("RB", "RC", "RD", "RA")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("robot", "message", "line"),
     [
         (newcomer(name="RA"), "the robot 'RA' is there already", 0),
@@ -209,7 +210,7 @@ def test_both_parts_of_a_partially_known_constraint_go(sides: tuple[str, ...]) -
     assert list(apply_changes(team, [RemoveConstraint("RB", "RA", "P")]).constraints()) == []
 
 
-@pytest.mark.parametrize(
+@looped(
     ("change", "message"),
     [
         (RemoveConstraint("RC", "RB", "N"), "'RC' shares no constraint 'N' with a parent 'RB'"),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from robochoc.formats import PREDEFINED
 from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
@@ -26,6 +24,7 @@ from robochoc.model.problem import (
 )
 from robochoc.model.team_edits import without_robots
 from robochoc.solver.explanation import domain_key, invalidated_by
+from tests.support.cases import looped
 from tests.support.problems import team_of
 from tests.support.small_teams import differ, named_constraint, newcomer, triangle
 
@@ -35,7 +34,7 @@ def told(old: Team, new: Team) -> tuple[set[str], set[str]]:
     return set(keys), set(agents)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("change", "keys", "agents"),
     [
         (RemoveConstraint("RC", "RB", "C"), {"RC<RB:C"}, set()),

@@ -26,6 +26,7 @@ from robochoc.model.expression import (
     parse,
     text,
 )
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.steps import steps_of
 
@@ -170,7 +171,7 @@ def test_figure_2_as_it_stands() -> None:
         assert bool(evaluate(expression, {"X": x, "Y": y, "i": i, "j": j})) == holds
 
 
-@pytest.mark.parametrize(
+@looped(
     ("written", "canonical"),
     [
         ("minus(i-j)", "sub(i,j)"),
@@ -195,7 +196,7 @@ def test_loose_forms(written: str, canonical: str) -> None:
     assert text(parse(written, ("i", "j"), Type.INTEGER)) == canonical
 
 
-@pytest.mark.parametrize(
+@looped(
     ("operator", "arguments", "expected"),
     [
         ("div", (7, 2), 3),
@@ -239,7 +240,7 @@ def test_names_in_order() -> None:
     assert names(parse("add(Y,X,Y,3)", ("X", "Y"), Type.INTEGER)) == ("Y", "X")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("written", "position", "fragments"),
     [
         ("nee(X,Y)", 0, ["unknown operator 'nee'", "did you mean 'ne"]),
@@ -277,7 +278,7 @@ def test_errors_say_what_where_and_what_next(written: str, position: int, fragme
         assert fragment in str(caught.value)
 
 
-@pytest.mark.parametrize(
+@looped(
     "written",
     [
         "(" * 60_000,

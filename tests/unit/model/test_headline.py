@@ -6,17 +6,16 @@ from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
-import pytest
-
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from tests.support.cases import looped
 
 SOLVED = Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION, {"V1": 1})
 SIX = tuple(f"Robot{number}" for number in range(6))
 EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcome(Verdict.SOLUTION, SIX[:3]))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("changed", "headline"),
     [
         ({}, "solution for all 16 robots"),

@@ -23,6 +23,7 @@ from robochoc.run.registry import UnknownProtocolError, protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
+from tests.support.cases import looped
 from tests.support.cost_problems import cost_of, with_costs
 from tests.support.examples import count
 from tests.support.problems import team_of
@@ -149,7 +150,7 @@ def test_a_solution_is_shown_in_a_line() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@looped(
     ("changed", "said"),
     [
         ({"robots": 0}, "numbers of 1 or more"),
@@ -192,8 +193,8 @@ def test_the_cost_is_that_of_values_that_there_are(values: list[float]) -> None:
         ArrayProblem(2, 2, PAIR, SAME).cost(values)
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("cost", [2**45, 2**50])
+@looped("protocol", PROTOCOLS)
+@looped("cost", [2**45, 2**50])
 def test_costs_of_all_robots_are_exact_above_what_floats_and_64_bits_hold(protocol: str, cost: int) -> None:
     """A chain of 5,000 robots: some 2^57 and 2^62; each edge is counted twice."""
     chain = [(robot, robot + 1) for robot in range(4999)]

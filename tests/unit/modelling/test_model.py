@@ -10,12 +10,11 @@ from enum import Enum, IntEnum
 from fractions import Fraction
 from typing import Any
 
-import pytest
-
 import robochoc
 from robochoc.model.constraint import Function, Predicate, Relation
 from robochoc.model.outcome import Verdict
 from robochoc.modelling.terms import Variable
+from tests.support.cases import looped
 
 
 class Color(Enum):
@@ -55,7 +54,7 @@ def test_five_drones_charge_in_slots() -> None:
     assert repr(outcome) == "<charging: optimal solution for all 5 robots, cost 5; adopt, simulator>"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("domain", "wanted"),
     [
         (range(3), 2),
@@ -70,7 +69,6 @@ def test_five_drones_charge_in_slots() -> None:
         ([frozenset({1}), frozenset({2})], frozenset({2})),
         ([10**17, 5, -3], -3),
     ],
-    ids=str,
 )
 def test_values_come_back_as_they_were_written(domain: object, wanted: object) -> None:
     model, x, y = two(domain)
@@ -102,7 +100,7 @@ OPERATORS: list[tuple[str, Callable[..., Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("means", [means for _, means in OPERATORS], ids=[name for name, _ in OPERATORS])
+@looped("means", [means for _, means in OPERATORS])
 def test_operators_mean_what_they_mean_in_python(means: Callable[..., Any]) -> None:
     for first, second in itertools.product((-7, 7), (-2, 2)):
         model, x, y = two([-7, 7], [-2, 2])

@@ -16,6 +16,7 @@ from robochoc.model.problem import Team
 from robochoc.modelling.places import ModelTypeError, UnknownNameError
 from robochoc.modelling.terms import Variable
 from robochoc.run.options import Options
+from tests.support.cases import looped
 
 
 class Color(Enum):
@@ -124,7 +125,7 @@ MISTAKES: list[tuple[Callable[[Made], object], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("mistake", "says"), MISTAKES, ids=[says for _, says in MISTAKES])
+@looped(("mistake", "says"), MISTAKES)
 def test_a_mistake_is_told_with_its_line(mistake: Callable[[Made], object], says: str) -> None:
     made = Made()
     with pytest.raises(robochoc.ModelError) as refused:
@@ -187,7 +188,7 @@ OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("options", "kind", "says"), OPTIONS, ids=[says for *_, says in OPTIONS])
+@looped(("options", "kind", "says"), OPTIONS)
 def test_options_that_there_are_not_are_guessed(options: dict[str, object], kind: type[Exception], says: str) -> None:
     with pytest.raises(kind, match=says):
         Made().model.solve(**options)  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ import pytest
 import robochoc
 from robochoc.formats import InvalidInputError
 from robochoc.modelling.terms import Term, Variable
+from tests.support.cases import looped
 
 
 def two() -> tuple[robochoc.Model, Variable, Variable]:
@@ -138,7 +139,7 @@ def test_a_quotient_with_the_factor_0_still_has_to_have_a_value() -> None:
 SCALARS = [np.float32(0.1), np.float64(0.1), np.float16(0.5), np.int64(2), np.uint8(1), np.bool_(True), np.int32(0)]
 
 
-@pytest.mark.parametrize("scalar", SCALARS, ids=[type(one).__name__ for one in SCALARS])
+@looped("scalar", SCALARS)
 def test_scalars_of_numpy_mean_what_python_numbers_do(scalar: Any) -> None:  # noqa: ANN401 - any of them
     def solved(given: Any) -> object:  # noqa: ANN401 - a number of NumPy or Python
         model, x = three()

@@ -22,6 +22,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compilation, CompiledFrom, Compiler
 from robochoc.solver.encoding import Codes, Network, Table
+from tests.support.cases import looped
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT, robochoc_within
 from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
@@ -159,7 +160,7 @@ def test_other_networks_are_not_known(cache: SolutionCache) -> None:
     assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
+@looped("damage", DAMAGES)
 def test_a_damaged_file_is_removed(cache: SolutionCache, damage: str) -> None:
     cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     (path,) = cache.files()

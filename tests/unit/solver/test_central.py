@@ -28,6 +28,7 @@ from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetr
 from robochoc.solver.team_network import identifiers
 from robochoc.verification.checker import RefutedError
 from tests.support.brute_force import solutions
+from tests.support.cases import looped
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.solver_networks import brute_force, misheard
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
@@ -129,11 +130,11 @@ def test_cliques_made_explicit_keep_the_solutions() -> None:
         assert set(brute_force(with_cliques(network, lambda part: tuple(brute_force(part))))) == every
 
 
-@pytest.mark.parametrize(
+@looped(
     ("n", "model", "count"),
     [(1, "planar", 1), (2, "planar", 0), (4, "planar", 0), (4, "full", 0), (5, "planar", 0), (7, "planar", 56)],
 )
-@pytest.mark.parametrize("robots", ["cells", "rows"])
+@looped("robots", ["cells", "rows"])
 def test_queens_are_counted(n: int, model: str, count: int, robots: str, solver: AceProcess) -> None:
     judgement = CentralSolver(solver=solver).solve(queens3d(n, model, robots), count=True)
     assert judgement.count == count

@@ -31,6 +31,7 @@ from robochoc.verification.checker import RefutedError, robots_without_values, v
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import contradiction
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,
@@ -231,9 +232,7 @@ def test_among_the_fewest_aside_costs_are_least(batch: int, solver: AceProcess) 
     assert aside > 2
 
 
-@pytest.mark.parametrize(
-    ("n", "model", "flying"), [(3, "planar", 5), (3, "full", 4), (4, "planar", 10), (4, "full", 7)]
-)
+@looped(("n", "model", "flying"), [(3, "planar", 5), (3, "full", 4), (4, "planar", 10), (4, "full", 7)])
 def test_so_many_queens_can_stay(n: int, model: str, flying: int, solver: AceProcess) -> None:
     outcome = solve(queens3d(n, model), FEWEST, solver=solver)
     assert outcome.verdict is Verdict.OPTIMAL

@@ -26,6 +26,7 @@ from robochoc.verification.checker import (
     violations,
 )
 from robochoc.verification.second_opinion import total_cost
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
@@ -69,7 +70,7 @@ def test_whoever_could_join_is_named() -> None:
     assert list(needlessly_withdrawn(team, {"A": 1}, ("RB",))) == ["RB"]
 
 
-@pytest.mark.parametrize(
+@looped(
     ("semantics", "row", "expected"),
     [
         (Semantics.SUPPORTS, (1, 2), 0),

@@ -19,6 +19,7 @@ from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Predi
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.foreign_problems import imported, optimum, random_problem, written
 
 HEAD = '<instance xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">'
@@ -48,7 +49,7 @@ def refused(text: str, folder: Path, **options: Any) -> str:  # noqa: ANN401
     return re.sub(r"^.*problem\.xml:?", "", str(failure.value))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "more", "maximize", "best"),
     [
         ("4: 1 1 | 1 2 | 7: 2 2", 'defaultCost="9"', False, 4),
@@ -198,7 +199,7 @@ def test_one_file_an_agent_counts_copies_once(tmp_path: Path) -> None:
 RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
 
 
-@pytest.mark.parametrize(
+@looped(
     ("old", "new", "message"),
     [
         ("</variables>", RANDOM, "the random variable 'w': stochastic problems are not read"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import InvalidInputError, check_team
+from tests.support.cases import looped
 from tests.support.foreign_problems import imported, written
 
 NAMES = "V0 V1 V2 V3"
@@ -67,7 +68,7 @@ CASES: list[tuple[str, str, Test]] = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "parameters", "allows"), CASES)
+@looped(("kind", "parameters", "allows"), CASES)
 def test_it_allows_what_its_definition_allows(kind: str, parameters: str, allows: Test, tmp_path: Path) -> None:
     found = imported(text_of(kind, parameters), tmp_path)
     check_team(found.team)
@@ -94,7 +95,7 @@ def test_what_frodo_has_too_is_exported_as_it_was(kind: str, parameters: str, tm
     assert list(again.constraints()) == list(team.constraints())
 
 
-@pytest.mark.parametrize(
+@looped(
     ("kind", "parameters", "message"),
     [
         ("weightedSum", "[ {1 V0} ] <foo/> 3", "'<foo/>' where <eq/> or <ne/>"),

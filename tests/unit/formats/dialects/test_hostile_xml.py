@@ -11,6 +11,7 @@ from robochoc.formats import InvalidInputError
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.names_file import NAMES_FILE, original_names
 from robochoc.formats.dialects.registry import NAMES, dialect_called, dialects, read_foreign, recognise
+from tests.support.cases import looped
 
 FRODO = '<presentation format="XCSP 2.1_FRODO"/><agents><agent name="a"/></agents>'
 LAUGH = "&l{};"
@@ -57,7 +58,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("what", HOSTILE)
+@looped("what", HOSTILE)
 def test_one_message(what: str, tmp_path: Path) -> None:
     text, message = HOSTILE[what]
     path = tmp_path / "problem.xml"
@@ -89,9 +90,7 @@ def test_all_dialects_have_their_names() -> None:
     assert dialect_called("os") is None
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"[]", b'{"dialect": 1, "names": {}}', b"\xff", b"[" * 10_000, b'{"names":{"a":1}}']
-)
+@looped("content", [b"", b"[]", b'{"dialect": 1, "names": {}}', b"\xff", b"[" * 10_000, b'{"names":{"a":1}}'])
 def test_names_that_are_none(content: bytes, tmp_path: Path) -> None:
     assert original_names(tmp_path) == {}
     (tmp_path / NAMES_FILE).write_bytes(content)

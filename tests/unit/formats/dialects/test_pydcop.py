@@ -22,6 +22,7 @@ from robochoc.model.constraint import INFINITE, Constraint, Domain, Relation, Se
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, RemoveAgent, Team
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.foreign_problems import imported, optimum, written
 
 HEAD = """name: small
@@ -44,7 +45,7 @@ def constraint(text: str) -> str:
     return f"{HEAD}  k:\n    type: intention\n    function: {quoted}\n"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("function", "best"),
     [
         ("0 if x != y else 10", 0),
@@ -111,7 +112,7 @@ def doubling(result: str) -> str:
     return f"|\n      a = (x,)\n      b = (x,)\n{doubled}      return {result}"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("function", "message"),
     [
         ("__import__('os').system('true') + x", "the attribute '.system'"),
@@ -160,7 +161,7 @@ LAUGHS = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
 )
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "message"),
     [
         (f"name: x\nobjective: min\n{LAUGHS}", "counting what aliases repeat"),

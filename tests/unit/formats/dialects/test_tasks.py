@@ -16,6 +16,7 @@ from robochoc.formats.dialects.registry import read_foreign, recognise
 from robochoc.formats.problems import read_problem
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import CENTRAL
+from tests.support.cases import looped
 from tests.support.task_lists import LIST, imported, mistakes
 
 
@@ -85,7 +86,7 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(
+@looped(
     ("now", "then", "told"),
     [
         ("skills: [camera]", "skill: [camera]", "3: unknown key 'skill' in robots.bob (did you mean 'skills'?)"),
@@ -131,7 +132,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     assert len(mistakes(text, tmp_path).splitlines()) == 2
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "told"),
     [
         ("robots: {a: }\ntasks: {none: {worth: 1}}\nmodel: assignment", "2: a task is called 'none', as no task is"),

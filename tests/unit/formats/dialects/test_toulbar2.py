@@ -13,6 +13,7 @@ from robochoc.model.constraint import INFINITE, Constraint, Domain, Relation, Se
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.foreign_problems import imported, optimum, written
 
 CFN = """# loose
@@ -60,7 +61,7 @@ def test_a_maximised_cfn(tmp_path: Path) -> None:
     assert optimum(imported(text, tmp_path, "a.cfn").team) == 6
 
 
-@pytest.mark.parametrize(
+@looped(
     ("name", "text", "message"),
     [
         ("a.cfn", CFN.replace("costs: t2", "type: salldiff params: []"), "'salldiff'"),

@@ -22,6 +22,7 @@ from robochoc.model.problem import Team
 from robochoc.model.team_edits import without_robots
 from robochoc.solver.central import CentralSolver
 from tests.support import brute_force
+from tests.support.cases import looped
 from tests.support.cost_problems import cost_of, random_cost_team
 from tests.support.problems import random_team
 from tests.support.xcsp3_forms import FORMS
@@ -50,7 +51,7 @@ def rows(*domains: range) -> Iterator[Row]:
     return itertools.product(*(domains or (range(3),) * 3))
 
 
-@pytest.mark.parametrize("form", FORMS)
+@looped("form", FORMS)
 def test_each_form_has_the_meaning_of_the_specification(form: str, tmp_path: Path) -> None:
     xml, truth = FORMS[form]
     assert solutions(csp(tmp_path, xml)) == {row for row in rows() if truth(*row)}
@@ -103,7 +104,7 @@ OBJECTIVES: dict[str, tuple[str, Callable[..., int]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", OBJECTIVES)
+@looped("kind", OBJECTIVES)
 def test_objectives_are_split_and_keep_the_optimum(kind: str, tmp_path: Path) -> None:
     xml, value = OBJECTIVES[kind]
     hard = "<intension> ne(x[0],x[1]) </intension><intension> gt(add(x[0],x[2]),1) </intension>"
@@ -242,7 +243,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("xml", REFUSED)
+@looped("xml", REFUSED)
 def test_what_has_no_counterpart_is_refused_by_name_with_its_line(xml: str, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError) as refused:
         csp(tmp_path, f"\n\n{xml}")
@@ -335,7 +336,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+@looped("text", HOSTILE)
 def test_hostile_files_get_one_message(text: str, tmp_path: Path) -> None:
     file = tmp_path / "hostile.xml"
     file.write_text(text)
