@@ -9,22 +9,24 @@ from collections.abc import Iterator
 from multiprocessing.util import get_temp_dir
 from pathlib import Path
 from secrets import token_hex
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robochoc.authority.authority import Authority
-from robochoc.formats import write_team
-from robochoc.generators.queens3d import queens3d
 from tests.support import leftovers
-from tests.support.ace_stable import AceStable
-from tests.support.authorities import Clock, Seen
-from tests.support.authority_service import AuthorityService, open_files
 from tests.support.counted_clock import time_passes_at_each_look
-from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
 from tests.support.large_pages import use_large_pages
-from tests.support.warm_programs import WarmPrograms
+
+# Fixtures import what they need: `pytest tests/unit/model` starts without certificates, solvers and networks.
+# ruff: noqa: PLC0415
+if TYPE_CHECKING:
+    from robochoc.authority.authority import Authority
+    from tests.support.ace_stable import AceStable
+    from tests.support.authorities import Clock, Seen
+    from tests.support.authority_service import AuthorityService
+    from tests.support.deployments import Deployment
+    from tests.support.warm_programs import WarmPrograms
 
 register_profiles()
 
@@ -70,8 +72,8 @@ def nothing_left_behind(no_process_left: None) -> Iterator[None]:
 @pytest.fixture
 def quick_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
     """Protocols that encrypt tables do so in a group in which no secret is safe, and whose elements are small."""
-    from robochoc.protocols.private.p2_dpop import P2DPOP  # noqa: PLC0415 - few tests need it
-    from tests.support.toy_group import ToyGroup  # noqa: PLC0415
+    from robochoc.protocols.private.p2_dpop import P2DPOP
+    from tests.support.toy_group import ToyGroup
 
     monkeypatch.setattr(P2DPOP, "group", ToyGroup)
 
@@ -85,6 +87,9 @@ def a_second_a_look() -> Iterator[None]:
 
 @pytest.fixture
 def four(tmp_path: Path) -> Path:
+    from robochoc.formats import write_team
+    from robochoc.generators.queens3d import queens3d
+
     folder = tmp_path / "queens3d-4"
     write_team(queens3d(4), folder)
     return folder
@@ -98,6 +103,8 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def warm() -> Iterator[WarmPrograms]:
+    from tests.support.warm_programs import WarmPrograms
+
     with leftovers.shared_by_tests():
         programs = WarmPrograms()
     with programs:
@@ -106,6 +113,8 @@ def warm() -> Iterator[WarmPrograms]:
 
 @pytest.fixture
 def site(tmp_path: Path, warm: WarmPrograms) -> Iterator[Deployment]:
+    from tests.support.deployments import Deployment
+
     with Deployment(tmp_path, warm=warm) as site:
         yield site
 
@@ -120,21 +129,29 @@ def cache_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Non
 
 @pytest.fixture
 def clock() -> Clock:
+    from tests.support.authorities import Clock
+
     return Clock()
 
 
 @pytest.fixture
 def seen() -> Seen:
+    from tests.support.authorities import Seen
+
     return Seen()
 
 
 @pytest.fixture
 def authority(tmp_path: Path, clock: Clock, seen: Seen) -> Authority:
+    from robochoc.authority.authority import Authority
+
     return Authority.create(tmp_path / "authority", clock=clock, observer=seen)
 
 
 @pytest.fixture
 def desk(tmp_path: Path) -> Iterator[AuthorityService]:
+    from tests.support.authority_service import AuthorityService, open_files
+
     before = threading.active_count(), open_files()
     desk = AuthorityService(tmp_path / "authority")
     with desk.server:
@@ -144,6 +161,8 @@ def desk(tmp_path: Path) -> Iterator[AuthorityService]:
 
 @pytest.fixture(scope="session")
 def ace_stable() -> Iterator[AceStable]:
+    from tests.support.ace_stable import AceStable
+
     stable = AceStable()
     yield stable
     stable.close()
@@ -160,7 +179,7 @@ def warm_ace(ace_stable: AceStable) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """Chromium, by Playwright. While it is there, no test may run an event loop in the main thread."""
-    from tests.support.browser_pages import chromium  # noqa: PLC0415 - for those tests only that look at pages
+    from tests.support.browser_pages import chromium
 
     with chromium() as browser:
         yield browser
