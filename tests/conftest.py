@@ -17,6 +17,7 @@ from tests.support import leftovers
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.examples import register_profiles
 from tests.support.large_pages import use_large_pages
+from tests.support.leftovers import LeftoversOfFile
 
 # Fixtures import what they need: `pytest tests/unit/model` starts without certificates, solvers and networks.
 # ruff: noqa: PLC0415
@@ -61,11 +62,24 @@ def no_process_left(temporary_folder: str) -> Iterator[None]:
         yield
 
 
-@pytest.fixture(autouse=True)
-def nothing_left_behind(no_process_left: None) -> Iterator[None]:
-    """No test leaves a thread, a process, a descriptor, a port or a file behind."""
+@pytest.fixture(scope="module")
+def may_stay() -> str:
+    """Return the beginning of what the tests of a file may leave behind."""
+    return "nothing"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def leftovers_of_file(no_process_left: None, may_stay: str) -> Iterator[LeftoversOfFile]:
     del no_process_left
-    with leftovers.nothing_left_behind():
+    of_file = LeftoversOfFile(may_stay)
+    yield of_file
+    of_file.check()
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(leftovers_of_file: LeftoversOfFile) -> Iterator[None]:
+    """No test leaves a thread, a process, a descriptor, a port or a file behind."""
+    with leftovers_of_file.of_test():
         yield
 
 

@@ -9,19 +9,16 @@ from typing import Any
 import pytest
 
 from robochoc.sniffer.session import SnifferSession
-from tests.support import leftovers
 from tests.support.browser_pages import chromium
 from tests.support.leftovers import shared_by_tests
 from tests.support.sniffer_pages import WHOLE, Page, shown
 from tests.support.sniffer_server import SnifferServer, sniffer_server
 
 
-@pytest.fixture(autouse=True)
-def nothing_left_behind(no_process_left: None) -> Iterator[None]:
-    """As elsewhere; but the browser keeps connections to the server that tests share, and makes new ones."""
-    del no_process_left
-    with leftovers.nothing_left_behind(but="descriptor socket"):
-        yield
+@pytest.fixture(scope="module")
+def may_stay() -> str:
+    """Allow sockets: the browser keeps connections to the server that tests share, and makes new ones."""
+    return "descriptor socket"
 
 
 @pytest.fixture(scope="package")
