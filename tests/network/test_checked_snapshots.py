@@ -16,7 +16,7 @@ from robochoc.model.problem import Constraint
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.support.local_search_runs import robot_of
+from tests.support.agents import robot_of
 from tests.support.problems import team_of
 from tests.support.sparse_teams import profiles_of
 

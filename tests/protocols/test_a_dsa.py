@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.a_dsa
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.a_dsa import ADSA
@@ -15,10 +13,10 @@ from robochoc.protocols.local_search.messages.a_dsa import Tick
 from robochoc.protocols.local_search.settings.a_dsa import ADSASettings
 from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, domains_of, played, robot_of, started
+from tests.support.local_search_runs import any_schedule, domains_of, played
 from tests.support.problems import team_of
 
 EQUAL_COSTS = Relation("E", 2, Semantics.SOFT, ((1, 1), (2, 2), (3, 3)), (1, 1, 1), 0)
@@ -136,7 +134,3 @@ def test_whatever_the_delays_it_ends_when_all_have_made_all_their_ticks(teams: i
         best = best_known(CompiledTeam(team), result)
         least = min(costs_by_cycle(CompiledTeam(team), trails))
         assert least == (best.cost if best else float("inf"))
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.a_dsa).failed == 0

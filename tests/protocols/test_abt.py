@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
-
-import robochoc.protocols.satisfaction.abt
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
@@ -132,7 +129,3 @@ def test_of_two_conflicts_the_one_with_the_highest_lowest_robot_is_kept() -> Non
     abt = agent(triangle(3), "RC")
     replies(abt, ("RB", Ok((1,))), ("RA", Ok((1,))))
     assert list(abt.store) == [{"RA": (1,)}]
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.satisfaction.abt).failed == 0

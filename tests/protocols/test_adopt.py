@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
-
-import robochoc.protocols.optimization.adopt
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt import ADOPT
@@ -198,7 +195,3 @@ def test_what_is_paid_is_looked_up_only_when_a_neighbour_above_has_another_value
     checks = adopt.problem.checks
     replies(adopt, ("RC", Cost(context(B=1, X=1), 4, 7)), ("RA", Value((1,), 2)), ("RA", Threshold(3, {})))
     assert adopt.problem.checks == checks
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.optimization.adopt).failed == 0

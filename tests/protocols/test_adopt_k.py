@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.optimization.adopt_k
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE
@@ -231,9 +229,3 @@ def test_as_few_as_possible_step_aside_for_every_k(k: str, teams: int) -> None:
 def test_k_is_a_whole_number_from_1_or_infinite(k: float) -> None:
     with pytest.raises(ValueError, match="whole number, 1 or more, or inf"):
         ADOPTkSettings(k=k)
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    result = doctest.testmod(robochoc.protocols.optimization.adopt_k)
-    assert result.attempted
-    assert not result.failed

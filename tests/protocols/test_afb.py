@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from collections.abc import Mapping
 
-import robochoc.protocols.optimization.afb
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -352,7 +350,3 @@ def test_the_bound_counts_what_the_present_value_is_expected_to_cost_until_its_c
     assert robot.findings == Findings(bound=4)
     robot.receive("RB", cpa((1, 1), least=[]))
     assert robot.findings == Findings(bound=5)
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.optimization.afb).failed == 0

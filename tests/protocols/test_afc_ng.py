@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 from typing import ClassVar
 
 import pytest
 
-import robochoc.protocols.satisfaction.afc_ng
 from robochoc.communication.host import message_decoder
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
@@ -292,7 +290,3 @@ def test_long_partial_assignments_are_compared_as_short_ones() -> None:
         right = left[: chance.randrange(len(left) + 1)] + (((1,), chance.randrange(1, 3)),) * chance.randrange(3)
         differ = [place for place, (one, other) in enumerate(zip(left, right, strict=False)) if one != other]
         assert first_difference(left, right) == min([*differ, len(left), len(right)])
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.satisfaction.afc_ng).failed == 0

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.satisfaction.afc_tree
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
@@ -203,7 +201,3 @@ def test_branches_are_searched_at_the_same_time() -> None:
     tree, chain = (Simulation(team, protocol, Concurrent(0)).run(60).metrics for protocol in (AFCTree, AFCng))
     assert tree.checks == chain.checks
     assert tree.ncccs * 2 < chain.ncccs
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.satisfaction.afc_tree).failed == 0

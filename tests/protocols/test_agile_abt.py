@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import robochoc.protocols.satisfaction.agile_abt
-import robochoc.protocols.satisfaction.agile_order
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, Value
@@ -372,8 +369,3 @@ def test_set_link_waits_until_the_listener_is_below() -> None:
     agile = agent(triangle(), "RB", ("RD", order("ADBC", 2, 2, 2, 2)))
     assert replies(agile, ("RD", AddLink())) == []
     assert replies(agile, ("RC", order("ABCD", 1, 2, 2, 2))) == [("RD", ok(1))]
-
-
-def test_the_docstrings_show_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.satisfaction.agile_abt).failed == 0
-    assert doctest.testmod(robochoc.protocols.satisfaction.agile_order).failed == 0

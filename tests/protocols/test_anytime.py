@@ -30,9 +30,10 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import Objective, withdrawal_cost
+from tests.support.agents import robot_of, started
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, robot_of, started
+from tests.support.local_search_runs import any_schedule
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.asymmetric.asym_pt_fb
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.problem import INFINITE, Domain, ProblemKind, Team, Variable
 from robochoc.protocols.asymmetric.asym_pt_fb import AsymPTFB
@@ -166,9 +164,3 @@ def test_what_a_robot_does_not_need_of_its_part_changes_no_message(teams: int) -
         others += elsewhere != problem
         assert [one[:3] for one in run(elsewhere, AsymPTFB, seed).envelopes] == [one[:3] for one in before.envelopes]
     assert others > teams // 2
-
-
-def test_the_example_in_the_documentation() -> None:
-    result = doctest.testmod(robochoc.protocols.asymmetric.asym_pt_fb)
-    assert result.attempted
-    assert not result.failed

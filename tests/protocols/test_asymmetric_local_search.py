@@ -23,9 +23,8 @@ from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.examples import count
-from tests.support.local_search_runs import robot_of, started
 
 TRANSFERS = pytest.mark.parametrize("protocol", [MCSMGM, GCAMGM])
 

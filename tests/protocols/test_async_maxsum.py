@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.async_maxsum
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import with_order
@@ -162,7 +160,3 @@ def test_on_any_graph_it_falls_silent_and_what_is_proven_is_true(teams: int) -> 
 def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
     with pytest.raises(SettingsError, match=rule):
         settings_of(AsyncMaxSum, {name: given})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.async_maxsum).failed == 0

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from random import Random
 
 import pytest
 
-import robochoc.protocols.asymmetric.atwb
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Domain, ProblemKind, Team, Variable
@@ -203,9 +201,3 @@ def test_what_a_robot_does_not_need_of_its_part_changes_no_message(teams: int) -
         others += elsewhere != team
         assert [one[:3] for one in run(elsewhere, ATWB, seed).envelopes] == [one[:3] for one in before.envelopes]
     assert others > teams // 2
-
-
-def test_the_example_in_the_documentation() -> None:
-    result = doctest.testmod(robochoc.protocols.asymmetric.atwb)
-    assert result.attempted
-    assert not result.failed

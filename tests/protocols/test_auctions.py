@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import doctest
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from random import Random
-from types import ModuleType
 
 import pytest
 
-import robochoc.protocols.auctions.cbaa
-import robochoc.protocols.auctions.cbba
-import robochoc.protocols.auctions.ssi
 from robochoc.generators.tasks import Skills, tasks
 from robochoc.model.allocation import Job, Worker, several
 from robochoc.model.assembly import assemble
@@ -31,17 +26,16 @@ from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.agents import robot_of, started
 from tests.support.allocation_problems import Allocation, greedy, idle, optimum, random_allocation
 from tests.support.brute_force import least_cost
 from tests.support.examples import count
 from tests.support.limits import HANG_S
-from tests.support.local_search_runs import robot_of, started
 from tests.support.problems import team_of
 from tests.support.random_options import random_schedule
 
 BUNDLING = ("ssi", "cbba")
 AUCTIONS = (*BUNDLING, "cbaa")
-MODULES = (robochoc.protocols.auctions.ssi, robochoc.protocols.auctions.cbaa, robochoc.protocols.auctions.cbba)
 
 
 def cost(allocation: Allocation, total: float) -> float:
@@ -239,11 +233,6 @@ def test_two_ways_to_do_a_task_are_one_task(protocol: str) -> None:
     outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
     assert outcome.assignment == {"A": 2, "B": 0}
     assert outcome.cost == least_cost(team) == 8
-
-
-@pytest.mark.parametrize("module", MODULES, ids=lambda one: one.__name__)
-def test_the_examples_in_the_docstrings(module: ModuleType) -> None:
-    assert doctest.testmod(module).failed == 0
 
 
 @pytest.mark.parametrize("protocol", AUCTIONS)

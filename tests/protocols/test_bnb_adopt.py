@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
-
-import robochoc.protocols.optimization.bnb_adopt
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
@@ -202,7 +199,3 @@ def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     said = replies(adopt, *both(*(Cost(context(B=number), INFINITE, INFINITE, True) for number in (1, 2))))
     assert to("RA", said) == [Cost(context(A=1, Z=1), INFINITE, INFINITE)]
     assert to("RC", said) == [Value((1,), 1, 0)]
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.optimization.bnb_adopt).failed == 0

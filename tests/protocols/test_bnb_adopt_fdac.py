@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.optimization.bnb_adopt_fdac
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
@@ -272,9 +270,3 @@ def test_as_few_as_possible_withdraw(level: str, teams: int) -> None:
         options = random_options(team, "bnb-adopt-fdac", chance)
         outcome = solve(team, replace(options, settings={"level": level}, withdraw=Withdrawal.MINIMUM))
         assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    result = doctest.testmod(robochoc.protocols.optimization.bnb_adopt_fdac)
-    assert result.attempted
-    assert not result.failed

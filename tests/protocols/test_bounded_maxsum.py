@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from collections.abc import Mapping
 from random import Random
@@ -10,7 +9,6 @@ from typing import NamedTuple
 
 import pytest
 
-import robochoc.protocols.inference.bounded_maxsum
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
@@ -247,7 +245,3 @@ def test_costs_that_floats_do_not_hold_are_refused(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(exact_costs, "EXACT", 5)
     with pytest.raises(TooLargeError, match="2\\^53"):
         run(pair(), Random(0))
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.bounded_maxsum).failed == 0

@@ -11,8 +11,7 @@ from robochoc.model.costs import normalized
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.protocols.auctions.cbba import CBBA, NOBODY, Standing
 from robochoc.protocols.auctions.messages.cbba import Bundles
-from tests.support.agents import replies
-from tests.support.local_search_runs import robot_of, started
+from tests.support.agents import replies, robot_of, started
 
 TASK = (0, 1)
 """The only task, as each robot names it."""

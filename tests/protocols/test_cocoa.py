@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 from itertools import pairwise
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.cocoa
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
 from robochoc.model.assembly import Extras, assemble
@@ -25,11 +23,11 @@ from robochoc.protocols.local_search.messages.cocoa import (
     SetValue,
 )
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, domains_of, robot_of, started
+from tests.support.local_search_runs import any_schedule, domains_of
 from tests.support.problems import team_of
 
 SOFT = Relation("S", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (4, 1, 2, 7))
@@ -317,7 +315,3 @@ def assert_few_messages(team: Team, events: list[AnyEvent]) -> None:
         activations = neighbours + len(domains[robot.variables[0].name])
         assert len(kinds) - kinds.count("Costs") <= 2 * neighbours * activations
         assert kinds.count("Inquiry") <= neighbours * activations
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.cocoa).failed == 0

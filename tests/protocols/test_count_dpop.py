@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 from collections import Counter
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.count_dpop
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.formats.result import result_json
@@ -215,7 +213,3 @@ def test_counting_is_refused_where_nobody_counts(options: Options, why: str) -> 
 def test_a_number_that_is_none_is_a_lie(count: str) -> None:
     assert fault_of_findings(Findings(count=count), ()) == "it tells of a number that is none"
     assert not fault_of_findings(Findings(count="1f"), ())
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.count_dpop).failed == 0

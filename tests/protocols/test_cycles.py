@@ -25,10 +25,10 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import violations
 from robochoc.verification.objective import withdrawal_cost
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, assignments_by_cycle, domains_of, played, robot_of, started
+from tests.support.local_search_runs import any_schedule, assignments_by_cycle, domains_of, played
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.d_gibbs
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
@@ -193,7 +191,3 @@ def test_settings_that_cannot_be_are_refused(setting: str) -> None:
     name, number = setting.split("=")
     with pytest.raises(SettingsError, match="it must be"):
         settings_of(DGibbs, {name: number})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.d_gibbs).failed == 0

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from random import Random
 
 import pytest
 
-import robochoc.protocols.satisfaction.dba
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -19,10 +17,10 @@ from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.verification.checker import violations
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_hard_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, robot_of, started
+from tests.support.local_search_runs import any_schedule
 from tests.support.loose_problems import minimum_cost
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
@@ -151,7 +149,3 @@ def test_who_stops_violates_nothing(teams: int) -> None:
         elif result.verdict is Verdict.NO_SOLUTION:
             assert not possible
     assert solved > 0.9 * soluble > 0
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.satisfaction.dba).failed == 0

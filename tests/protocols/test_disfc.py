@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 from collections import Counter
 from dataclasses import replace
 from random import Random
@@ -10,7 +9,6 @@ from random import Random
 import msgspec
 import pytest
 
-import robochoc.protocols.satisfaction.disfc
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
@@ -214,10 +212,6 @@ def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPa
 
 def test_a_filter_that_is_too_short_allows_nothing_more() -> None:
     assert [allows(b"\x02", place) for place in (0, 1, 8, 100)] == [False, True, False, False]
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.satisfaction.disfc).failed == 0
 
 
 # The truth

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from collections.abc import Sequence
 
-import robochoc.protocols.inference.dpop
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.expression import Type, parse
@@ -177,7 +175,3 @@ def test_messages_are_as_many_as_the_tree_says() -> None:
     sent = Simulation(team, DPOP, RandomChannels(2)).run().metrics.messages
     wanted = {"Domain": 6, "Dimensions": 5, "Proceed": 5, "UTIL": 5, "VALUE": 5}
     assert {name: sent[name] for name in wanted} == wanted
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.dpop).failed == 0

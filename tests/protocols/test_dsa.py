@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.dsa
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -15,17 +13,10 @@ from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.settings.dsa import DSASettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Value
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
-from tests.support.local_search_runs import (
-    assignments_by_cycle,
-    cost_of_assignment,
-    domains_of,
-    played,
-    robot_of,
-    started,
-)
+from tests.support.local_search_runs import assignments_by_cycle, cost_of_assignment, domains_of, played
 from tests.support.problems import team_of
 
 EQUAL_COSTS = Relation("E", 2, Semantics.SOFT, ((1, 1), (2, 2), (3, 3)), (1, 1, 1), 0)
@@ -166,7 +157,3 @@ def test_there_are_five_variants() -> None:
     assert settings_of(DSA, {"variant": "E"}) == DSASettings(variant="E")
     with pytest.raises(SettingsError, match="variant"):
         settings_of(DSA, {"variant": "F"})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.dsa).failed == 0

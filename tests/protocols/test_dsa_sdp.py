@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 
 import pytest
 
-import robochoc.protocols.local_search.dsa_sdp
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa_sdp import DSASDP
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Value
-from tests.support.agents import replies, value
-from tests.support.local_search_runs import robot_of, started
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.problems import team_of
 
 
@@ -84,7 +81,3 @@ def test_who_has_no_other_value_stays() -> None:
 def test_settings_are_probabilities_and_a_period(settings: dict[str, str], why: str) -> None:
     with pytest.raises(SettingsError, match=why):
         settings_of(DSASDP, settings)
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.dsa_sdp).failed == 0

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 from typing import ClassVar
 
 import pytest
 
-import robochoc.protocols.local_search.duct
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
@@ -334,7 +332,3 @@ def test_settings_that_cannot_be_are_refused() -> None:
     for name, number in [("samples", 0), ("contexts", 0), ("bound", -1), ("error", -1), ("confidence", 1)]:
         with pytest.raises(SettingsError, match="it must be"):
             settings_of(DUCT, {name: str(number)})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.duct).failed == 0

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.gdba
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -20,11 +18,11 @@ from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, domains_of, played, robot_of, started
+from tests.support.local_search_runs import any_schedule, domains_of, played
 from tests.support.problems import team_of
 
 VARIANTS = [*itertools.product("AM", ("NZ", "NM", "MX"), "ERCT")]
@@ -193,7 +191,3 @@ def test_on_weighted_colourings_it_leaves_the_minima_of_mgm(teams: int) -> None:
             trails = {name: found.trail for name, found in result.findings.items() if found.trail}
             sums[protocol] += min(costs_by_cycle(CompiledTeam(team), trails))
     assert sums[GDBA] < sums[MGM]
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.gdba).failed == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from collections import Counter
 from dataclasses import replace
@@ -10,7 +9,6 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.auctions.grape
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.tasks import tasks
@@ -23,11 +21,11 @@ from robochoc.protocols.auctions.grape import GRAPE
 from robochoc.protocols.auctions.messages.grape import Partition
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started
 from tests.support.allocation_problems import Congestion, plain, random_congestion, simple_allocation_team
 from tests.support.examples import count
 from tests.support.limits import HANG_S
-from tests.support.local_search_runs import any_schedule, played, robot_of, started
+from tests.support.local_search_runs import any_schedule, played
 from tests.support.problems import team_of
 from tests.support.random_options import random_schedule
 
@@ -262,7 +260,3 @@ def test_the_seed_decides_who_moves_first() -> None:
     team = normalized(tasks(5, 2, 3))
     found = {str(played(team, GRAPE, Concurrent(0), seed).assignments) for seed in range(9)}
     assert len(found) > 1
-
-
-def test_the_example_in_the_docstring() -> None:
-    assert doctest.testmod(robochoc.protocols.auctions.grape).failed == 0

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 import math
 from random import Random
 
 import pytest
 
-import robochoc.protocols.optimization.hs_cai
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Message
@@ -232,9 +230,3 @@ def test_no_table_is_over_more_than_k_robots_and_the_optimum_is_the_same(k: int)
                 seen += 1
                 assert len(event.content["axes"]) <= k
     assert seen
-
-
-def test_the_example_shows_what_happens() -> None:
-    result = doctest.testmod(robochoc.protocols.optimization.hs_cai)
-    assert result.attempted
-    assert not result.failed

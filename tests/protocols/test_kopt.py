@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from collections.abc import Iterator
 from itertools import pairwise
@@ -10,7 +9,6 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.kopt
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search import kopt_groups
@@ -21,7 +19,7 @@ from robochoc.protocols.local_search.settings.kopt import KOptSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.solver.encoding import TooLargeError
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import (
@@ -31,8 +29,6 @@ from tests.support.local_search_runs import (
     domains_of,
     never_rises,
     played,
-    robot_of,
-    started,
 )
 from tests.support.problems import team_of
 
@@ -234,7 +230,3 @@ def test_three_that_are_stuck_in_pairs_move_together() -> None:
 def test_k_is_bounded(k: str) -> None:
     with pytest.raises(SettingsError, match="it must be from 1 to 8"):
         settings_of(KOpt, {"k": k})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.kopt).failed == 0

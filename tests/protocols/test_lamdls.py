@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.lamdls
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
@@ -16,7 +14,7 @@ from robochoc.protocols.local_search.lamdls import LAMDLS
 from robochoc.protocols.local_search.messages.lamdls import Colour
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import (
@@ -27,8 +25,6 @@ from tests.support.local_search_runs import (
     is_optimal,
     never_rises,
     played,
-    robot_of,
-    started,
 )
 from tests.support.problems import team_of
 
@@ -161,7 +157,3 @@ def test_a_cycle_takes_one_message_for_each_neighbour() -> None:
     Simulation(triangle(), LAMDLS, Concurrent(0), observer=events.append, parameters=parameters).search()
     kinds = [event.type for event in events if isinstance(event, Sent)]
     assert (kinds.count("Colour"), kinds.count("Value")) == (8, 80)
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.lamdls).failed == 0

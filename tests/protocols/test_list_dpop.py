@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.list_dpop
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.communication.run_result import RunResult
@@ -259,7 +257,3 @@ def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]],
 def test_a_place_that_is_none_is_a_lie() -> None:
     assert fault_of_findings(Findings(listing=Listing([-1], 1)), ()) == "it tells of optima that cannot be"
     assert not fault_of_findings(Findings(listing=Listing([0], 1)), ())
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.list_dpop).failed == 0

@@ -15,7 +15,7 @@ from robochoc.model.problem import Constraint
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.support.local_search_runs import robot_of
+from tests.support.agents import robot_of
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 

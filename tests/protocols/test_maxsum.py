@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from dataclasses import replace
 from itertools import combinations
@@ -11,7 +10,6 @@ from random import Random
 import numpy as np
 import pytest
 
-import robochoc.protocols.inference.maxsum
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -26,19 +24,11 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.solver import shared_constraint
 from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team, random_tree, with_costs
 from tests.support.examples import count
-from tests.support.local_search_runs import (
-    any_schedule,
-    assignments_by_cycle,
-    cost_of_assignment,
-    domains_of,
-    played,
-    robot_of,
-    started,
-)
+from tests.support.local_search_runs import any_schedule, assignments_by_cycle, cost_of_assignment, domains_of, played
 from tests.support.problems import team_of
 
 COSTS = Relation("C", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (3, 1, 4, 6))
@@ -340,7 +330,3 @@ def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -
 def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
     with pytest.raises(SettingsError, match=rule):
         settings_of(MaxSum, {name: given})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.maxsum).failed == 0

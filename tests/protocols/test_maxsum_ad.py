@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.maxsum_ad
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.orders import with_order
@@ -18,7 +16,7 @@ from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum_ad import MaxSumADSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain, Value
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team, random_tree
 from tests.support.examples import count
@@ -30,8 +28,6 @@ from tests.support.local_search_runs import (
     is_optimal,
     never_rises,
     played,
-    robot_of,
-    started,
 )
 from tests.support.problems import team_of
 
@@ -230,7 +226,3 @@ def test_what_is_proven_is_true(variant: str, teams: int) -> None:
 def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
     with pytest.raises(SettingsError, match=rule):
         settings_of(MaxSumAD, {name: given})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.maxsum_ad).failed == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from dataclasses import replace
 from decimal import Decimal
@@ -10,7 +9,6 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.mb_dpop
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Message
@@ -321,7 +319,3 @@ def test_with_enough_dimensions_it_is_dpop() -> None:
     assert wide.cost == plain.cost
     assert wide.metrics.messages["UTIL"] == plain.metrics.messages["UTIL"]
     assert "Context" not in wide.metrics.messages or not wide.metrics.messages["Context"]
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.mb_dpop).failed == 0

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.mgm
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.shared.messages.cycles import Value
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.local_search_runs import (
     any_schedule,
@@ -22,8 +20,6 @@ from tests.support.local_search_runs import (
     is_optimal,
     never_rises,
     played,
-    robot_of,
-    started,
 )
 from tests.support.problems import team_of
 
@@ -100,7 +96,3 @@ def test_the_cost_never_rises_and_the_end_is_a_local_optimum(batch: int) -> None
             course = assignments_by_cycle(team, played(team, MGM, any_schedule(chance), seed, cycles=30))
             assert never_rises([cost_of_assignment(team, values) for values in course])
             assert is_optimal(team, course[-1], together=1)
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.mgm).failed == 0

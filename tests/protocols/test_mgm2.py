@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.mgm2
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -17,7 +15,7 @@ from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain, Value
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.local_search_runs import (
     any_schedule,
@@ -27,8 +25,6 @@ from tests.support.local_search_runs import (
     is_optimal,
     never_rises,
     played,
-    robot_of,
-    started,
 )
 from tests.support.problems import team_of
 
@@ -256,7 +252,3 @@ def test_the_cost_never_rises_and_the_end_is_a_2_optimum(batch: int) -> None:
 def test_the_threshold_is_a_probability(threshold: str) -> None:
     with pytest.raises(SettingsError, match="it must be from 0 to 1"):
         settings_of(MGM2, {"threshold": threshold})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.mgm2).failed == 0

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.mixed_dsa
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.mixed_dsa import MixedDSA
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Value
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
-from tests.support.local_search_runs import any_schedule, domains_of, played, robot_of, started
+from tests.support.local_search_runs import any_schedule, domains_of, played
 from tests.support.problems import team_of
 
 
@@ -66,7 +64,3 @@ def test_with_one_probability_for_both_it_is_dsa(teams: int) -> None:
 def test_what_is_no_probability_is_refused(name: str, probability: str) -> None:
     with pytest.raises(SettingsError, match=f"{name} is {probability}; it must be more than 0 and at most 1"):
         settings_of(MixedDSA, {name: probability})
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.mixed_dsa).failed == 0

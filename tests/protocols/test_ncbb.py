@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
 from random import Random
 
 import pytest
 
-import robochoc.protocols.optimization.ncbb
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
@@ -128,11 +126,6 @@ def test_a_limit_returns_an_assignment_early() -> None:
         assert outcome.verdict is Verdict.UNKNOWN
         assert outcome.cost is not None
         assert (outcome.bound or 0) <= least_cost(team) <= outcome.cost
-
-
-def test_the_example_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.optimization.ncbb).attempted
-    assert doctest.testmod(robochoc.protocols.optimization.ncbb).failed == 0
 
 
 def test_messages_between_two_robots() -> None:

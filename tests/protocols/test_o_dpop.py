@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 from collections import defaultdict
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.o_dpop
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
@@ -192,7 +190,3 @@ def test_it_sends_fewer_bytes_than_dpop_where_few_combinations_are_good() -> Non
     team = with_costs(team_of(dict.fromkeys("ABCD", range(size)), constraints))
     sent = [solve(team, Options(protocol=name, runtime=Runtime.SIMULATOR)).metrics.bytes for name in ("o-dpop", "dpop")]
     assert sent[0] < sent[1]
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.o_dpop).failed == 0

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import doctest
-
 import pytest
 
-import robochoc.protocols.optimization.pt_fb
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.messages.branching import Members, Report, Request, Result
@@ -122,9 +119,3 @@ def test_reports_that_are_handed_down_save_messages_against_ncbb() -> None:
             outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False))
             sent[protocol] += sum(outcome.metrics.messages.values())
     assert sent["pt-fb"] < 0.8 * sent["ncbb"]
-
-
-def test_the_example_shows_what_happens() -> None:
-    result = doctest.testmod(robochoc.protocols.optimization.pt_fb)
-    assert result.attempted
-    assert not result.failed

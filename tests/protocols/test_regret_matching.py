@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import itertools
 from collections import Counter
 from fractions import Fraction
@@ -10,24 +9,15 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.local_search.regret_matching
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.regret_matching import UNIT, RegretMatching
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Value
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
-from tests.support.local_search_runs import (
-    any_schedule,
-    assignments_by_cycle,
-    cost_of_assignment,
-    domains_of,
-    played,
-    robot_of,
-    started,
-)
+from tests.support.local_search_runs import any_schedule, assignments_by_cycle, cost_of_assignment, domains_of, played
 from tests.support.problems import team_of
 
 B_SAYS = (1, 2, 3)
@@ -171,7 +161,3 @@ def test_a_replay_shows_regrets() -> None:
 def test_settings_are_a_part_and_a_probability(settings: dict[str, str], why: str) -> None:
     with pytest.raises(SettingsError, match=why):
         settings_of(RegretMatching, settings)
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.local_search.regret_matching).failed == 0

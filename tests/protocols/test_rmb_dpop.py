@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import doctest
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.rmb_dpop
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.problem import Team
@@ -267,7 +265,3 @@ def test_with_enough_dimensions_it_is_dpop() -> None:
         ours, before = solve(team, options), solve(team, replace(options, protocol="dpop", settings={}))
         assert ours.cost == before.cost
         assert sum(ours.metrics.messages.values()) == sum(before.metrics.messages.values())
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.rmb_dpop).failed == 0

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
 import pytest
 
-import robochoc.protocols.inference.s_dpop
 from robochoc.generators.random_csp import random_csp
 from robochoc.generators.scenario import Kind, random_scenario
 from robochoc.model.orders import Order
@@ -237,7 +235,3 @@ def test_without_new_links_it_takes_less_than_half_of_what_dpop_takes_anew() -> 
         assert [epoch.cost for epoch in kept] == [epoch.cost for epoch in anew]
         assert 2 * sum(epoch.metrics.bytes for epoch in kept) < sum(epoch.metrics.bytes for epoch in anew)
         assert 2 * sum(sum(said(epoch).values()) for epoch in kept) < sum(sum(said(epoch).values()) for epoch in anew)
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.inference.s_dpop).failed == 0

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from collections import Counter
 from random import Random
 
 import pytest
 
-import robochoc.protocols.optimization.sfb
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
@@ -391,7 +389,3 @@ def test_the_bound_is_never_more_than_the_least_cost_and_is_it_in_the_end(teams:
             found = Simulation(problem, SFB, RandomChannels(seed)).search(60, messages).findings["RX00"]
             assert found.bound is None or found.bound <= least
         assert best is None or end.findings["RX00"].bound == least
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.optimization.sfb).failed == 0

@@ -13,8 +13,7 @@ from robochoc.protocols.auctions.cbaa import CBAA
 from robochoc.protocols.auctions.messages.cbaa import WinningBids
 from robochoc.protocols.auctions.messages.ssi import Bid, Won
 from robochoc.protocols.auctions.ssi import SSI
-from tests.support.agents import replies
-from tests.support.local_search_runs import robot_of, started
+from tests.support.agents import replies, robot_of, started
 
 ONE, TWO = (0, 1), (0, 2)
 """Tasks as each robot names them, which does one at most."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from collections.abc import Mapping
 from typing import Literal
 
 import pytest
 
-import robochoc.protocols.asymmetric.syncabb
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 from robochoc.protocols.asymmetric.messages.syncabb import CPA, CPABack, FullBack, Priced, TooCostly
@@ -141,10 +139,6 @@ def test_a_cpa_that_cannot_be_is_refused(message: CPABack | FullBack) -> None:
 def test_a_side_without_an_own_value_is_refused() -> None:
     with pytest.raises(ValueError, match="has no value in it"):
         replies(agent("RB"), ("RC", CPABack("RC", (1,), 0, 9, [])))
-
-
-def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.asymmetric.syncabb).failed == 0
 
 
 @pytest.mark.parametrize(

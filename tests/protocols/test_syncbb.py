@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from collections.abc import Mapping
 from random import Random
 
 import pytest
 
-import robochoc.protocols.optimization.syncbb
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
@@ -201,7 +199,3 @@ def test_one_robot_acts_at_a_time_so_all_checks_stand_in_a_row() -> None:
     for seed in range(10):
         metrics = Simulation(random_cost_team(Random(seed)), SyncBB, Concurrent(seed)).run().metrics
         assert metrics.ncccs == metrics.checks
-
-
-def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.optimization.syncbb).failed == 0

@@ -1,9 +1,51 @@
-"""One protocol object, alone: what it sends after a packet, and its value."""
+"""One protocol object, alone: how it starts, what it sends after a packet, and its value."""
 
 from __future__ import annotations
 
+import itertools
+from typing import TypeVar
+
 from robochoc.model.message import Message, Value
+from robochoc.model.problem import Team
+from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
+from robochoc.solver.compiled import LocalProblem
+
+P = TypeVar("P", bound=Protocol)
+
+
+def robot_of(
+    protocol: type[P], team: Team, name: str, *chances: float, parameters: RunParameters = DEFAULT_PARAMETERS
+) -> P:
+    """Return the protocol object of one robot, not yet started, which draws `chances`, and then 0 for ever."""
+    traits = protocol.traits
+    part = agent_problems(team, parameters, shared_scopes=traits.shared_scopes, tree=traits.tree)[name]
+    robot = protocol(LocalProblem(part), PriorityOrder(part.order, part.known.links))
+    robot.chance = itertools.chain(chances, itertools.repeat(0.0)).__next__
+    return robot
+
+
+def started(robot: Protocol) -> list[tuple[str, Message]]:
+    """Start `robot` and return its first messages."""
+    robot.start()
+    return sent(robot)
+
+
+def started_robot(
+    protocol: type[P], team: Team, name: str, *chances: float, parameters: RunParameters = DEFAULT_PARAMETERS
+) -> P:
+    """Return the same as `robot_of`, started; its first messages are gone."""
+    robot = robot_of(protocol, team, name, *chances, parameters=parameters)
+    started(robot)
+    return robot
+
+
+def sent(robot: Protocol) -> list[tuple[str, Message]]:
+    """Return the messages in the outbox of `robot`, and empty it."""
+    messages = list(robot.outbox)
+    robot.outbox.clear()
+    return messages
 
 
 def replies(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
@@ -11,9 +53,7 @@ def replies(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Me
     for sender, message in packet:
         robot.receive(sender, message)
     robot.settle()
-    said = list(robot.outbox)
-    robot.outbox.clear()
-    return said
+    return sent(robot)
 
 
 def value(robot: Protocol) -> Value | None:

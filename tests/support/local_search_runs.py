@@ -5,36 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from random import Random
-from typing import TypeVar
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Assignment, Team
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
-
-P = TypeVar("P", bound=Protocol)
-
-
-def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
-    """The protocol object of one robot, not yet started, which draws `chances`, and then 0 for ever."""
-    part = agent_problems(team, shared_scopes=protocol.traits.shared_scopes)[name]
-    robot = protocol(LocalProblem(part), PriorityOrder(team.order))
-    robot.chance = itertools.chain(chances, itertools.repeat(0.0)).__next__
-    return robot
-
-
-def started(robot: Protocol) -> list[tuple[str, Message]]:
-    """Return the first messages of `robot`."""
-    robot.start()
-    said = list(robot.outbox)
-    robot.outbox.clear()
-    return said
 
 
 def any_schedule(chance: Random) -> Schedule:

@@ -9,10 +9,8 @@ from typing import TypeVar
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.optimization.messages.bounding import Context
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from tests.support.agents import robot_of
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 
@@ -37,7 +35,7 @@ def priced(names: str, costs: Costs, values: Mapping[str, int] = {}) -> Team:
 
 def unplaced(protocol: type[P], team: Team, name: str) -> P:
     """The protocol object of one robot, before it has started."""
-    return protocol(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
+    return robot_of(protocol, team, name)
 
 
 def placed(
