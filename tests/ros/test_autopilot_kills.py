@@ -42,6 +42,7 @@ def all_come_down(vehicles: PlayedFleet[Any], run: Run) -> None:
     assert run.left_behind() == []
 
 
+@pytest.mark.more
 def test_when_the_program_is_killed_the_guard_lands_all(kind: AutopilotKind, tmp_path: Path) -> None:
     with kind.flight(tmp_path, **kind.quick) as (vehicles, run):
         meet(kind, vehicles, run, "climbing")

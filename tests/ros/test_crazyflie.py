@@ -27,6 +27,7 @@ def all_ready(guard: GuardProcess) -> bool:
     return [state.phase for state in guard.states.values()] == [Phase.READY] * len(NAMES)
 
 
+@pytest.mark.more
 def test_without_permission_crazyflies_are_seen_and_none_is_commanded(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         done = solve(tmp_path, fleet)
@@ -57,6 +58,7 @@ def test_crazyflies_take_off_reach_their_places_and_land(tmp_path: Path, arms_it
         assert len({reached(vehicle)[0][-1] for vehicle in vehicles}) > 1
 
 
+@pytest.mark.more
 def test_speed_is_that_of_the_fleet_file(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path, haste=40, speed=2, takeoff=0.5) as (vehicles, fleet):
         assert solve(tmp_path, fleet, "--arm").returncode == 0
@@ -91,6 +93,7 @@ def test_where_a_crazyflie_was_switched_on(tmp_path: Path) -> None:
 # What is refused before anything is armed
 
 
+@pytest.mark.more
 def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path, fence="[[-1, -1, 0], [6.5, 5, 1.5]]", takeoff=0.5) as (vehicles, fleet):
         done = solve(tmp_path, fleet, "--arm")
@@ -99,6 +102,7 @@ def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_pa
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
+@pytest.mark.more
 def test_a_crazyflie_that_is_not_there_ends_with_one_message(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True

@@ -27,6 +27,7 @@ from robochoc.ros.autopilots.supervisor import (
     TUMBLED,
     Supervisor,
 )
+from tests.support.cases import looped
 from tests.support.crazyflie_firmware import Crazyfly, Place
 from tests.support.crazyflies import Crazyflies
 from tests.support.limits import HANG_S, wait_until
@@ -95,6 +96,7 @@ def test_what_is_told_is_in_the_frame_of_the_team() -> None:
         assert not told.in_air
 
 
+@pytest.mark.more
 def test_on_its_way_it_is_sent_elsewhere_in_a_straight_line() -> None:
     with linked() as (vehicle, autopilot):
         fly(vehicle, autopilot)
@@ -185,6 +187,7 @@ def test_on_the_ground_it_is_disarmed_and_does_not_land() -> None:
         assert vehicle.log == ["armed", "refused takeoff", "disarmed"]
 
 
+@pytest.mark.more
 def test_a_take_off_whose_answer_is_lost_is_none_that_was_refused() -> None:
     with linked(deaf={"takeoff"}) as (vehicle, autopilot):
         autopilot.arm()
@@ -203,6 +206,7 @@ def test_who_is_not_heard_gets_no_command(monkeypatch: pytest.MonkeyPatch) -> No
             autopilot.arm()
 
 
+@pytest.mark.more
 def test_a_link_that_was_opened_in_vain_is_opened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its questions are lost. Once it is heard again it goes on with its log, as if that were an answer."""
     for name in ("_REOPEN_S", "_ATTEMPT_S"):
@@ -229,7 +233,7 @@ def test_a_landing_that_is_under_way_is_no_refusal() -> None:
         assert vehicle.log.count("land") == 1
 
 
-@pytest.mark.parametrize(
+@looped(
     ("bits", "armed", "mode", "problem"),
     [
         (CAN_ARM, False, "STANDBY", ""),

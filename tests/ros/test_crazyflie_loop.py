@@ -26,6 +26,7 @@ def closed(folder: Path, fleet: Path) -> subprocess.CompletedProcess[str]:
     return solve(folder, fleet, *words)
 
 
+@pytest.mark.more
 def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[1].drain = 3.0

@@ -24,9 +24,10 @@ from robochoc.ros.names import REPORTS
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
+from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE, free_domain, reporter, subscriber
 from tests.support.limits import HANG_S, wait_until
-from tests.support.program import ROOT, robochoc
+from tests.support.program import ROOT, robochoc, robochoc_within
 
 POSE = "geometry_msgs/PoseStamped"
 BATTERY = "sensor_msgs/BatteryState"
@@ -56,7 +57,7 @@ def pose(number: int) -> dict[str, object]:
 # Places
 
 
-@pytest.mark.parametrize(
+@looped(
     ("place", "found"),
     [
         ("", DdsPlace(7, QUALITY)),
@@ -73,7 +74,7 @@ def test_places(monkeypatch: pytest.MonkeyPatch, place: str, found: DdsPlace) ->
     assert DdsPlace.of(place, QUALITY, options, SinkError) == found
 
 
-@pytest.mark.parametrize(
+@looped(
     ("place", "told"),
     [
         ("nonsense", r"'nonsense' is no domain of DDS; expected a number from 0 to 232, as in dds:0"),
@@ -117,7 +118,7 @@ def test_the_domain_of_ros_is_heeded(monkeypatch: pytest.MonkeyPatch, domain: in
         DdsSource("")
 
 
-@pytest.mark.parametrize("configuration", ["<Cyc", "file:///nonexistent", "ü"])
+@looped("configuration", ["<Cyc", "file:///nonexistent", "ü"])
 def test_a_configuration_that_is_none(monkeypatch: pytest.MonkeyPatch, domain: int, configuration: str) -> None:
     monkeypatch.setenv("CYCLONEDDS_URI", configuration)
     with pytest.raises(SinkError, match=rf"domain {domain} of DDS cannot be joined \(.*\); see CYCLONEDDS_URI"):
@@ -125,7 +126,7 @@ def test_a_configuration_that_is_none(monkeypatch: pytest.MonkeyPatch, domain: i
 
 
 def test_the_program_refuses_a_bad_place_in_one_line() -> None:
-    done = robochoc("solve", HANGAR, "--ros", "dds:nonsense")
+    done = robochoc_within("solve", HANGAR, "--ros", "dds:nonsense")
     assert done.returncode != 0
     assert done.stderr.count("\n") == 1
     assert "'nonsense' is no domain of DDS" in done.stderr
@@ -160,6 +161,7 @@ def received(said: Any) -> dict[str, list[tuple[float, float, float, int, str]]]
     return dict(found)
 
 
+@pytest.mark.more
 def test_every_waypoint_of_the_queens_arrives(domain: int, tmp_path: Path) -> None:
     queens = str(ROOT / "instances" / "queens3d-4")
     with subscriber(domain, waypoints_of(queens)) as peer:
@@ -195,6 +197,7 @@ def test_who_comes_late_receives_the_last(domain: int, depth: int, numbers: list
             assert [message["pose"]["position"]["x"] for _, message in [*late, peer.heard()]] == [*numbers, 5]
 
 
+@pytest.mark.more
 def test_a_subscriber_that_asks_for_less_receives_too(domain: int) -> None:
     """It is sent nothing again: what is published before it has found the publisher is lost to it."""
     with (
@@ -209,6 +212,7 @@ def test_a_subscriber_that_asks_for_less_receives_too(domain: int) -> None:
     assert message["header"]["stamp"] == {"sec": 1_700_000_000, "nanosec": 123_456_789}
 
 
+@pytest.mark.more
 def test_partitions_keep_apart(domain: int) -> None:
     topics = {"/a/waypoint": "PoseStamped"}
     with (
@@ -232,6 +236,7 @@ def _stands(thread: Path) -> bool:
     return (thread / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "T"
 
 
+@pytest.mark.more
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc says whether a process is stopped")
 def test_a_subscriber_that_stands_still_ends_it(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dds_module, "STUCK_S", 0.3)
@@ -291,6 +296,7 @@ def expected(source: DdsSource) -> ReceivedMessage:
     return message
 
 
+@pytest.mark.more
 def test_reports_that_may_be_lost_are_heard(domain: int) -> None:
     """As sensors publish: whoever has not been found yet is sent nothing, and nothing is sent again."""
     with reporter(domain, {"/a/battery": "BatteryState"}, reliable=False) as peer, DdsSource(str(domain)) as source:
@@ -303,6 +309,7 @@ def test_reports_that_may_be_lost_are_heard(domain: int) -> None:
     assert message.fields["percentage"] == 0.25
 
 
+@pytest.mark.more
 def test_latched_reports_are_heard_where_the_place_asks_for_them(domain: int) -> None:
     topics = {"/a/out_of_order": "String", "/b/out_of_order": "String"}
     with reporter(domain, topics, latched=True) as peer, DdsSource(str(domain)) as first:
@@ -325,7 +332,7 @@ GARBAGE = (
 )
 
 
-@pytest.mark.parametrize("garbage", GARBAGE)
+@looped("garbage", GARBAGE)
 def test_bytes_that_are_no_message_are_passed_over(domain: int, garbage: bytes) -> None:
     """Cyclone DDS does not let most of them pass; whoever it lets pass changes nothing."""
     with DdsSource(str(domain)) as source:
@@ -334,6 +341,7 @@ def test_bytes_that_are_no_message_are_passed_over(domain: int, garbage: bytes) 
         assert expected(source).fields == {"data": "whole"}
 
 
+@pytest.mark.more
 def test_a_message_that_is_too_long_does_not_come(domain: int, capfd: pytest.CaptureFixture[str]) -> None:
     with reporter(domain, {"/a/out_of_order": "String"}) as peer, DdsSource(f"{domain}?{RELIABLE}") as source:
         source.listen({"/a/out_of_order": STRING})
@@ -344,6 +352,7 @@ def test_a_message_that_is_too_long_does_not_come(domain: int, capfd: pytest.Cap
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.more
 def test_a_message_of_another_type_does_not_come(domain: int) -> None:
     topics = {"/a/battery": "String", "/b/out_of_order": "String"}
     with reporter(domain, topics) as peer, DdsSource(f"{domain}?{RELIABLE}") as source:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
 from robochoc.ros.live.dds_types import described, raw_type, topic_name
 from robochoc.ros.recordings.types import types_of
+from tests.support.cases import looped
 
 STAMP = 1_700_000_000_123_456_789
 KINDS = sorted(
@@ -38,7 +37,7 @@ def value(field: Any, number: int) -> Any:  # noqa: ANN401 - of any type
     return plain.get(field.name, number / 4 if field.name.startswith("float") else number % 100)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@looped("kind", KINDS)
 def test_the_description_of_a_type_is_that_of_its_bytes(kind: str) -> None:
     """The library, which knows the description alone, reads our bytes and writes the same."""
     content = types_of(2).encode(kind, filled(kind))

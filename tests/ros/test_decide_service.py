@@ -28,6 +28,7 @@ from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.recordings.types import FieldsError, types_of
 from robochoc.ros.sink import Fields, SinkError
 from robochoc.run import Options, Runtime, solve
+from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE, ServiceClient, free_domain, subscriber
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import PROGRAM, ROOT
@@ -96,7 +97,7 @@ def test_a_trigger_tells_the_assignment() -> None:
     assert told["assignment"] == solve(HANGAR, SIMULATED).assignment
 
 
-@pytest.mark.parametrize(
+@looped(
     ("fields", "told"),
     [
         ({"team": "yard\x1b"}, r"no team has the name 'yard\\x1b'; known are hangar, rescue"),
@@ -187,6 +188,7 @@ def test_a_client_is_answered_with_its_own_number(offered: DdsServices) -> None:
         assert client.heard() == {"guid": GUID, "seq": 1, "success": False, "message": "b"}
 
 
+@pytest.mark.more
 def test_a_service_at_once_does_not_wait_for_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dds_service, "END_S", 0.0)  # clients are killed
     kinds = {SERVICE: DECIDE, "/robochoc/cancel": TRIGGER}
@@ -205,6 +207,7 @@ def test_a_service_at_once_does_not_wait_for_its_turn(monkeypatch: pytest.Monkey
         assert offered.next(0.001) is None
 
 
+@pytest.mark.more
 def test_feedback_is_published(offered: DdsServices) -> None:
     with subscriber(offered.domain, {"/robochoc/feedback": "String"}) as peer:
         offered.announce("/robochoc/feedback", "std_msgs/String")
@@ -266,7 +269,7 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(
     assert told.count(f"{WAITING_MAX} requests wait already; ask again later") == 3
 
 
-@pytest.mark.parametrize("place", ["x", "233", "5?wait=1", "5?reliability=reliable", "5?partition="])
+@looped("place", ["x", "233", "5?wait=1", "5?reliability=reliable", "5?partition="])
 def test_places_that_are_none(place: str) -> None:
     with pytest.raises(SinkError):
         DdsServices(place, {SERVICE: DECIDE}, refusal)
@@ -283,6 +286,7 @@ def served(domain: int, *words: str) -> subprocess.Popen[str]:
     )
 
 
+@pytest.mark.more
 def test_the_command_answers() -> None:
     domain = free_domain()
     with _asks_at_once(domain) as client:
@@ -338,7 +342,7 @@ def test_a_signal_ends_it(how: signal.Signals, status: int) -> None:
     assert server.returncode in {status, -how}
 
 
-@pytest.mark.parametrize(
+@looped(
     ("words", "told"),
     [
         (["--ros", "rospy"], "--ros rospy: services are offered by dds, rclpy, rmw_zenoh, rosbridge; as in dds:5"),

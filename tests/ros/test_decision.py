@@ -22,6 +22,7 @@ from robochoc.ros.decision import FollowedDecision
 from robochoc.ros.recordings.types import types_of
 from robochoc.run import Options, Runtime, solve
 from robochoc.system.stopping import stop_requested
+from tests.support.cases import looped
 from tests.support.cost_problems import cost_of, random_cost_team
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
@@ -148,28 +149,28 @@ def test_whatever_is_asked_is_answered_in_one_short_line_that_can_be_sent(fields
     assert back["message"] == answer["message"]
 
 
-@pytest.mark.parametrize(
-    ("fields", "told"),
+@looped(
+    ("told", "fields"),
     [
-        ({"timeout": True}, "timeout must be seconds, or 0 for the longest, is True"),
-        ({"timeout": False}, "timeout must be seconds, or 0 for the longest, is False"),
-        ({"timeout": None}, "timeout must be seconds, or 0 for the longest, is None"),
-        ({"timeout": 10**5000}, ""),
-        ({"timeout": -(10**5000)}, "timeout must be seconds, or 0 for the longest, is a int"),
-        ({"timeout": math.nan}, "timeout must be seconds, or 0 for the longest, is nan"),
-        ({"timeout": "5"}, "timeout must be seconds, or 0 for the longest, is '5'"),
-        ({"team": 5}, "team must be text, is 5"),
+        ("timeout must be seconds, or 0 for the longest, is True", {"timeout": True}),
+        ("timeout must be seconds, or 0 for the longest, is False", {"timeout": False}),
+        ("timeout must be seconds, or 0 for the longest, is None", {"timeout": None}),
+        ("", {"timeout": 10**5000}),
+        ("timeout must be seconds, or 0 for the longest, is a int", {"timeout": -(10**5000)}),
+        ("timeout must be seconds, or 0 for the longest, is nan", {"timeout": math.nan}),
+        ("timeout must be seconds, or 0 for the longest, is '5'", {"timeout": "5"}),
+        ("team must be text, is 5", {"team": 5}),
         (
-            {"team": "a\udfff"},
             "team must be text that UTF-8 can hold, and character 2 is half of a pair (U+DFFF)",
+            {"team": "a\udfff"},
         ),
         (
-            {"changes": '[{"remove_agent": {"name": "\ud800"}}]'},
             "changes must be text that UTF-8 can hold, and character 29 is half of a pair (U+D800)",
+            {"changes": '[{"remove_agent": {"name": "\ud800"}}]'},
         ),
-        ({"changes": [1]}, "changes must be text, is [1]"),
+        ("changes must be text, is [1]", {"changes": [1]}),
     ],
 )
-def test_the_reason_is_the_right_one(fields: dict[str, Any], told: str) -> None:
+def test_the_reason_is_the_right_one(told: str, fields: dict[str, Any]) -> None:
     answer = DecideService([HANGAR], lambda *_: DECIDED, SIMULATED).decide(fields)
     assert answer["message"] == (told or "solution, 1 epoch")

@@ -20,6 +20,7 @@ from robochoc.ros.autopilots.messages import Phase, Target
 from robochoc.ros.closed_loop import drones_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.waypoint import Waypoint
+from tests.support.cases import looped
 from tests.support.limits import HANG_S
 from tests.support.mavlink_teams import NAMES, fleet_file, four_drones, team_folder, udp_ports
 from tests.support.mavlink_vehicles import HOME, Vehicle, Vehicles
@@ -47,6 +48,7 @@ def reached(vehicle: Vehicle) -> list[str]:
     return [line.removeprefix("reached ") for line in vehicle.log if line.startswith("reached")]
 
 
+@pytest.mark.more
 def test_without_permission_vehicles_are_seen_and_none_is_commanded(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet):
         done = solve(tmp_path, fleet)
@@ -70,6 +72,7 @@ def test_vehicles_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
         assert len({reached(vehicle)[0][-1] for vehicle in vehicles}) > 1
 
 
+@pytest.mark.more
 def test_at_the_end_vehicles_may_hold(tmp_path: Path) -> None:
     with field(tmp_path, end="hold") as (vehicles, fleet):
         done = solve(tmp_path, fleet, "--arm")
@@ -77,6 +80,7 @@ def test_at_the_end_vehicles_may_hold(tmp_path: Path) -> None:
         assert all(vehicle.mode == "hold" and vehicle.armed and vehicle.flies for vehicle in vehicles)
 
 
+@pytest.mark.more
 def test_places_on_the_earth(tmp_path: Path) -> None:
     origin = f"[{HOME.lat}, {HOME.lon}, {HOME.alt}]"
     with field(tmp_path, origin=origin) as (vehicles, fleet):
@@ -92,6 +96,7 @@ def test_places_on_the_earth(tmp_path: Path) -> None:
 # What is refused before anything is armed
 
 
+@pytest.mark.more
 def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_path: Path) -> None:
     with field(tmp_path, fence="[[-1, -1, 0], [5, 5, 6]]", end="land") as (vehicles, fleet):
         vehicles[3].at = (4.0, 1.0, 0.0)
@@ -104,6 +109,7 @@ def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_pa
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
+@pytest.mark.more
 def test_a_vehicle_that_stands_outside_of_the_fence_is_refused(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet):
         vehicles[1].at = (0.0, 700.0, 0.0)
@@ -112,6 +118,7 @@ def test_a_vehicle_that_stands_outside_of_the_fence_is_refused(tmp_path: Path) -
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
+@pytest.mark.more
 def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
@@ -133,6 +140,7 @@ def test_all_vehicles_that_are_not_heard_are_told_at_once(tmp_path: Path) -> Non
         assert "within 5 s; nor can RC, RD; nothing was armed" in done.stderr
 
 
+@pytest.mark.more
 def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
     with field(tmp_path) as (_, fleet):
         fleet.write_text(fleet.read_text().replace("udpin://127.0.0.1", "udpin://no.such.host.invalid"))
@@ -140,7 +148,7 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
         assert "RA cannot be flown: udpin://no.such.host.invalid" in done.stderr
 
 
-@pytest.mark.parametrize(
+@looped(
     ("names", "told"),
     [
         (["RA", "RB", "RC"], "there is no vehicle for RD; each drone with a topic needs one"),
@@ -153,7 +161,7 @@ def test_drones_and_vehicles_match(tmp_path: Path, names: list[str], told: str) 
     assert told in solve(tmp_path, fleet).stderr
 
 
-@pytest.mark.parametrize(
+@looped(
     ("words", "told"),
     [
         (["--arm"], "--arm is for robots that are commanded: add --ros mavlink:FILE, or crazyflie:FILE"),
@@ -256,6 +264,7 @@ def test_a_guard_may_say_nothing_for_longer_at_first(tmp_path: Path, monkeypatch
             guard.check()
 
 
+@pytest.mark.more
 def test_the_guard_flies_nobody_without_a_permit(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet), guarded(fleet) as guard:
         assert guard.wait_for(all_in(guard, Phase.READY), HANG_S)
@@ -265,6 +274,7 @@ def test_the_guard_flies_nobody_without_a_permit(tmp_path: Path) -> None:
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
+@pytest.mark.more
 def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet):
         with guarded(fleet) as guard:
@@ -286,6 +296,7 @@ def test_an_order_to_an_ended_guard_reports_what_vehicles_do(tmp_path: Path, mon
             guard.permit()
 
 
+@pytest.mark.more
 def test_a_sink_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
     with field(tmp_path) as (_, fleet):
         sink = MavlinkSink(str(fleet))

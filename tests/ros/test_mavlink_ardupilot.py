@@ -36,6 +36,7 @@ def solve(folder: Path, fleet: Path) -> subprocess.CompletedProcess[str]:
     return robochoc_within("solve", team_folder(folder), *words)
 
 
+@pytest.mark.more
 def test_copters_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet):
         done = solve(tmp_path, fleet)

@@ -60,6 +60,7 @@ def targets_of(places: Sequence[Point]) -> Mapping[str, Target]:
     return {name: Target(at) for name, at in zip(NAMES, places, strict=False)}
 
 
+@pytest.mark.more
 def test_vehicles_that_change_places_keep_their_distance(tmp_path: Path) -> None:
     with field(tmp_path, 2) as (vehicles, guard):
         fly(guard, PLACES[:2])
@@ -132,6 +133,7 @@ def test_who_is_lost_above_another_comes_down_when_that_one_has_made_room(tmp_pa
     assert vehicles.nearest_m >= LEAST_M
 
 
+@pytest.mark.more
 def test_places_that_are_too_near_are_not_flown_to(tmp_path: Path) -> None:
     with field(tmp_path, 2) as (vehicles, guard):
         guard.fly(targets_of([(0, 0, 2), (0.5, 0, 2)]))

@@ -10,6 +10,7 @@ import pytest
 from robochoc.ros.autopilots.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, Link, read_fleet
 from robochoc.ros.autopilots.frames import GpsPlace
 from robochoc.ros.autopilots.kinds import Kind
+from tests.support.cases import looped
 from tests.support.program import ROOT
 
 LINK = "udpin://0.0.0.0:14540"
@@ -64,7 +65,7 @@ def test_the_fleet_file_of_the_guide(tmp_path: Path) -> None:
 GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "told"),
     [
         ("", "is empty; see docs/guides/autopilots.md for what a fleet file has"),
@@ -124,7 +125,7 @@ def test_the_fleet_file_of_the_guide_for_crazyflies(tmp_path: Path) -> None:
     assert sorted(found.vehicles) == sorted(file.stem for file in (ROOT / "docs" / "examples" / "hangar").glob("*.xml"))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("first", "second"),
     [
         ("udpin://0.0.0.0:14540", "udpin://127.0.0.1:14540"),
@@ -138,7 +139,7 @@ def test_two_links_that_receive_at_one_port(tmp_path: Path, first: str, second: 
         read(tmp_path, f"vehicles:\n  Nose: {first}\n  Fin: {second}\n{FENCE}\n")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("first", "second"),
     [
         ("udpin://127.0.0.1:14540", "udpin://10.0.0.7:14540"),
@@ -166,16 +167,14 @@ def test_a_fleet_of_crazyflies_and_what_its_file_leaves_out(tmp_path: Path) -> N
     assert (found.speed_ms, found.patience_s, found.connect_s) == (1, 10, 60)
 
 
-@pytest.mark.parametrize(
-    "uri", [URI, "radio://12/125/250K/e7e7e7e7e7", "radio://0123456789/0/1M/0000000000", "udp://127.0.0.1:19850"]
-)
+@looped("uri", [URI, "radio://12/125/250K/e7e7e7e7e7", "radio://0123456789/0/1M/0000000000", "udp://127.0.0.1:19850"])
 def test_links_to_crazyflies(tmp_path: Path, uri: str) -> None:
     found = read_crazyflies(tmp_path, f"vehicles: {{Nose: {{link: '{uri}', at: [1, 2, 0]}}}}\n{FENCE}\nspeed: 0.5\n")
     assert found.vehicles == {"Nose": Link(uri, (1, 2, 0))}
     assert found.speed_ms == 0.5
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "told"),
     [
         *(

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from robochoc.ros.autopilots.frames import FAR_M, LATITUDE_MAX, GpsPlace, enu_from_gps, enu_of, gps_of, ned_of
 from tests.support import wgs84
+from tests.support.cases import looped
 
 NEAR_M = 1_000.0
 ORIGINS = st.builds(
@@ -25,7 +26,7 @@ def within(limit_m: float) -> st.SearchStrategy[tuple[float, float, float]]:
     return st.tuples(side, side, st.floats(-50, 200, allow_subnormal=False))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("enu", "ned"),
     [((1, 0, 0), (0, 1, 0)), ((0, 1, 0), (1, 0, 0)), ((0, 0, 1), (0, 0, -1)), ((3, -4, 2.5), (-4, 3, -2.5))],
 )

@@ -55,6 +55,7 @@ def openings(done: subprocess.CompletedProcess[str]) -> list[str]:
     return [" ".join(line.split()[1:-4]) for line in takewhile(lambda line: line.split()[0].isdigit(), table)]
 
 
+@pytest.mark.more
 def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet):
         vehicles[1].drain = 3.0
@@ -136,6 +137,7 @@ def heard(source: MavlinkSource, topic: str) -> ReceivedMessage:
             return received
 
 
+@pytest.mark.more
 def test_places_and_batteries_are_reported(tmp_path: Path) -> None:
     with field(tmp_path) as (vehicles, fleet), listening(fleet) as source:
         place = heard(source, "/RC/pose").fields["pose"]["position"]
@@ -153,6 +155,7 @@ def test_who_is_not_heard_is_out_of_order(tmp_path: Path) -> None:
         assert "it is not heard on udpin" in heard(source, "/RD/out_of_order").fields["data"]
 
 
+@pytest.mark.more
 def test_a_source_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
     with field(tmp_path) as (_, fleet), listening(fleet) as source:
         os.kill(source._guard.pid, signal.SIGKILL)  # noqa: SLF001 - as the system might
@@ -165,6 +168,7 @@ def test_a_source_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
             read_on()
 
 
+@pytest.mark.more
 def test_vehicles_have_the_names_of_drones(tmp_path: Path) -> None:
     fleet = fleet_file(tmp_path, {"RX": udp_ports(1)[0]})
     with MavlinkSource(str(fleet)) as source, pytest.raises(SourceError, match="no drone is called RX"):

@@ -22,6 +22,7 @@ from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.sinks import open_sink, open_source
 from robochoc.ros.source import SourceError
+from tests.support.cases import looped
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S, wait_until
 from tests.support.ports import free_port
@@ -93,7 +94,7 @@ def test_an_attachment_is_33_bytes_in_little_endian() -> None:
     assert content == b"\2" + bytes(7) + STAMP.to_bytes(8, "little") + b"\x10" + bytes(range(16))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("place", "address"),
     [
         ("", ("localhost", 7447)),
@@ -106,7 +107,7 @@ def test_a_place(place: str, address: tuple[str, int]) -> None:
     assert RouterAddress.of(place) == address
 
 
-@pytest.mark.parametrize("place", [":7447", "a:b", "a:0", "a:99999", "//a/b", "user@a", "[::1", "a?b", "\x1b[31m:b"])
+@looped("place", [":7447", "a:b", "a:0", "a:99999", "//a/b", "user@a", "[::1", "a?b", "\x1b[31m:b"])
 def test_a_place_that_is_none(place: str) -> None:
     with pytest.raises(SinkError, match=r"^[ -~]*expected rmw_zenoh, or rmw_zenoh://HOST:PORT") as refused:
         RmwZenohSink(place)
@@ -288,7 +289,7 @@ def test_nobody_listens() -> None:
         RmwZenohSink("nowhere.invalid")
 
 
-@pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
+@looped("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
 def test_what_listens_is_no_router(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rmw_zenoh_session, "OPEN_S", 0.2)
     with (
@@ -312,6 +313,7 @@ def test_a_configuration_of_the_users(router: Router, tmp_path: Path, monkeypatc
         RmwZenohSource("")
 
 
+@pytest.mark.more
 def test_the_router_dies(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rmw_zenoh_session, "GONE_S", 0.1)
     with Router() as router:

@@ -51,6 +51,7 @@ def as_ours(fields: dict[str, dict[str, object]]) -> dict[str, object]:
     return {**fields, "header": {**header, "stamp": stamp["sec"] * 10**9 + stamp["nanosec"]}}
 
 
+@pytest.mark.more
 def test_the_far_end_receives_every_waypoint(
     router: Router, end: FarEnd, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,7 @@ from robochoc.ros.live.service_hashes import service_hash
 from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import SinkError
+from tests.support.cases import looped
 from tests.support.faults import running
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import PROGRAM, ROOT
@@ -115,7 +116,7 @@ def test_a_service_has_the_key_and_the_token_of_rmw_zenoh() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@looped(
     ("attached", "known"),
     [
         (attachment(2, 5, GID), (2, GID)),

@@ -8,9 +8,10 @@ from robochoc.ros.live.ros2_names import dds_type_name, domain_id
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import SourceError
+from tests.support.cases import looped
 
 
-@pytest.mark.parametrize(("given", "domain"), [(None, 0), ("", 0), ("0", 0), (" 7 ", 7), ("232", 232)])
+@looped(("given", "domain"), [(None, 0), ("", 0), ("0", 0), (" 7 ", 7), ("232", 232)])
 def test_the_domain(monkeypatch: pytest.MonkeyPatch, given: str | None, domain: int) -> None:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     if given is not None:
@@ -18,7 +19,7 @@ def test_the_domain(monkeypatch: pytest.MonkeyPatch, given: str | None, domain: 
     assert domain_id(SinkError) == domain
 
 
-@pytest.mark.parametrize("given", ["-1", "233", "one", "1.0", "٣", "9" * 5000, "0\x1b[31m"])
+@looped("given", ["-1", "233", "one", "1.0", "٣", "9" * 5000, "0\x1b[31m"])
 def test_a_domain_that_is_none(monkeypatch: pytest.MonkeyPatch, given: str) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", given)
     with pytest.raises(SourceError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, and is '[^\x1b]*'$"):

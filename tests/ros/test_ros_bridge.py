@@ -23,6 +23,7 @@ from robochoc.ros.live.rosbridge_connection import RosbridgeAddress
 from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S
@@ -147,7 +148,7 @@ def test_nobody_listens() -> None:
         RosbridgeSource(f"//127.0.0.1:{port}")
 
 
-@pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
+@looped("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
 def test_what_listens_is_no_rosbridge(answer: bytes, impatient: Callable[..., None]) -> None:
     impatient("CONNECT_S", "CLOSE_S")
     refusal = pytest.raises(SinkError, match="does not answer as a rosbridge does; start it")
@@ -214,7 +215,7 @@ def test_reports_are_heard(server: Server) -> None:
         assert source.next(0.01) is None
 
 
-@pytest.mark.parametrize("garbage", GARBAGE)
+@looped("garbage", GARBAGE)
 def test_garbage_is_passed_over_or_ends_it(garbage: str | bytes, capfd: pytest.CaptureFixture[str]) -> None:
     """A frame that is no text ends the connection: rosbridge sends none without being asked."""
     with Server(Manner(garbage=(garbage,))) as server, RosbridgeSource(server.place) as source:
@@ -266,6 +267,7 @@ except SinkError as failed:
 """
 
 
+@pytest.mark.more
 def test_a_program_whose_server_dies_ends_in_silence(tmp_path: Path) -> None:
     """Neither the loop's thread nor a source that nobody closes keep it, and nothing is said but by us."""
     (tmp_path / "program.py").write_text(PROGRAM, encoding="utf-8")
@@ -277,7 +279,7 @@ def test_a_program_whose_server_dies_ends_in_silence(tmp_path: Path) -> None:
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize(
+@looped(
     ("place", "url"),
     [
         ("//localhost:9090", "ws://localhost:9090"),
@@ -292,7 +294,7 @@ def test_places(place: str, url: str) -> None:
     assert RosbridgeAddress.of(place).url == url
 
 
-@pytest.mark.parametrize(
+@looped(
     "place",
     ["", "//", "//:9090", "//host:0", "//host:port", "//host:99999", "http://host:9090", "//me:pw@host", "//[x"],
 )

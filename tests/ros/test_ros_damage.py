@@ -20,6 +20,7 @@ from robochoc.ros.recordings import recording
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sinks import open_source
 from robochoc.ros.source import SourceError
+from tests.support.cases import looped
 from tests.support.ros_recordings import (
     FILES,
     NOW,
@@ -50,7 +51,7 @@ HOSTILE = (
 )
 
 
-@pytest.mark.parametrize(
+@looped(
     ("kind", "encoding", "text", "message", "content", "told"),
     [
         ("geometry_msgs/PoseStamped", "ros2msg", HOSTILE, "cdr", b"", "its definition of geometry_msgs/PoseStamped is"),
@@ -197,7 +198,7 @@ def test_a_file_larger_than_it_says_is_refused(monkeypatch: pytest.MonkeyPatch) 
         read(file)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("content", "told"),
     [
         (None, "No such file"),

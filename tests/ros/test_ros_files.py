@@ -23,6 +23,7 @@ from robochoc.ros.recordings.mcap_file import NAMES
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.sinks import UnknownSinkError, UnknownSourceError, open_sink, open_source
+from tests.support.cases import looped
 from tests.support.program import unmeasured
 from tests.support.ros_recordings import (
     FILES,
@@ -50,9 +51,10 @@ def attributes(message: Any) -> Any:  # noqa: ANN401 - whatever a reference make
     return {name: attributes(getattr(message, name)) for name in names} if names else message
 
 
-@pytest.mark.parametrize("text", FILES)
-@pytest.mark.parametrize("number", [0, 1, 500])
-def test_what_is_written_is_read(text: str, number: int) -> None:
+@looped("text", FILES)
+@looped("number", [0, 1, 500])
+def test_what_is_written_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, number: int) -> None:
+    monkeypatch.chdir(tmp_path)
     said = messages(number)
     file = write(text, said)
     check(read(text), said)
@@ -121,9 +123,9 @@ def test_what_has_another_type_is_passed_over(text: str) -> None:
     assert read(text, {"/a_1/battery": TEXT, "/nobody": POSE}) == []
 
 
-@pytest.mark.parametrize("compression", CompressionType)
-@pytest.mark.parametrize("chunked", [True, False])
-@pytest.mark.parametrize("ros", [1, 2])
+@looped("compression", [*CompressionType])
+@looped("chunked", [True, False])
+@looped("ros", [1, 2])
 def test_mcap_files_of_others(compression: CompressionType, ros: int, *, chunked: bool) -> None:
     types = types_of(1 if ros == 1 else 2)
     said = messages(60)
@@ -141,8 +143,11 @@ def test_mcap_files_of_others(compression: CompressionType, ros: int, *, chunked
     check(read("other.mcap"), said)
 
 
-@pytest.mark.parametrize("compression", [None, *BagWriter.CompressionFormat])
-def test_bags_of_others(compression: BagWriter.CompressionFormat | None) -> None:
+@looped("compression", [None, *BagWriter.CompressionFormat])
+def test_bags_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compression: BagWriter.CompressionFormat | None
+) -> None:
+    monkeypatch.chdir(tmp_path)
     said = messages(60)
     bag = BagWriter("other.bag")
     bag.chunk_threshold = 700
@@ -207,6 +212,7 @@ def test_files_that_cannot_be_written(text: str, monkeypatch: pytest.MonkeyPatch
     assert not [*Path().iterdir()]
 
 
+@pytest.mark.more
 @pytest.mark.parametrize("text", FILES)
 def test_a_full_disk_is_told_and_nothing_is_left(text: str) -> None:
     """The process may write 40 kB to a file: its next write fails."""
@@ -232,6 +238,7 @@ except SinkError as failed:
     assert not [*Path().iterdir()]
 
 
+@pytest.mark.more
 @pytest.mark.parametrize("text", FILES)
 def test_not_even_a_kill_leaves_a_trace(text: str) -> None:
     program = f"""
@@ -270,7 +277,7 @@ def test_what_cannot_be_published_is_told_with_its_topic(text: str) -> None:
             sink.advertise({"/a": "my_msgs/Unheard"})
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "told"),
     [
         ("mcpa:run.mcap", "no sink 'mcpa' is installed, only: .*did you mean 'mcap'"),

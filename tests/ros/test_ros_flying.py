@@ -19,7 +19,6 @@ from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.simulated_feedback import CannotFlyError, FlightSettings, SimulatedFeedback, UnknownDroneError
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import violations
-from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
@@ -58,7 +57,7 @@ def openings(outcome: Outcome) -> list[str]:
     return [epoch.opened_by for epoch in outcome.epochs]
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+@pytest.mark.parametrize("runtime", [Runtime.SIMULATOR, pytest.param(Runtime.PROCESSES, marks=pytest.mark.more)])
 def test_an_obstacle_and_a_drone_that_falls_out(runtime: Runtime, met: Looped) -> None:
     done = met if runtime is Runtime.SIMULATOR else looped(MET, replace(SIMULATED, runtime=runtime))
     outcome, flown = done.outcome, done.flown

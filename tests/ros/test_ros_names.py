@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from robochoc.flight.mission import Drone
 from robochoc.model.problem import Topic
 from robochoc.ros.names import NAME_MAX, REPORTS, NameClashError, TopicNames, ros_name
+from tests.support.cases import looped
 
 TOKEN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TOPICS = st.text(min_size=1, max_size=30) | st.from_regex(
@@ -55,7 +56,7 @@ def test_what_is_legal_stays_as_it_is(name: str) -> None:
     assert ros_name(name) == name
 
 
-@pytest.mark.parametrize(
+@looped(
     ("name", "expected"),
     [
         ("/drone3.1/waypoint3.1", "/drone3_1/waypoint3_1"),

@@ -17,6 +17,7 @@ from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
 from robochoc.ros.live.rospy_node import RospySink, RospySource
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import SourceError
+from tests.support.cases import looped
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S
 
@@ -66,7 +67,7 @@ def test_a_master_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_rospy")
-@pytest.mark.parametrize("answer", [b"\xff" * 100, b"HTTP/1.0 200 OK\r\n\r\nhello", b"HTTP/1.0 404 Not Found\r\n\r\n"])
+@looped("answer", [b"\xff" * 100, b"HTTP/1.0 200 OK\r\n\r\nhello", b"HTTP/1.0 404 Not Found\r\n\r\n"])
 def test_what_listens_is_no_master(monkeypatch: pytest.MonkeyPatch, answer: bytes) -> None:
     with fake_server(answer, hangs_up=True) as port:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
@@ -75,7 +76,7 @@ def test_what_listens_is_no_master(monkeypatch: pytest.MonkeyPatch, answer: byte
 
 
 @pytest.mark.usefixtures("_rospy")
-@pytest.mark.parametrize("uri", ["localhost:11311", "ftp://localhost", "http://", "http://[x", ""])
+@looped("uri", ["localhost:11311", "ftp://localhost", "http://", "http://[x", ""])
 def test_a_master_whose_address_is_none(monkeypatch: pytest.MonkeyPatch, uri: str) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     with pytest.raises(SinkError, match="set ROS_MASTER_URI"):
@@ -149,7 +150,7 @@ def test_a_field_that_is_none() -> None:
 
 
 @pytest.mark.usefixtures("_messages")
-@pytest.mark.parametrize("kind", ["my_msgs/Rover", "no_such_msgs/Rover", "Rover", "../os/system", "os/path", ""])
+@looped("kind", ["my_msgs/Rover", "no_such_msgs/Rover", "Rover", "../os/system", "os/path", ""])
 def test_a_type_that_is_none(kind: str) -> None:
     with pytest.raises(SinkError, match="rospy knows no message type"):
         message_class(kind, SinkError)

@@ -23,6 +23,7 @@ from robochoc.ros.live.rclpy_node import MESSAGE_BYTES_MAX, RclpyNode, RclpySink
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support import rclpy_stand_in
+from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
@@ -128,7 +129,7 @@ def test_it_takes_no_place() -> None:
 
 
 @pytest.mark.usefixtures("_rclpy")
-@pytest.mark.parametrize("domain", ["one", "-1", "233"])
+@looped("domain", ["one", "-1", "233"])
 def test_a_domain_that_is_none(monkeypatch: pytest.MonkeyPatch, domain: str) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
     with pytest.raises(SourceError, match=f"ROS_DOMAIN_ID must be a whole number from 0 to 232, and is '{domain}'"):
@@ -261,9 +262,7 @@ def test_reports_are_heard() -> None:
 
 
 @pytest.mark.usefixtures("_rclpy")
-@pytest.mark.parametrize(
-    "garbage", [b"", b"{", b'{"data": 1}', b"\xff" * 9, b'{"data": "%s"}' % (b"x" * MESSAGE_BYTES_MAX)]
-)
+@looped("garbage", [b"", b"{", b'{"data": 1}', b"\xff" * 9, b'{"data": "%s"}' % (b"x" * MESSAGE_BYTES_MAX)])
 def test_bytes_that_are_no_message_are_passed_over(garbage: bytes) -> None:
     with RclpySource("") as source:
         source.listen({"/a/out_of_order": STRING})

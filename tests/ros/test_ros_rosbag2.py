@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import Fields
 from robochoc.ros.source import SourceError
+from tests.support.cases import looped
 from tests.support.ros_recordings import POINT, TOPICS, check, messages, read
 
 pytestmark = pytest.mark.usefixtures("in_a_folder")
@@ -66,7 +67,7 @@ def test_messages_that_are_compressed_one_by_one() -> None:
     check(read(READ), said)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("statement", "told"),
     [
         ("DROP TABLE messages", "no table 'messages'"),
@@ -81,7 +82,8 @@ def test_messages_that_are_compressed_one_by_one() -> None:
         ("UPDATE message_definitions SET encoded_message_definition = 'int8 lies'", "is not that of ROS 2"),
     ],
 )
-def test_what_is_no_bag_is_told(statement: str, told: str) -> None:
+def test_what_is_no_bag_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str, told: str) -> None:
+    monkeypatch.chdir(tmp_path)
     written()
     changed(statement)
     with pytest.raises(SourceError, match=told):

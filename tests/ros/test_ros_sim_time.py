@@ -20,6 +20,7 @@ from robochoc.ros.sinks import open_source
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import Options, Runtime, solve
+from tests.support.cases import looped
 from tests.support.program import ROOT
 
 FOLDER = ROOT / "docs" / "examples" / "hangar"
@@ -156,7 +157,7 @@ def test_without_a_clock_the_run_ends(waited: Waited) -> None:
     assert waited.waited_s == pytest.approx(3, abs=0.5)
 
 
-@pytest.mark.parametrize(
+@looped(
     "clock",
     [None, True, "1", 1.5, -1, 1 << 70, {}, {"sec": 1}, {"sec": -1, "nanosec": 0}, {"sec": 1, "nanosec": SECOND}],
 )
@@ -226,7 +227,7 @@ def test_it_needs_a_source(words: tuple[str, ...]) -> None:
     assert "--use-sim-time is for robots that report: add --situation" in told
 
 
-@pytest.mark.parametrize("word", [("--tf",), ("--diagnostics",), ("--ros-type", "nav_msgs/Path")])
+@looped("word", [("--tf",), ("--diagnostics",), ("--ros-type", "nav_msgs/Path")])
 def test_what_else_is_published_needs_a_sink(word: tuple[str, ...]) -> None:
     code, told = solved("--situation", "flight", *word)
     assert code != 0

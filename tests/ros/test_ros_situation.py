@@ -33,6 +33,7 @@ from robochoc.ros.closed_loop import drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.situation import LIES_TIMES, Situation
 from robochoc.ros.source import ReceivedMessage
+from tests.support.cases import looped
 from tests.support.problems import team_of
 
 HUGE = Domain("huge", (range(10**9),))
@@ -116,7 +117,7 @@ def test_out_of_order_takes_the_robot_once() -> None:
     assert after(pair(), OutOfOrder("B"), OutOfOrder("B"), Blocked("B", (1, 1, 1))) == ()
 
 
-@pytest.mark.parametrize(("level", "leaves"), [(0.19, True), (0.0, True), (0.2, False), (1.0, False), (-1.0, False)])
+@looped(("level", "leaves"), [(0.19, True), (0.0, True), (0.2, False), (1.0, False), (-1.0, False)])
 def test_an_empty_battery_takes_the_robot(level: float, leaves: bool) -> None:  # noqa: FBT001 - a table
     assert after(pair(), Battery("A", level)) == ((RemoveAgent("A"),) if leaves else ())
 
@@ -136,7 +137,7 @@ def test_a_drone_that_has_flown_and_lies_on_the_ground_is_out_of_order() -> None
     assert after(pair(), *flight(0, 0.6, 2, 0.1, 0.1, 0.1)) == (RemoveAgent("A"),)
 
 
-@pytest.mark.parametrize(
+@looped(
     "poses",
     [
         flight(*[0.0] * 50),  # it waits until others have passed
@@ -301,7 +302,7 @@ def test_messages_become_reports() -> None:
     assert read("/B/out_of_order", {"data": "no\nmotor"}) == OutOfOrder("B", "no\\nmotor", 2.5)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "1", None, True, [1], {"x": 1}, 10**400, 1e300])
+@looped("value", [math.nan, math.inf, -math.inf, "1", None, True, [1], {"x": 1}, 10**400, 1e300])
 def test_what_is_no_number_is_passed_over(value: object) -> None:
     assert read("/A/battery", {"percentage": value}) is None
     for axis in "xyz":
@@ -309,7 +310,7 @@ def test_what_is_no_number_is_passed_over(value: object) -> None:
         assert read("/A/pose", {"pose": {"position": {**PLACE, axis: value}}}) is None
 
 
-@pytest.mark.parametrize("fields", [{}, {"point": None}, {"point": []}, {"header": 3, "point": 4}, {"pose": {}}])
+@looped("fields", [{}, {"point": None}, {"point": []}, {"header": 3, "point": 4}, {"pose": {}}])
 def test_what_is_missing_is_passed_over(fields: object) -> None:
     assert read("/A/blocked", fields) is None
     assert read("/A/pose", fields) is None

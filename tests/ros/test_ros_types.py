@@ -13,6 +13,7 @@ from mcap_ros2._dynamic import generate_dynamic
 from robochoc.ros.names import REPORTS
 from robochoc.ros.recordings.definitions import DEFINITION_MAX, same_fields
 from robochoc.ros.recordings.types import FieldsError, FieldType, UnknownTypeError, Version, types_of
+from tests.support.cases import looped
 
 POSE = "geometry_msgs/PoseStamped"
 BATTERY = "sensor_msgs/BatteryState"
@@ -80,7 +81,7 @@ def test_the_reference_reads_what_is_written(fields: dict[str, Any]) -> None:
     assert (message.present, message.location) == (fields["present"], fields["location"])
 
 
-@pytest.mark.parametrize(
+@looped(
     ("kind", "fields", "told"),
     [
         (POSE, {"pose": {"position": {"x": "1"}}}, "pose.position.x must be a number, is '1'"),
@@ -100,7 +101,7 @@ def test_the_reference_reads_what_is_written(fields: dict[str, Any]) -> None:
         ("geometry_msgs/PoseWithCovariance", {"covariance": [0.0]}, "covariance must have 36 values, has 1"),
     ],
 )
-@pytest.mark.parametrize("version", [1, 2])
+@looped("version", [1, 2])
 def test_what_is_no_field_is_told_by_its_name(version: Version, kind: str, fields: Any, told: str) -> None:  # noqa: ANN401
     with pytest.raises(FieldsError) as wrong:
         types_of(version).encode(kind, fields)
@@ -114,7 +115,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
     assert types.encode(BATTERY, fields) == types.encode(BATTERY, plain)
 
 
-@pytest.mark.parametrize("kind", ["my_msgs/Nothing", "PoseStamped", "", "../../etc"])
+@looped("kind", ["my_msgs/Nothing", "PoseStamped", "", "../../etc"])
 def test_types_that_nobody_defines(kind: str) -> None:
     with pytest.raises(UnknownTypeError, match="its mapping can bring the definition"):
         types_of(2).encode(kind, {})
@@ -159,7 +160,7 @@ def test_a_definition_that_has_the_same_fields_is_the_same() -> None:
     assert types_of(2).is_the_same(BATTERY, types_of(2).definition(BATTERY).text + "\n# the end")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("old", "new"),
     [
         ("float64 z\n", ""),

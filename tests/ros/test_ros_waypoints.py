@@ -22,6 +22,7 @@ from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.team_topics import PublishOptions
 from robochoc.ros.waypoint import Waypoint
+from tests.support.cases import looped
 from tests.support.installed_packages import install_entry_points
 
 POSE = "geometry_msgs/PoseStamped"
@@ -148,7 +149,7 @@ def test_poses_of_all_drones() -> None:
     assert fields["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": math.sqrt(0.5), "w": math.sqrt(0.5)}
 
 
-@pytest.mark.parametrize(
+@looped(
     ("report", "topic", "part", "value"),
     [
         (Battery("drone1.2", 0.25), "battery", "percentage", 0.25),
@@ -185,7 +186,7 @@ def test_a_team_without_topics_has_nothing_to_publish() -> None:
         Publisher("queens", DRONES[2:3], [Heap()])
 
 
-@pytest.mark.parametrize("kind", ["sensor_msgs/Image", "PoseStamped", "", "a/b/c", "geometry_msgs/srv/Pose"])
+@looped("kind", ["sensor_msgs/Image", "PoseStamped", "", "a/b/c", "geometry_msgs/srv/Pose"])
 def test_a_type_that_nobody_maps_is_refused(kind: str) -> None:
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", kind))
     with pytest.raises(NoMappingError) as refused:
@@ -194,8 +195,8 @@ def test_a_type_that_nobody_maps_is_refused(kind: str) -> None:
     assert all(part in told for part in ("/drone1.1/waypoint1.1", "Robot1.1", repr(kind), POSE, "robochoc.waypoints"))
 
 
-@pytest.mark.parametrize("kind", kinds())
-@pytest.mark.parametrize("version", [1, 2])
+@looped("kind", kinds())
+@looped("version", [1, 2])
 def test_every_built_in_type_is_a_type_of_ros_and_holds_the_place(kind: str, version: int) -> None:
     mapping = mapping_for(kind.replace("/", "/msg/"))
     assert mapping is not None
@@ -264,7 +265,7 @@ def test_goals_and_drones_are_frames() -> None:
         assert back["transforms"][0]["child_frame_id"] == "drone1_1/base_link"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("verdict", "level"),
     [(Verdict.SOLUTION, 0), (Verdict.OPTIMAL, 0), (Verdict.UNKNOWN, 1), (Verdict.NO_SOLUTION, 2)],
 )
@@ -316,7 +317,7 @@ def test_a_package_brings_a_type_and_its_definition(monkeypatch: pytest.MonkeyPa
         assert "MSG: my_msgs/Deep\nint8[2] pair" in types.definition(kind).text
 
 
-@pytest.mark.parametrize("place", [f"{__name__}:NUMBER", f"{__name__}:missing", "no_such_module:x"])
+@looped("place", [f"{__name__}:NUMBER", f"{__name__}:missing", "no_such_module:x"])
 def test_a_broken_package_is_told(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     installed(monkeypatch, my_msgs__Target=place)
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Target"))

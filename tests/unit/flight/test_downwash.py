@@ -16,6 +16,7 @@ from robochoc.flight.quadrotor.separation import SeparationMonitor
 from robochoc.flight.routes.motion import MotionLimits, RoutePlan
 from robochoc.flight.routes.spacing import TooCloseError
 from robochoc.flight.routes.timetable import plan_routes
+from tests.support.cases import looped
 from tests.support.flights import planar
 
 LIMITS = MotionLimits()
@@ -44,8 +45,8 @@ def swapped(number: int, seed: int, downwash: float) -> tuple[Array, Array]:
     return np.array(starts), np.roll(np.array(starts), 1, axis=0)
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("downwash", [1.5, 3.0])
+@looped("seed", range(4))
+@looped("downwash", [1.5, 3.0])
 def test_routes_keep_the_ellipsoid_at_all_times(downwash: float, seed: int) -> None:
     starts, goals = swapped(6, seed, downwash)
     plan = plan_routes(starts, goals, distance=0.6, downwash=downwash)
@@ -112,7 +113,7 @@ def test_goals_too_near_above_each_other_are_refused() -> None:
         flight.fly("", {0: Goal((0.0, 0.0, 2.0)), 1: Goal((0.0, 0.0, 3.2))})
 
 
-@pytest.mark.parametrize("downwash", [0.5, float("nan"), float("inf"), 101])
+@looped("downwash", [0.5, float("nan"), float("inf"), 101])
 def test_a_factor_makes_a_drone_taller_not_flatter(downwash: float) -> None:
     with pytest.raises(ValueError, match="downwash has to be a number from 1 to 100"):
         FlightConditions(downwash=downwash)

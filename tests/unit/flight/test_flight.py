@@ -20,6 +20,7 @@ from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.reports import Blocked, OutOfOrder
 from robochoc.flight.routes.move_order import NoRouteError
 from robochoc.flight.routes.spacing import TooCloseError
+from tests.support.cases import looped
 from tests.support.flights import planar
 
 IN_THE_WIND = (3.0, 4.0, 0.0)
@@ -217,7 +218,7 @@ def test_a_motor_that_stops_on_the_ground_keeps_its_drone_there() -> None:
     assert flown.errors_m[1] < 0.01
 
 
-@pytest.mark.parametrize(
+@looped(
     ("obstacle", "start"),
     [((0.0, 0.0, 3.0), (-6.0, 2.0)), ((0.3, 0.0, 3.1), (-2.0, 0.0)), ((0.0, -0.2, 2.7), (0.0, 0.0))],
 )
@@ -356,7 +357,7 @@ def test_far_from_the_origin_drones_fly_as_near_it() -> None:
     assert far.flown().errors_m == pytest.approx(near.flown().errors_m, abs=1e-6)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("wrong", "why"),
     [
         ({"distance": 0.0}, "positive"),

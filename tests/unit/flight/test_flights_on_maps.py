@@ -23,6 +23,7 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.flights_on_maps import FlownTeam, flown_team, gaps
 from tests.support.maps import write_map
@@ -55,7 +56,7 @@ def sent(team: Team, ground: GroundMap, *places: tuple[int, int], withdrawn: tup
 
 # Seeds with a building, a loose map, narrow doors, large pixels, downwash; one that once led through a wall (45), and
 # one with corners so close to each other that a drone that takes no time for them overshoots (115).
-@pytest.mark.parametrize("seed", [1, 4, 45, 115])
+@looped("seed", [1, 4, 45, 115])
 def test_drones_fly_around_walls_and_keep_from_each_other(seed: int, tmp_path: Path) -> None:
     made = flown_team(seed, tmp_path)
     assert isinstance(made, FlownTeam)

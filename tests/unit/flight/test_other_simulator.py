@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.cases import looped
 from tests.support.program import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -33,8 +34,8 @@ def simulator(flights: Any, name: str) -> Any:  # noqa: ANN401
     return other
 
 
-@pytest.mark.parametrize("name", SIMULATORS)
-@pytest.mark.parametrize(("number", "rms_mm", "most_mm"), [(0, 0.01, 0.01), (1, 20, 50), (2, 2, 4)])
+@looped("name", SIMULATORS)
+@looped(("number", "rms_mm", "most_mm"), [(0, 0.01, 0.01), (1, 20, 50), (2, 2, 4)])
 def test_others_fly_as_we_do(flights: Any, name: str, number: int, rms_mm: float, most_mm: float) -> None:  # noqa: ANN401
     found = flights.closed_loop(flights.cases()[number], simulator(flights, name))
     assert found.rms_m * 1e3 < rms_mm

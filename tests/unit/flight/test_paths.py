@@ -14,6 +14,7 @@ from robochoc.flight.routes.move_order import NoRouteError
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, TooCloseError, norms, segment_distances
 from robochoc.flight.routes.timetable import plan_routes
+from tests.support.cases import looped
 from tests.support.examples import examples
 
 HZ = 100
@@ -126,8 +127,8 @@ def test_a_team_changes_its_columns_and_levels() -> None:
     assert len(flown.position) / HZ < 2.5 * longest
 
 
-@pytest.mark.parametrize("distance", [0.5, 1.0])
-@pytest.mark.parametrize("count", [2, 3, 4])
+@looped("distance", [0.5, 1.0])
+@looped("count", [2, 3, 4])
 def test_drones_of_one_column_change_places(count: int, distance: float) -> None:
     column = np.array([(0.0, 0.0, 1.0 + level) for level in range(count)])
     fly(column, column[::-1].copy(), distance)
@@ -229,9 +230,7 @@ def test_a_team_of_nobody_flies_nowhere() -> None:
     assert planned.at(0).position.shape == (0, 3)
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"distance": 0.0}, {"distance": np.nan}, {"delays": np.zeros(2)}, {"ground": np.inf}]
-)
+@looped("wrong", [{"distance": 0.0}, {"distance": np.nan}, {"delays": np.zeros(2)}, {"ground": np.inf}])
 def test_arguments_without_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be finite|do not go together"):
         plan_routes(GRID[:1], GRID[:1], **{"distance": 1.0, **wrong})  # type: ignore[arg-type]

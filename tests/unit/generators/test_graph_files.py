@@ -13,6 +13,7 @@ from robochoc.generators import graph_files
 from robochoc.generators.graph_files import MAX_BYTES, read_graph
 from robochoc.generators.random_csp import random_on
 from tests.support.binary_problems import edges_of
+from tests.support.cases import looped
 from tests.support.program import robochoc_within
 
 GRAPHML = """\
@@ -34,7 +35,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("name", FILES)
+@looped("name", FILES)
 def test_each_kind_of_file(name: str, tmp_path: Path) -> None:
     """Node a, or 2, is between the two others; they are numbered as in the file, or by their own numbers."""
     pytest.importorskip("networkx")
@@ -54,7 +55,7 @@ def test_a_label_is_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
     assert read_graph(path).label == "our-town-1"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("name", "content", "said"),
     [
         ("town.dot", "graph {}", "'.dot' is no kind of graph file"),

@@ -29,6 +29,7 @@ from robochoc.generators.random_csp import random_on
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
+from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 
@@ -186,7 +187,7 @@ def test_kinds_of_colouring() -> None:
     assert best(weighted) == Fraction(min(int(one.cost) for one in shared_constraints(weighted)), 100)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("make", "said"),
     [
         (lambda: scale_free(5, 5), "links is 5; it must be from 1 to 4"),

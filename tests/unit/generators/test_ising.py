@@ -16,6 +16,7 @@ from robochoc.model.problem import Constraint, Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.binary_problems import relation_of, shared_constraints
+from tests.support.cases import looped
 from tests.support.evaluation import digest
 from tests.support.examples import examples
 
@@ -65,7 +66,7 @@ def test_the_torus(rows: int, columns: int, coupling: float, places: int, seed: 
     assert all(abs(strength(one)) <= most for one in shared_constraints(team))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@looped("seed", range(3))
 def test_the_least_energy_of_a_small_torus(seed: int) -> None:
     team = ising(3, 3, seed)
     wanted = least_energy(team)

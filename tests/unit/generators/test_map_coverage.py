@@ -22,6 +22,7 @@ from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sight import sight_on
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 from tests.support.maps import drawn_rows, free_pixels, touched, write_map
@@ -87,7 +88,7 @@ def least(choice: MapChoice, seed: int, sensing: Fraction, worth: Fraction) -> t
     return Fraction(min(pairs), 10), Fraction(min(unions), 10)
 
 
-@pytest.mark.parametrize("agents", [1, 2, 3])
+@looped("agents", [1, 2, 3])
 def test_robots_see_as_much_as_can_be(agents: int, tmp_path: Path) -> None:
     for seed in range(2):
         choice = MapChoice(map=BUILDING, agents=agents, cells=16, within=20)
@@ -126,7 +127,7 @@ def test_no_two_robots_stand_in_one_cell() -> None:
     assert found > 0  # one of them has to leave
 
 
-@pytest.mark.parametrize(
+@looped(
     ("make", "said"),
     [
         (lambda: coverage(MapChoice(map=BUILDING, agents=2), sensing=-1), "sensing is -1"),

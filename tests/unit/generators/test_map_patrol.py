@@ -18,6 +18,7 @@ from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.maps import Pixel, fitting, ways, write_map
 from tests.support.program import ROOT
@@ -79,7 +80,7 @@ def least(reach: Reach, idleness: dict[int, int], rounds: int, apart: int, withi
     return Fraction(min(totals), 10) if totals else None
 
 
-@pytest.mark.parametrize(
+@looped(
     ("agents", "points", "rounds", "within"),
     [(1, 4, 2, None), (2, 5, 1, None), (3, 5, 1, None), (2, 5, 2, None), (2, 5, 2, 16)],
 )
@@ -152,7 +153,7 @@ def test_each_leg_takes_no_longer_than_it_may() -> None:
         assert (best(team) is not None) is bool(wanted)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("make", "said"),
     [
         (lambda: patrol(MapChoice(map=BUILDING, agents=3), rounds=3), "3 robots make 9 visits, more than 6 points"),

@@ -30,6 +30,7 @@ from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 from tests.support.flights_on_maps import gaps
@@ -218,7 +219,7 @@ def test_ways_lead_where_a_disc_of_the_radius_gets(columns: int, rows: int, seed
         assert found <= disc_reaches(drawn, start, float(radius))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("side", "door", "radius", "rooms"),
     [("0.25", 1, 0.2, 1), ("0.25", 2, 0.2, 2), ("0.25", 1, 0.12, 2), ("0.05", 8, 0.2, 1), ("0.05", 9, 0.2, 2),
      ("0.5", 1, 0.24, 2), ("0.5", 1, 0.26, 1), ("0.1", 5, 0.2, 2), ("0.1", 4, 0.21, 1)],
@@ -271,7 +272,7 @@ def check_answer(team: Team, reach: Reach, assignment: dict[str, int]) -> None:
         assert assignment[variable] in robot.variables[0].domain
 
 
-@pytest.mark.parametrize("shape", ["line", "column", "wedge", "circle", "grid"])
+@looped("shape", ["line", "column", "wedge", "circle", "grid"])
 def test_formations_take_as_little_time_as_can_be(shape: str, tmp_path: Path) -> None:
     for seed in range(2):
         choice = MapChoice(map=BUILDING, agents=4, cells=60)
@@ -352,7 +353,7 @@ def test_the_flight_reads_the_same_map(rooms: str) -> None:
     assert (unpacked(walls.occupied, walls.rows, walls.columns) == grid.occupied).all()
 
 
-@pytest.mark.parametrize(
+@looped(
     ("make", "said"),
     [
         (lambda choice: formation(choice(agents=None)), "agents is missing"),
@@ -383,7 +384,7 @@ def test_impossible_ones_are_refused(rooms: str, make: Callable[[Callable[..., M
         make(lambda **how: MapChoice(**{"map": rooms, **({} if "at" in how else {"agents": 2}), **how}))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "said"),
     [("1,2,3", "offsets.txt:1: has 1,2,3"), ("0,0", "has 1 slots .*expected from 2"), ("0,0\n" * 101, "has 101 slots")],
 )

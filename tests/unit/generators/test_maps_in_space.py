@@ -30,6 +30,7 @@ from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 from tests.support.octomaps import (
@@ -350,7 +351,7 @@ def test_the_flight_reads_the_same_map() -> None:
             assert bool(sides & 1 << bit) is is_open
 
 
-@pytest.mark.parametrize(
+@looped(
     ("make", "said"),
     [
         (lambda choice: formation(choice(at="1,1")), "at has '1,1'; expected X,Y,Z on a three-dimensional map"),

@@ -14,6 +14,7 @@ from robochoc.generators.meetings import Meetings, drawn_meetings, meetings
 from robochoc.model.problem import ProblemKind
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 
@@ -67,7 +68,7 @@ def test_all_models_have_the_maximum_of_the_calendars(agents: int, count: int, s
         assert best(team) == wanted >= 0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@looped("seed", range(3))
 def test_protocols_find_the_maximum(seed: int) -> None:
     problem = drawn_meetings(Random(seed), (4, 4, 2, 4), 2, 10)
     wanted = max(schedules(problem, required=False))
@@ -77,8 +78,8 @@ def test_protocols_find_the_maximum(seed: int) -> None:
         assert (outcome.cost, outcome.verdict) == (wanted, "optimal")
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("slots", "length"), [(2, 1), (3, 2)])
+@looped("seed", range(4))
+@looped(("slots", "length"), [(2, 1), (3, 2)])
 def test_required_meetings_take_place_or_there_is_no_solution(slots: int, length: int, seed: int) -> None:
     problem = drawn_meetings(Random(seed), (4, 4, 2, slots), length, 1)
     wanted = "solution" if schedules(problem, required=True) else "no-solution"

@@ -13,6 +13,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.verification.checker import needlessly_withdrawn, violations
+from tests.support.cases import looped
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
@@ -53,8 +54,8 @@ def allowed(constraint: Constraint) -> list[bool]:
     return [constraint.allows(dict(zip(constraint.variables, pair, strict=True))) for pair in pairs]
 
 
-@pytest.mark.parametrize("model", list(QueensModel))
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+@looped("model", list(QueensModel))
+@looped("n", [1, 2, 3, 4, 5])
 def test_constraints_say_who_attacks_whom(n: int, model: QueensModel) -> None:
     team = queens3d(n, model)
     cells = list(itertools.product(range(1, n + 1), repeat=2))
@@ -86,7 +87,7 @@ def test_the_instances_in_the_repository_are_what_generate_writes(n: int) -> Non
     assert read_team(INSTANCES / f"queens3d-{n}") == queens3d(n)
 
 
-@pytest.mark.parametrize("n", [0, -1, MAX_N + 1])
+@looped("n", [0, -1, MAX_N + 1])
 def test_absurd_sizes_are_refused(n: int) -> None:
     with pytest.raises(ValueError, match="n is"):
         queens3d(n)
@@ -97,7 +98,7 @@ def test_absurd_sizes_are_refused(n: int) -> None:
     [
         (QueensModel.PLANAR, Runtime.SIMULATOR),
         (QueensModel.FULL, Runtime.SIMULATOR),
-        (QueensModel.FULL, Runtime.PROCESSES),
+        pytest.param(QueensModel.FULL, Runtime.PROCESSES, marks=pytest.mark.more),
         pytest.param(QueensModel.PLANAR, Runtime.PROCESSES, marks=pytest.mark.slow),
     ],
 )
@@ -113,8 +114,8 @@ def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runt
 
 
 @pytest.mark.parametrize("runtime", [Runtime.SIMULATOR, IN_PROCESSES])
-@pytest.mark.parametrize("protocol", ["abt", "sfb"])
-@pytest.mark.parametrize(("model", "most"), [("planar", 10), ("full", 7)])
+@looped("protocol", ["abt", "sfb"])
+@looped(("model", "most"), [("planar", 10), ("full", 7)])
 def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: int, runtime: Runtime) -> None:
     """Whether the fewest are told after it has been found that not all can, or at once."""
     options = Options(protocol=protocol, runtime=runtime, withdraw=Withdrawal.MINIMUM, timeout=HANG_S)

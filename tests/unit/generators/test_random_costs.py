@@ -14,6 +14,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
+from tests.support.cases import looped
 from tests.support.program import robochoc_within
 
 
@@ -65,7 +66,7 @@ def test_a_graph_to_be_coloured_has_the_degree_that_was_asked_for() -> None:
     assert all(constraint_graph(coloring(15, 3, 3, 7, connected=True)).values())
 
 
-@pytest.mark.parametrize(
+@looped(
     "team", [random_csp(8, 3, 0.5, 0.2, 1, max_cost=0), random_csp(8, 3, 0.5, 0.2, 1, max_cost=50), coloring(8, 2, 3)]
 )
 def test_the_team_is_what_its_files_say(tmp_path: Path, team: Team) -> None:
@@ -133,7 +134,7 @@ def test_generate_writes_costs_where_it_says(tmp_path: Path) -> None:
     assert read_team(tmp_path / folder) == coloring(6, 3, 3, connected=True)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("words", "said"),
     [
         (["random", "--agents", 5, "--domain", 3, "--density", 0.4], "Missing option '--tightness'"),

@@ -13,6 +13,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import Robot, Semantics
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
+from tests.support.cases import looped
 from tests.support.program import robochoc_within
 
 SIZES = [
@@ -25,7 +26,7 @@ SIZES = [
 ]
 
 
-@pytest.mark.parametrize(("agents", "domain", "density", "tightness", "count", "forbidden"), SIZES)
+@looped(("agents", "domain", "density", "tightness", "count", "forbidden"), SIZES)
 def test_the_numbers_are_exact(
     agents: int, domain: int, density: float, tightness: float, count: int, forbidden: int
 ) -> None:
@@ -50,7 +51,7 @@ def test_a_constraint_stands_with_the_lower_robot() -> None:
             assert int(parent.name[5:]) < int(robot.name[5:])
 
 
-@pytest.mark.parametrize(("agents", "domain", "density", "tightness"), [size[:4] for size in SIZES])
+@looped(("agents", "domain", "density", "tightness"), [size[:4] for size in SIZES])
 def test_the_team_is_what_its_files_say(
     tmp_path: Path, agents: int, domain: int, density: float, tightness: float
 ) -> None:
@@ -99,7 +100,7 @@ def test_connected_keeps_a_graph_that_is() -> None:
     assert robots(connected=True) == robots(connected=False)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("problem", "said"),
     [
         ((0, 3, 0.5, 0.5), "agents is 0"),
@@ -143,7 +144,7 @@ def test_generate_random_writes_where_it_says(tmp_path: Path) -> None:
     assert all(constraint_graph(read_team(tmp_path / "linked")).values())
 
 
-@pytest.mark.parametrize(
+@looped(
     ("changed", "said"),
     [
         (["--density", "1.5"], "density is 1.5"),

@@ -19,6 +19,7 @@ from robochoc.model.change import apply_changes, describe_change
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import best
 from tests.support.examples import examples
 from tests.support.program import robochoc_within
@@ -49,7 +50,7 @@ def test_a_team_can_take_its_scenario(team: Team, events: int, rate: float, seed
             assert all(len(variable.domain) for variable in now.variables.values())
 
 
-@pytest.mark.parametrize("kind", Kind)
+@looped("kind", [*Kind])
 def test_kinds_of_changes(kind: Kind) -> None:
     opposite = {"remove-": "add-", "add-": "remove-"}
     start = next(word for word in opposite if kind.startswith(word))
@@ -71,7 +72,7 @@ def test_a_seed_is_one_scenario_everywhere() -> None:
     ]
 
 
-@pytest.mark.parametrize("team", TEAMS[:3])
+@looped("team", TEAMS[:3])
 def test_files_say_the_same(team: Team, tmp_path: Path) -> None:
     for seed in range(3):
         changing = random_scenario(team, 4, 0.3, seed, after=50)
@@ -81,7 +82,7 @@ def test_files_say_the_same(team: Team, tmp_path: Path) -> None:
         assert [best(now) for now in stages(read)] == [best(now) for now in stages(changing)]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@looped("seed", range(3))
 def test_each_epoch_is_solved(seed: int) -> None:
     changing = random_scenario(random_on(tree(5), 2, 0, 4, max_cost=9), 4, 0.5, seed)
     outcome = solve(changing, Options(protocol="syncbb", runtime=Runtime.SIMULATOR))

@@ -14,6 +14,7 @@ from robochoc.generators.sensors import Reach, grid_sensors, sensors
 from robochoc.model.problem import Relation, Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.evaluation import digest
 from tests.support.examples import examples
 
@@ -58,8 +59,8 @@ def test_a_seed_is_one_problem_everywhere() -> None:
     }
 
 
-@pytest.mark.parametrize(("count", "targets", "needed"), [(8, 2, 3), (7, 2, 2), (6, 3, 2)])
-@pytest.mark.parametrize("seed", range(3))
+@looped(("count", "targets", "needed"), [(8, 2, 3), (7, 2, 2), (6, 3, 2)])
+@looped("seed", range(3))
 def test_both_models_say_what_is_so(count: int, targets: int, needed: int, seed: int) -> None:
     of_targets, of_sensors = (
         sensors(count, targets, seed, visibility=0.7, compatibility=0.7, needed=needed, model=model)

@@ -25,6 +25,7 @@ from robochoc.generators.maps.sight import sight_on
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.maps import Pixel, drawn_rows, fitting, free_pixels, ways, write_map
 from tests.support.program import ROOT
@@ -96,9 +97,7 @@ def test_cells_of_turned_maps_are_squares_of_the_frame(
     assert 2 * len(free) >= cells.columns * cells.rows  # few depend on rounding
 
 
-@pytest.mark.parametrize(
-    "yaw", ["1.5707963267948966", "-4.71238898", "1.57080", "3.14159265358979", "-1.5708", "6.2832"]
-)
+@looped("yaw", ["1.5707963267948966", "-4.71238898", "1.57080", "3.14159265358979", "-1.5708", "6.2832"])
 def test_quarter_turns_are_those_of_the_image(tmp_path: Path, yaw: str) -> None:
     """The same map, drawn as it lies in its frame, makes the same problem."""
     rows = drawn_rows(Random(5), 7, 4, 0.2)
