@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +14,13 @@ from tests.support.browser_pages import chromium
 from tests.support.leftovers import shared_by_tests
 from tests.support.sniffer_pages import WHOLE, Page, shown
 from tests.support.sniffer_server import SnifferServer, sniffer_server
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of this folder: `make test-more` runs them."""
+    for item in items:
+        if item.path.is_relative_to(Path(__file__).parent):
+            item.add_marker(pytest.mark.more)
 
 
 @pytest.fixture(scope="module")

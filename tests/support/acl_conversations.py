@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import get_args
 
-import pytest
 import sexpdata
 
 from robochoc.model.message import Envelope, Message, encode
@@ -17,7 +16,6 @@ from robochoc.sniffer.conversation import Conversation
 
 PLATFORM = "192.168.1.14:7447/robochoc"
 BUNDLED_PROTOCOLS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
-EVERY_PROTOCOL = pytest.mark.parametrize("protocol", BUNDLED_PROTOCOLS)
 
 
 def types_of(protocol: type[Protocol]) -> tuple[type[Message], ...]:

@@ -1,4 +1,4 @@
-"""Sentences of real runs, by protocol and message type: what `tests/unit/sniffer/test_sentences.py` expects."""
+"""Sentences of runs that messages of the protocols say, by protocol and message type."""
 
 from __future__ import annotations
 
@@ -129,8 +129,8 @@ REAL = {
     ("p2-dpop", "AskAxis"): "RX00 says: what are you called in turn 1, if you are still to come?",
     ("p2-dpop", "Axis"): "RX00 says: in turn 2 call me 66d5; as declared, X00 is -3, -1 or 3",
     ("p2-dpop", "Gone"): "RX00 says: in turn 1 I come before you",
-    ("p2-dpop", "EncryptedTable"): "RX00 says: the table of turn 1, encrypted: 1,280 bytes",
-    ("p2-dpop", "Opening"): "RX00 says: blind this cipher (083f), and take your share of the key off",
+    ("p2-dpop", "EncryptedTable"): "RX00 says: the table of turn 1, encrypted: 320 bytes",
+    ("p2-dpop", "Opening"): "RX00 says: blind this cipher (02ed), and take your share of the key off",
     ("mb-dpop", "DomainAtDepth"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
     ("mb-dpop", "Label"): (
         "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from random import Random
 
 from robochoc.generators.queens3d import queens3d
@@ -26,7 +26,7 @@ def record(team: Team, options: Options) -> Journal:
     return read_journal(recorder.content())
 
 
-@cache
+@lru_cache(maxsize=2)
 def recorded(protocol: str, n: int = 3, schedule: ScheduleName = ScheduleName.CONCURRENT) -> Journal:
     """A short run in the simulator: queens in space, or a few robots with costs or tasks where it is about these."""
     traits = protocol_named(protocol).traits
@@ -41,7 +41,15 @@ def _priced(protocol: str) -> Team:
     return affordable(protocol, lambda: random_cost_team(chance))
 
 
-@cache
+@lru_cache(maxsize=2)
 def feed_of(protocol: str, n: int = 3) -> PageData:
     """The feed of that run."""
     return PageData(Trace.of(recorded(protocol, n)))
+
+
+def words_of(feed: PageData) -> dict[str, set[str]]:
+    """The sentences of a run, by the type of the message."""
+    found: dict[str, set[str]] = {kind: set() for kind in feed.trace.kinds}
+    for message, kind in enumerate(feed.trace.messages.kind):
+        found[feed.trace.kinds[kind]].add(feed.words(message))
+    return found

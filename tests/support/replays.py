@@ -13,6 +13,7 @@ from robochoc.journal.journal import Header, Journal, JournalRecorder, read_jour
 from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import Order
 from robochoc.model.problem import ConstraintModel, ProblemKind, Team
+from robochoc.replay import ReplayResult
 from robochoc.run import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
@@ -27,7 +28,7 @@ from tests.support.problems import random_team
 from tests.support.random_changes import random_changing_team
 from tests.support.random_options import random_schedule
 
-ENOUGH = 1500
+ENOUGH = 500
 """Messages after which a run may end."""
 
 
@@ -83,6 +84,11 @@ def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> 
 
 def header_of(team: Team, options: Options) -> Header:
     return Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed)
+
+
+def identical(replayed: ReplayResult) -> bool:
+    """Return whether everything was replayed, and identically."""
+    return replayed.identical and not (replayed.stopped or replayed.unfinished)
 
 
 def in_text(journal: Journal) -> Journal:

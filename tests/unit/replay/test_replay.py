@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -31,23 +30,21 @@ from robochoc.model.message import Message, Value
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.dynabt import DynABT
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
-from robochoc.replay import CannotReplayError, ReplayOptions, ReplayResult, replay
+from robochoc.replay import CannotReplayError, ReplayOptions, replay
 from robochoc.run import Options, Runtime, Withdrawal
-from robochoc.run.options import ScheduleName
-from robochoc.run.registry import protocol_names
 from robochoc.run.scenario import ScenarioRun
 from robochoc.run.start_events import StartEvents
-from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
+from tests.support.cases import cases
 from tests.support.golden import odd_team
 from tests.support.limits import HANG_S
 from tests.support.problems import random_team
 from tests.support.program import ROOT
 from tests.support.replays import (
+    identical,
     in_binary,
     in_text,
-    random_run,
     recorded,
     with_events,
     with_events_as_observed,
@@ -56,50 +53,13 @@ from tests.support.replays import (
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
 
-FEW, MANY = 2, 100
 FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
-
-
-@pytest.fixture(scope="module")
-def warm() -> Iterator[AceProcess]:
-    """A solver for complex robots that need not be started for each team."""
-    with AceProcess() as ace:
-        yield ace
 
 
 @pytest.fixture(scope="module")
 def four() -> Journal:
     """Four queens' robots search, and as few as possible withdraw: two runs."""
     return recorded(queens3d(4), FOUR)
-
-
-def identical(replayed: ReplayResult) -> bool:
-    """Whether all was played, and the same."""
-    return replayed.identical and not (replayed.stopped or replayed.unfinished)
-
-
-@pytest.mark.parametrize("protocol", protocol_names())
-@pytest.mark.parametrize(
-    "numbers", [range(FEW), pytest.param(range(FEW, MANY), marks=pytest.mark.slow)], ids=["few", "many"]
-)
-def test_what_was_recorded_is_said_again(protocol: str, numbers: range, warm: AceProcess) -> None:
-    steps = 0
-    for number in numbers:
-        team, options = random_run(protocol, Random(f"replay {protocol} {number}"), number)
-        journal = recorded(team, options, warm)
-        replayed = replay(in_text(journal) if number % 2 else journal, ReplayOptions(solver=warm))
-        assert identical(replayed) or not replayed.runs, (team, options, replayed)
-        assert replayed.messages == sum(isinstance(event, Sent) for event in journal.events)
-        steps += replayed.steps
-    assert steps > len(numbers)
-
-
-@pytest.mark.parametrize("protocol", protocol_names()[::4])
-def test_what_was_recorded_in_processes_is_said_again(protocol: str, warm: AceProcess) -> None:
-    team, options = random_run(protocol, Random(f"processes {protocol}"), 0)
-    in_processes = replace(options, runtime=Runtime.PROCESSES, delay=0, schedule=ScheduleName.CONCURRENT, channel=None)
-    journal = recorded(team, in_processes, warm)
-    assert identical(replay(journal, ReplayOptions(solver=warm)))
 
 
 def test_a_network_of_processes_is_one_more_runtime() -> None:
@@ -211,30 +171,32 @@ def test_one_content_that_was_changed_is_the_first_difference(four: Journal) -> 
         assert difference.replayed.content == {"value": (event.content["value"][0],)}
 
 
-@pytest.mark.parametrize(
-    ("kind", "change"),
-    [
-        (Settled, {"checks": 77}),
-        (Settled, {"clock": 1_000_000}),
-        (Sent, {"bytes": 3}),
-        (Sent, {"receiver": "Robot4.4"}),
-        (Sent, {"type": "AddLink"}),
-        (Received, {"type": "AddLink"}),
-        (Received, {"clock": 0}),
-        (Decided, {"assignment": {}}),
-    ],
-)
-def test_anything_else_that_was_changed_is_one_too(kind: type[AnyEvent], change: dict[str, Any], four: Journal) -> None:
-    places = [place for place, event in enumerate(four.events) if isinstance(event, kind)]
-    place = places[len(places) // 2]
-    events = list(four.events)
-    events[place] = msgspec.structs.replace(events[place], **change)
-    assert events[place] != four.events[place]
-    replayed = replay(with_events(four, events))
-    assert not identical(replayed)
-    if kind is not Sent:
-        assert replayed.difference is not None
-        assert replayed.difference.recorded == events[place]
+CHANGES: list[tuple[type[AnyEvent], dict[str, Any]]] = [
+    (Settled, {"checks": 77}),
+    (Settled, {"clock": 1_000_000}),
+    (Sent, {"bytes": 3}),
+    (Sent, {"receiver": "Robot4.4"}),
+    (Sent, {"type": "AddLink"}),
+    (Received, {"type": "AddLink"}),
+    (Received, {"clock": 0}),
+    (Decided, {"assignment": {}}),
+]
+
+
+def test_anything_else_that_was_changed_is_one_too(four: Journal) -> None:
+    with cases() as each:
+        for kind, change in CHANGES:
+            with each((kind.__name__, change)):
+                places = [place for place, event in enumerate(four.events) if isinstance(event, kind)]
+                place = places[len(places) // 2]
+                events = list(four.events)
+                events[place] = msgspec.structs.replace(events[place], **change)
+                assert events[place] != four.events[place]
+                replayed = replay(with_events(four, events))
+                assert not identical(replayed)
+                if kind is not Sent:
+                    assert replayed.difference is not None
+                    assert replayed.difference.recorded == events[place]
 
 
 class Forgetful(ABT):
@@ -251,9 +213,9 @@ class Fragile(ABT):
         raise KeyError(nogood.value)
 
 
-@pytest.mark.parametrize("every", [61, pytest.param(7, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("every", [61, pytest.param(17, marks=pytest.mark.slow)])
 def test_a_step_that_stands_there_twice_is_a_difference(four: Journal, every: int) -> None:
-    """Nobody begins a run twice, and nobody acts without having taken something in."""
+    """No robot begins a run twice or acts without having received a message."""
     for place, event in list(enumerate(four.events))[::every]:
         if isinstance(event, Settled):
             difference = replay(

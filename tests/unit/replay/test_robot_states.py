@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.journal.events import Concluded, Sent, Settled, actor
+from robochoc.journal.events import Concluded, Sent, actor
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.findings import Incumbent
 from robochoc.protocols.satisfaction.abt import ABT
@@ -24,9 +24,10 @@ from robochoc.replay.safe_repr import MAX_LENGTH, safe_repr
 from robochoc.replay.value_text import ValueText
 from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.cases import cases
 from tests.support.compiled import plain_python_only
 from tests.support.problems import random_team, team_of
-from tests.support.replays import in_text, random_run, recorded, with_events
+from tests.support.replays import in_text, recorded, with_events
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
 
@@ -89,15 +90,17 @@ def test_a_robot_without_a_value_left_says_what_had_ruled_out_each() -> None:
     assert re.match(r"no value was left, and it said Nogood to Robot1\.1: .*V1\.1 != \d", first.why[place])
 
 
-@pytest.mark.parametrize("protocol", ["awc", "sbt", "afc", "afc-ng", "disfc"])
-def test_so_it_does_in_other_protocols_once_for_each_time(protocol: str) -> None:
-    journal = recorded(queens3d(3), replace(SIMULATED, protocol=protocol))
-    told = [state.why for robot in queens3d(3).order for state in states_of(journal, robot) if state.why]
-    ends = [why for why in told if any(line.startswith("no value was left, and it said ") for line in why)]
-    assert ends
-    assert all(len(why) <= (MOST_REASONS + 2) * (MOST_BACKTRACKS + 1) for why in told)
-    assert any("ruled out by: " in why[0] for why in ends)
-    assert all(len({*why}) == len(why) for why in ends if protocol == "awc")
+def test_so_it_does_in_other_protocols_once_for_each_time() -> None:
+    with cases() as each:
+        for protocol in ("awc", "sbt", "afc", "afc-ng", "disfc"):
+            with each(protocol):
+                journal = recorded(queens3d(3), replace(SIMULATED, protocol=protocol))
+                told = [state.why for robot in queens3d(3).order for state in states_of(journal, robot) if state.why]
+                ends = [why for why in told if any(line.startswith("no value was left, and it said ") for line in why)]
+                assert ends
+                assert all(len(why) <= (MOST_REASONS + 2) * (MOST_BACKTRACKS + 1) for why in told)
+                assert any("ruled out by: " in why[0] for why in ends)
+                assert all(len({*why}) == len(why) for why in ends if protocol == "awc")
 
 
 def test_a_robot_that_ends_the_search_says_so() -> None:
@@ -110,15 +113,17 @@ def test_a_robot_that_ends_the_search_says_so() -> None:
     ]
 
 
-@pytest.mark.parametrize("protocol", [name for name in protocol_names() if protocol_named(name).traits.complete])
-def test_whoever_ends_the_search_says_so_in_every_protocol(protocol: str) -> None:
+def test_whoever_ends_the_search_says_so_in_every_protocol() -> None:
     team = team_of({"A": [1], "B": [1]}, [differ("A", "B")])
-    journal = recorded(team, replace(SIMULATED, protocol=protocol))
-    concluded = {event.robot for event in journal.events if isinstance(event, Concluded)}
-    assert concluded
-    for robot in concluded:
-        told = [line for state in states_of(journal, robot) for line in state.why]
-        assert sum(line.startswith("it concluded that ") for line in told) == 1
+    with cases() as each:
+        for protocol in (name for name in protocol_names() if protocol_named(name).traits.complete):
+            with each(protocol):
+                journal = recorded(team, replace(SIMULATED, protocol=protocol))
+                concluded = {event.robot for event in journal.events if isinstance(event, Concluded)}
+                assert concluded
+                for robot in concluded:
+                    told = [line for state in states_of(journal, robot) for line in state.why]
+                    assert sum(line.startswith("it concluded that ") for line in told) == 1
 
 
 def test_views_stand_in_the_order_of_priority_and_what_is_empty_is_left_out() -> None:
@@ -130,23 +135,26 @@ def test_views_stand_in_the_order_of_priority_and_what_is_empty_is_left_out() ->
         assert not {"{}", "[]", "None"} & {*state.more.values()}
 
 
-@pytest.mark.parametrize(
-    ("protocol", "view", "ruled_out"),
-    [
-        ("sbt", ("RA", "A = 1"), "A = 1, by C"),
-        ("afc", ("RA", "A = 1"), "A = 1, by C"),
-        ("afc-ng", ("RA", "A = 1"), "A = 1"),
-        ("awc", ("RA", "A = 1"), "A = 1, by C"),
-        ("disfc", ("RA", "assignment 1 of RA"), "assignment 1 of RA"),
-        ("syncbb", ("RA", "A = 1"), "A = 1, by C"),
-        ("adopt", ("RA", "A = 1"), "A = 1, by C"),
-        ("mgm2", ("RA", "A = 1"), "A = 1, by C"),
-    ],
-)
-def test_views_of_other_protocols_are_understood(protocol: str, view: tuple[str, str], ruled_out: str) -> None:
-    seen = [state for state in states(pair(), "RB", protocol) if view in state.view]
-    assert seen
-    assert ruled_out in {one.ruled_out_by for state in seen for one in state.domain}
+VIEWS = {
+    "sbt": ("A = 1", "A = 1, by C"),
+    "afc": ("A = 1", "A = 1, by C"),
+    "afc-ng": ("A = 1", "A = 1"),
+    "awc": ("A = 1", "A = 1, by C"),
+    "disfc": ("assignment 1 of RA", "assignment 1 of RA"),
+    "syncbb": ("A = 1", "A = 1, by C"),
+    "adopt": ("A = 1", "A = 1, by C"),
+    "mgm2": ("A = 1", "A = 1, by C"),
+}
+"""By protocol: RA's value in RB's view, and what rules out that value of RB's."""
+
+
+def test_views_of_other_protocols_are_understood() -> None:
+    with cases() as each:
+        for protocol, (view, ruled_out) in VIEWS.items():
+            with each(protocol):
+                seen = [state for state in states(pair(), "RB", protocol) if ("RA", view) in state.view]
+                assert seen
+                assert ruled_out in {one.ruled_out_by for state in seen for one in state.domain}
 
 
 def test_costs_and_bounds_stand_with_the_values() -> None:
@@ -157,20 +165,6 @@ def test_costs_and_bounds_stand_with_the_values() -> None:
     assert all("(LB " in one.value for one in last.domain)
     assert {"lb", "ub", "threshold", "bounds"} <= {*last.more}
     assert any("(costs " in one.value for one in states(team, team.order[-1], "syncbb")[-1].domain)
-
-
-@pytest.mark.parametrize("protocol", protocol_names())
-def test_looking_changes_nothing(protocol: str) -> None:
-    """A robot that is looked at still does what was recorded, its checks and clocks included, or it would be told."""
-    team, options = random_run(protocol, Random(f"look {protocol}"), 0)
-    journal = in_text(recorded(team, replace(options, withdraw=None)))
-    for robot in sorted({name for event in journal.events if (name := actor(event))}):
-        found = list(states_of(journal, robot))
-        assert [state.step for state in found] == [*range(len(found))]
-        assert len(found) == sum(isinstance(event, Settled) and event.robot == robot for event in journal.events)
-        assert all(len(msgspec.json.encode(state)) < 50_000 for state in found)
-        values = [state.value for state in found]
-        assert all(state.why for before, state in zip(values, found[1:], strict=False) if before != state.value)
 
 
 def test_the_last_states_alone_are_the_same() -> None:
@@ -271,25 +265,12 @@ def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> Non
     assert (then.value, then.domain) == ({"B": 2}, [])
 
 
-@pytest.mark.parametrize(
-    ("thing", "shown"),
-    [
-        (None, "None"),
-        (True, "True"),
-        (12_000, "12000"),
-        (0.5, "0.5"),
-        (float("inf"), "inf"),
-        (b"abc", "<3 bytes>"),
-        ({}, "{}"),
-        ({"a": (1, 2)}, "{'a': (1, 2)}"),
-        ({3, 1, 2}, "{1, 2, 3}"),
-        (ValueText, "ValueText"),
-    ],
-)
-def test_the_safe_repr_of_things(thing: object, shown: str) -> None:
-    assert safe_repr(thing) == shown
-
-
-def test_a_safe_repr_is_short() -> None:
+def test_the_safe_repr_of_things_is_short() -> None:
+    things = [
+        None, True, 12_000, 0.5, float("inf"), b"abc", {}, {"a": (1, 2)}, {3, 1, 2}, ValueText,
+    ]  # fmt: skip
+    assert [*map(safe_repr, things)] == [
+        "None", "True", "12000", "0.5", "inf", "<3 bytes>", "{}", "{'a': (1, 2)}", "{1, 2, 3}", "ValueText",
+    ]  # fmt: skip
     for thing in ("x" * 10**6, list(range(10**6)), {number: [number] * 100 for number in range(1000)}, 10**5000):
         assert len(safe_repr(thing)) <= MAX_LENGTH

@@ -13,6 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from robochoc.services import descriptions, directory
 from robochoc.services.descriptions import AgentDescription, Reason, RequestRefusedError, ServiceDescription, matches
 from robochoc.services.directory import Directory, Notice
+from tests.support.cases import cases
 
 LASER = ServiceDescription("eyes", "laser", "Ann", ("abt", "afc"), ("o",), ("sl",), (("range", "30"), ("unit", "m")))
 ROBOT = AgentDescription("r1", (LASER, ServiceDescription("arm", "grip")), ("abt",), ("o1", "o2"), ("fipa-sl0",))
@@ -30,34 +31,36 @@ def names(found: tuple[AgentDescription, ...]) -> list[str]:
     return [one.name for one in found]
 
 
-@pytest.mark.parametrize(
-    ("template", "found"),
-    [
-        (ANYBODY, True),
-        (ROBOT, True),
-        (AgentDescription("r1"), True),
-        (AgentDescription("R1"), False),
-        (AgentDescription(protocols=("abt",)), True),
-        (AgentDescription(protocols=("abt", "afc")), False),
-        (AgentDescription(ontologies=("o2",)), True),
-        (AgentDescription(languages=("sl",)), False),
-        (AgentDescription(addresses=("tcp/a:1",)), False),
-        (AgentDescription(lease_s=5), True),
-        (AgentDescription(services=(ServiceDescription(type="laser"),)), True),
-        (AgentDescription(services=(ServiceDescription(type="laser"), ServiceDescription(name="arm"))), True),
-        (AgentDescription(services=(ServiceDescription("arm", "laser"),)), False),
-        (AgentDescription(services=(ServiceDescription(ownership="Bob"),)), False),
-        (AgentDescription(services=(ServiceDescription(protocols=("afc",)),)), True),
-        (AgentDescription(services=(ServiceDescription(languages=("kif",)),)), False),
-        (AgentDescription(services=(ServiceDescription(properties=(("unit", "m"),)),)), True),
-        (AgentDescription(services=(ServiceDescription(properties=(("unit", "30"),)),)), False),
-    ],
-)
-def test_all_that_a_template_gives_must_match(template: AgentDescription, found: bool) -> None:  # noqa: FBT001
-    assert matches(template, ROBOT) is found
-    there = Directory()
-    there.register(ROBOT, 0, requester="r1")
-    assert there.search(template, 0) == ((ROBOT,) if found else ())
+TEMPLATES: list[tuple[AgentDescription, bool]] = [
+    (ANYBODY, True),
+    (ROBOT, True),
+    (AgentDescription("r1"), True),
+    (AgentDescription("R1"), False),
+    (AgentDescription(protocols=("abt",)), True),
+    (AgentDescription(protocols=("abt", "afc")), False),
+    (AgentDescription(ontologies=("o2",)), True),
+    (AgentDescription(languages=("sl",)), False),
+    (AgentDescription(addresses=("tcp/a:1",)), False),
+    (AgentDescription(lease_s=5), True),
+    (AgentDescription(services=(ServiceDescription(type="laser"),)), True),
+    (AgentDescription(services=(ServiceDescription(type="laser"), ServiceDescription(name="arm"))), True),
+    (AgentDescription(services=(ServiceDescription("arm", "laser"),)), False),
+    (AgentDescription(services=(ServiceDescription(ownership="Bob"),)), False),
+    (AgentDescription(services=(ServiceDescription(protocols=("afc",)),)), True),
+    (AgentDescription(services=(ServiceDescription(languages=("kif",)),)), False),
+    (AgentDescription(services=(ServiceDescription(properties=(("unit", "m"),)),)), True),
+    (AgentDescription(services=(ServiceDescription(properties=(("unit", "30"),)),)), False),
+]
+
+
+def test_all_that_a_template_gives_must_match() -> None:
+    with cases() as each:
+        for template, found in TEMPLATES:
+            with each(template):
+                assert matches(template, ROBOT) is found
+                there = Directory()
+                there.register(ROBOT, 0, requester="r1")
+                assert there.search(template, 0) == ((ROBOT,) if found else ())
 
 
 def test_a_search_is_by_name_and_may_be_limited() -> None:
@@ -184,31 +187,33 @@ LARGE = tuple((f"{number:03}" + "x" * 500, "x" * 500) for number in range(66))
 MANY = tuple(map(str, range(descriptions.MAX_NAMES + 1)))
 
 
-@pytest.mark.parametrize(
-    ("description", "about"),
-    [
-        (AgentDescription(), "missing-parameter df-agent-description name"),
-        (AgentDescription("r", (ServiceDescription(type="t"),)), "missing-parameter service-description name"),
-        (AgentDescription("r", (ServiceDescription("n"),)), "missing-parameter service-description type"),
-        (AgentDescription("r", (LASER,) * 65), "df-agent-description services"),
-        (AgentDescription("r", protocols=MANY), "df-agent-description protocols"),
-        (AgentDescription("r", ontologies=(LONG,)), "df-agent-description ontologies"),
-        (AgentDescription("r", addresses=MANY), "df-agent-description addresses"),
-        (AgentDescription(LONG), "df-agent-description name"),
-        (AgentDescription("r", (ServiceDescription(LONG, "t"),)), "service-description name"),
-        (AgentDescription("r", (ServiceDescription("n", "t", languages=MANY),)), "service-description languages"),
-        (AgentDescription("r", (ServiceDescription("n", "t", properties=(("a", LONG),)),)), "properties"),
-        (AgentDescription("r", (ServiceDescription("n", "t", properties=(("a", "b"),) * 1025),)), "properties"),
-        (AgentDescription("r", (ServiceDescription("n", "t", properties=LARGE),)), "internal-error .* too large"),
-        *((AgentDescription("r", lease_s=lease_s), "lease-time") for lease_s in (0, -1, math.inf, math.nan, 1e9)),
-    ],
-)
-def test_what_is_incomplete_or_too_large_is_refused(description: AgentDescription, about: str) -> None:
-    there = Directory()
-    with pytest.raises(RequestRefusedError, match=about) as caught:
-        there.register(description, 0, requester=description.name)
-    assert len(str(caught.value)) < 100
-    assert not len(there)
+REFUSED: list[tuple[AgentDescription, str]] = [
+    (AgentDescription(), "missing-parameter df-agent-description name"),
+    (AgentDescription("r", (ServiceDescription(type="t"),)), "missing-parameter service-description name"),
+    (AgentDescription("r", (ServiceDescription("n"),)), "missing-parameter service-description type"),
+    (AgentDescription("r", (LASER,) * 65), "df-agent-description services"),
+    (AgentDescription("r", protocols=MANY), "df-agent-description protocols"),
+    (AgentDescription("r", ontologies=(LONG,)), "df-agent-description ontologies"),
+    (AgentDescription("r", addresses=MANY), "df-agent-description addresses"),
+    (AgentDescription(LONG), "df-agent-description name"),
+    (AgentDescription("r", (ServiceDescription(LONG, "t"),)), "service-description name"),
+    (AgentDescription("r", (ServiceDescription("n", "t", languages=MANY),)), "service-description languages"),
+    (AgentDescription("r", (ServiceDescription("n", "t", properties=(("a", LONG),)),)), "properties"),
+    (AgentDescription("r", (ServiceDescription("n", "t", properties=(("a", "b"),) * 1025),)), "properties"),
+    (AgentDescription("r", (ServiceDescription("n", "t", properties=LARGE),)), "internal-error .* too large"),
+    *((AgentDescription("r", lease_s=lease_s), "lease-time") for lease_s in (0, -1, math.inf, math.nan, 1e9)),
+]
+
+
+def test_what_is_incomplete_or_too_large_is_refused() -> None:
+    with cases() as each:
+        for description, about in REFUSED:
+            with each(about):
+                there = Directory()
+                with pytest.raises(RequestRefusedError, match=about) as caught:
+                    there.register(description, 0, requester=description.name)
+                assert len(str(caught.value)) < 100
+                assert not len(there)
 
 
 def test_templates_are_bounded_too() -> None:

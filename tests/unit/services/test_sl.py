@@ -36,6 +36,7 @@ from robochoc.services.symbolic import (
     read,
     written,
 )
+from tests.support.cases import cases
 from tests.support.examples import examples
 
 CAPS = Caps(10_000, 100, 10)
@@ -94,28 +95,30 @@ def foreign(expression: Expression) -> object:
     return list(map(foreign, expression.items)) if isinstance(expression, List) else expression.text
 
 
-@pytest.mark.parametrize(
-    ("text", "message", "at"),
-    [
-        ("", "no expression", 0),
-        ("  ", "no expression", 2),
-        ("(a (b)", "ends before", 6),
-        ("a)", "goes on", 1),
-        (")", "closes nothing", 0),
-        ("(a) b", "goes on", 4),
-        ('(a "b', "never closed", 3),
-        ('("a\\"', "never closed", 1),
-        ('#9"abc', "the text ends before", 0),
-        ('#1"é', "whole characters", 0),
-        ("(" * 11, "deeper than 10", 10),
-        ("(" + "a " * 100, "more than 100", 199),
-        ("x" * 10_001, "too many", 10_000),
-    ],
-)
-def test_bad_expressions_are_told_with_their_place(text: str, message: str, at: int) -> None:
-    with pytest.raises(SymbolicExpressionError, match=message) as caught:
-        read(text, CAPS)
-    assert caught.value.at == at
+BAD_EXPRESSIONS: list[tuple[str, str, int]] = [
+    ("", "no expression", 0),
+    ("  ", "no expression", 2),
+    ("(a (b)", "ends before", 6),
+    ("a)", "goes on", 1),
+    (")", "closes nothing", 0),
+    ("(a) b", "goes on", 4),
+    ('(a "b', "never closed", 3),
+    ('("a\\"', "never closed", 1),
+    ('#9"abc', "the text ends before", 0),
+    ('#1"é', "whole characters", 0),
+    ("(" * 11, "deeper than 10", 10),
+    ("(" + "a " * 100, "more than 100", 199),
+    ("x" * 10_001, "too many", 10_000),
+]
+
+
+def test_bad_expressions_are_told_with_their_place() -> None:
+    with cases() as each:
+        for text, message, at in BAD_EXPRESSIONS:
+            with each(f"{text:.30}"):
+                with pytest.raises(SymbolicExpressionError, match=message) as caught:
+                    read(text, CAPS)
+                assert caught.value.at == at
 
 
 def test_fipa_strings_that_tell_their_size_are_read() -> None:
@@ -216,45 +219,47 @@ NAMELESS = "(set (service-description :name a :type b :properties (set (property
 SELF = f"(df-agent-description :name (agent-identifier :name {ROBOT}))"
 
 
-@pytest.mark.parametrize(
-    ("act", "performative", "reason"),
-    [
-        (f"(modify {SELF})", "failure", "not-registered"),
-        ("(register (df-agent-description :name (agent-identifier :name other@p)))", "refuse", "unauthorised"),
-        ("(deregister (df-agent-description :name (agent-identifier :name other@p)))", "refuse", "unauthorised"),
-        ("(register)", "refuse", "(missing-argument df-agent-description)"),
-        (f"(register {SELF} {SELF})", "refuse", "(unexpected-argument register)"),
-        ("(register (df-agent-description))", "refuse", "(missing-parameter df-agent-description name)"),
-        ("(deregister (df-agent-description))", "refuse", "(missing-parameter df-agent-description name)"),
-        (
-            f"(register {SELF[:-1]} :services (set (service-description :name a))))",
-            "refuse",
-            "(missing-parameter service-description type)",
-        ),
-        (f"(register {SELF[:-1]} :wings 2))", "refuse", "(unexpected-parameter df-agent-description wings)"),
-        (
-            f"(register {SELF[:-1]} :lease-time 20260101T000000000Z))",
-            "refuse",
-            "(unrecognised-parameter-value df-agent-description lease-time)",
-        ),
-        (
-            f"(search {SELF} (search-constraints :max-results many))",
-            "refuse",
-            "(unrecognised-parameter-value search-constraints max-results)",
-        ),
-        ("(fly high)", "refuse", "(unsupported-function fly)"),
-        (
-            f"(register {SELF[:-1]} :services {NAMELESS}))",
-            "refuse",
-            "(missing-parameter property value)",
-        ),
-    ],
-)
-def test_what_cannot_be_done_is_refused_or_fails(act: str, performative: str, reason: str) -> None:
-    action = f"(action (agent-identifier :name {DF.name}) {act})"
-    directory = Directory()
-    assert handle(directory, ROBOT, f"({action})", 0) == (performative, f"({action} {reason})")
-    assert not len(directory)
+REFUSED: list[tuple[str, str, str]] = [
+    (f"(modify {SELF})", "failure", "not-registered"),
+    ("(register (df-agent-description :name (agent-identifier :name other@p)))", "refuse", "unauthorised"),
+    ("(deregister (df-agent-description :name (agent-identifier :name other@p)))", "refuse", "unauthorised"),
+    ("(register)", "refuse", "(missing-argument df-agent-description)"),
+    (f"(register {SELF} {SELF})", "refuse", "(unexpected-argument register)"),
+    ("(register (df-agent-description))", "refuse", "(missing-parameter df-agent-description name)"),
+    ("(deregister (df-agent-description))", "refuse", "(missing-parameter df-agent-description name)"),
+    (
+        f"(register {SELF[:-1]} :services (set (service-description :name a))))",
+        "refuse",
+        "(missing-parameter service-description type)",
+    ),
+    (f"(register {SELF[:-1]} :wings 2))", "refuse", "(unexpected-parameter df-agent-description wings)"),
+    (
+        f"(register {SELF[:-1]} :lease-time 20260101T000000000Z))",
+        "refuse",
+        "(unrecognised-parameter-value df-agent-description lease-time)",
+    ),
+    (
+        f"(search {SELF} (search-constraints :max-results many))",
+        "refuse",
+        "(unrecognised-parameter-value search-constraints max-results)",
+    ),
+    ("(fly high)", "refuse", "(unsupported-function fly)"),
+    (
+        f"(register {SELF[:-1]} :services {NAMELESS}))",
+        "refuse",
+        "(missing-parameter property value)",
+    ),
+]
+
+
+def test_what_cannot_be_done_is_refused_or_fails() -> None:
+    with cases() as each:
+        for act, performative, reason in REFUSED:
+            with each(act):
+                action = f"(action (agent-identifier :name {DF.name}) {act})"
+                directory = Directory()
+                assert handle(directory, ROBOT, f"({action})", 0) == (performative, f"({action} {reason})")
+                assert not len(directory)
 
 
 def test_an_action_of_somebody_else_is_refused() -> None:
@@ -263,35 +268,37 @@ def test_an_action_of_somebody_else_is_refused() -> None:
     assert handle(Directory(), ROBOT, f"({action})", 0) == answer
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        "",
-        "hello",
-        "()",
-        "((action))",
-        "((action df (register)))",
-        f"((done (action (agent-identifier :name {DF.name}) (register {SELF}))))",
-        f"((action (agent-identifier :name {DF.name}) register))",
-        f"((action (agent-identifier) (register {SELF})))",
-        f"((action (agent-identifier :name {DF.name}) (register (car))))",
-        f"((action (agent-identifier :name {DF.name}) (register (df-agent-description :services x))))",
-        f"((action (agent-identifier :name {DF.name}) (register {SELF})) (and more))",
-        f"((action (agent-identifier :name {DF.name} :name a) (register {SELF})))",
-        f"((action (agent-identifier :name {DF.name} name) (register {SELF})))",
-        f"((action (agent-identifier :name {DF.name} :name) (register {SELF})))",
-        f"((action (agent-identifier :name {DF.name} :wings 2) (register {SELF})))",
-        "(" * 1000,
-        "(" + "a" * (1 << 18) + ")",
-    ],
-)
-def test_what_is_no_request_is_not_understood(content: str) -> None:
-    directory = Directory()
-    performative, answer = handle(directory, ROBOT, content, 0)
-    assert performative is Performative.NOT_UNDERSTOOD
-    assert answer.startswith("((unsupported-value ")
-    assert len(answer) < 300
-    assert not len(directory)
+NO_REQUESTS: list[str] = [
+    "",
+    "hello",
+    "()",
+    "((action))",
+    "((action df (register)))",
+    f"((done (action (agent-identifier :name {DF.name}) (register {SELF}))))",
+    f"((action (agent-identifier :name {DF.name}) register))",
+    f"((action (agent-identifier) (register {SELF})))",
+    f"((action (agent-identifier :name {DF.name}) (register (car))))",
+    f"((action (agent-identifier :name {DF.name}) (register (df-agent-description :services x))))",
+    f"((action (agent-identifier :name {DF.name}) (register {SELF})) (and more))",
+    f"((action (agent-identifier :name {DF.name} :name a) (register {SELF})))",
+    f"((action (agent-identifier :name {DF.name} name) (register {SELF})))",
+    f"((action (agent-identifier :name {DF.name} :name) (register {SELF})))",
+    f"((action (agent-identifier :name {DF.name} :wings 2) (register {SELF})))",
+    "(" * 1000,
+    "(" + "a" * (1 << 18) + ")",
+]
+
+
+def test_what_is_no_request_is_not_understood() -> None:
+    with cases() as each:
+        for content in NO_REQUESTS:
+            with each(f"{content:.120}"):
+                directory = Directory()
+                performative, answer = handle(directory, ROBOT, content, 0)
+                assert performative is Performative.NOT_UNDERSTOOD
+                assert answer.startswith("((unsupported-value ")
+                assert len(answer) < 300
+                assert not len(directory)
 
 
 @given(st.text(alphabet='()":+ arf0\n', max_size=60))

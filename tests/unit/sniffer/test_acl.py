@@ -28,6 +28,7 @@ from tests.support.acl_conversations import (
     conversation,
     types_of,
 )
+from tests.support.cases import cases
 from tests.support.examples import examples
 from tests.support.program import ROOT
 
@@ -103,36 +104,38 @@ def test_messages_of_others_are_read_in_any_case_and_layout() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("bad", "message", "at"),
-    [
-        ("", "no expression", 0),
-        ("INFORM", "begins with a word", 0),
-        ("()", "begins with a word", 0),
-        (" (SHOUT)", "'shout' is no performative", 1),
-        ("(INFORM :sender", "ends before", 15),
-        ("(INFORM :sender)", "has no value", 8),
-        ("(INFORM sender a)", "begin with a colon", 8),
-        ("(INFORM :sender a)", "agent-identifier is to be a list", 16),
-        ("(INFORM :sender (agent-identifier))", "needs a :name", 16),
-        ("(INFORM :sender (agent-identifier :name (a)))", "not a list", 40),
-        ("(INFORM :receiver (agent-identifier :name a))", "begin with set", 18),
-        ("(INFORM :language (a b))", "not a list", 18),
-        ("(INFORM :colour red)", "no parameter :colour", 16),
-        ("(INFORM :language a :Language b)", "twice", 20),
-        ("(INFORM :X-a! b)", "no name of a user-defined parameter", 0),
-        ("(INFORM :reply-by soon)", "no DateTime", 0),
-        ('(INFORM :content "a)', "never closed", 17),
-        ("(INFORM :content " + "(" * 40, "deeper", 32),
-        ("(INFORM" + " a" * 10_001, "more than 10000", 20_004),
-        ("(INFORM :content " + "a" * (1 << 25) + ")", "too many", 1 << 25),
-    ],
-)
-def test_bad_texts_are_told_with_their_place(bad: str, message: str, at: int) -> None:
-    with pytest.raises(ACLError, match=message) as caught:
-        parse(bad)
-    assert caught.value.at == at
-    assert len(str(caught.value)) < 200
+BAD_TEXTS: list[tuple[str, str, int]] = [
+    ("", "no expression", 0),
+    ("INFORM", "begins with a word", 0),
+    ("()", "begins with a word", 0),
+    (" (SHOUT)", "'shout' is no performative", 1),
+    ("(INFORM :sender", "ends before", 15),
+    ("(INFORM :sender)", "has no value", 8),
+    ("(INFORM sender a)", "begin with a colon", 8),
+    ("(INFORM :sender a)", "agent-identifier is to be a list", 16),
+    ("(INFORM :sender (agent-identifier))", "needs a :name", 16),
+    ("(INFORM :sender (agent-identifier :name (a)))", "not a list", 40),
+    ("(INFORM :receiver (agent-identifier :name a))", "begin with set", 18),
+    ("(INFORM :language (a b))", "not a list", 18),
+    ("(INFORM :colour red)", "no parameter :colour", 16),
+    ("(INFORM :language a :Language b)", "twice", 20),
+    ("(INFORM :X-a! b)", "no name of a user-defined parameter", 0),
+    ("(INFORM :reply-by soon)", "no DateTime", 0),
+    ('(INFORM :content "a)', "never closed", 17),
+    ("(INFORM :content " + "(" * 40, "deeper", 32),
+    ("(INFORM" + " a" * 10_001, "more than 10000", 20_004),
+    ("(INFORM :content " + "a" * (1 << 25) + ")", "too many", 1 << 25),
+]
+
+
+def test_bad_texts_are_told_with_their_place() -> None:
+    with cases() as each:
+        for bad, message, at in BAD_TEXTS:
+            with each(f"{bad:.50}"):
+                with pytest.raises(ACLError, match=message) as caught:
+                    parse(bad)
+                assert caught.value.at == at
+                assert len(str(caught.value)) < 200
 
 
 @given(st.text(alphabet='()": \\#:aX-0', max_size=60))

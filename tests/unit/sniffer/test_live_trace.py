@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from robochoc.journal.events import AnyEvent, Began, Event
 from robochoc.journal.journal import JournalError, read_journal
+from robochoc.model.outcome import Outcome
 from robochoc.sniffer import live_trace
 from robochoc.sniffer.cache import Cache
 from robochoc.sniffer.growing_file import GrowingFile, NoFileError
@@ -21,8 +22,12 @@ from robochoc.sniffer.trace import Trace
 from tests.support.examples import examples
 from tests.support.sniffer_server import header, journal_of, run_events
 
-EVENTS, OUTCOME = run_events()
 QUICK = examples(5, also_suppress=(HealthCheck.function_scoped_fixture,))
+
+
+@pytest.fixture(scope="module")
+def run() -> tuple[list[AnyEvent], Outcome]:
+    return run_events()
 
 
 @contextmanager
@@ -51,15 +56,14 @@ def _who(event: Event) -> set[str]:
     return {getattr(event, name, "")}
 
 
-@pytest.mark.parametrize("robot", ["Robot1.1"])
 @given(piece=st.integers(500, 20_000), at_once=st.integers(50, 3000))
 @QUICK
 def test_in_pieces_as_in_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str, piece: int, at_once: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: tuple[list[AnyEvent], Outcome], piece: int, at_once: int
 ) -> None:
     monkeypatch.setattr(live_trace, "PIECE_BYTES", piece)
     monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", at_once)
-    content = journal_of(late(EVENTS, robot), OUTCOME, header("processes"))
+    content = journal_of(late(run[0], "Robot1.1"), run[1], header("processes"))
     whole = Trace.of(read_journal(content))
     before = 0
     with opened(tmp_path / "run.journal", content) as window:
@@ -71,17 +75,17 @@ def test_in_pieces_as_in_whole(
         assert (follows.trace.over, follows.trace.outcome, follows.loaded) == (True, whole.outcome, 1)
 
 
-def test_events_by_time_are_the_journals(tmp_path: Path) -> None:
-    content = journal_of(late(EVENTS, "Robot2.2"), OUTCOME, header("processes"))
+def test_events_by_time_are_the_journals(tmp_path: Path, run: tuple[list[AnyEvent], Outcome]) -> None:
+    content = journal_of(late(run[0], "Robot2.2"), run[1], header("processes"))
     with opened(tmp_path / "run.journal", content) as window:
         window.widen(len(content))
         events = [event for some in events_by_time(window) for event in some]
     assert tuple(events) == read_journal(content).events
 
 
-def test_whoever_writes_is_not_disturbed(tmp_path: Path) -> None:
+def test_whoever_writes_is_not_disturbed(tmp_path: Path, run: tuple[list[AnyEvent], Outcome]) -> None:
     """The descriptor's own place stays where it was: a parent writes through the same one."""
-    content = journal_of(EVENTS, OUTCOME)
+    content = journal_of(*run)
     path = tmp_path / "run.journal"
     with path.open("w+b") as file:
         file.write(content)

@@ -6,68 +6,40 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from random import Random
-from typing import Any, get_args
+from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
+from robochoc.model.problem import Team
 from robochoc.model.wording import Wording, listed
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.shared.messages.dfs import Token
 from robochoc.run import Options, Runtime, Withdrawal
-from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.run.registry import protocol_named
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.trace import Trace
+from tests.support.acl_conversations import BUNDLED_PROTOCOLS, types_of
+from tests.support.cases import cases
 from tests.support.complex_problems import random_complex_team
 from tests.support.examples import examples
 from tests.support.problems import random_team
 from tests.support.random_changes import random_changing_team
-from tests.support.real_sentences import REAL
-from tests.support.recorded_journals import feed_of, record
+from tests.support.recorded_journals import record, words_of
 
-OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
-PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
+PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, BUNDLED_PROTOCOLS), FirstFit]
 TYPES: list[type[Message]] = sorted(
-    {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
-    key=lambda kind: (kind.__name__, kind.__module__),
+    {kind for protocol in PROTOCOLS for kind in types_of(protocol)}, key=lambda kind: (kind.__name__, kind.__module__)
 )
 
 
-@cache
-def said(protocol: str) -> dict[str, set[str]]:
-    """All that is said in a run, by the type of message."""
-    feed = feed_of(protocol)
-    return words_of(feed)
-
-
-def words_of(feed: PageData) -> dict[str, set[str]]:
-    told: dict[str, set[str]] = {kind: set() for kind in feed.trace.kinds}
-    for message, kind in enumerate(feed.trace.messages.kind):
-        told[feed.trace.kinds[kind]].add(feed.words(message))
-    return told
-
-
-@pytest.mark.parametrize(("protocol", "kind"), REAL)
-def test_what_robots_say_in_real_runs(protocol: str, kind: str) -> None:
-    assert REAL[protocol, kind] in said(protocol)[kind]
-
-
-@pytest.mark.parametrize("protocol", OURS)
-def test_no_message_of_ours_is_told_as_a_strangers(protocol: str) -> None:
-    for kind, sentences in said(protocol).items():
-        assert all(" says: " in sentence for sentence in sentences), kind
-
-
-@pytest.mark.parametrize("kind", TYPES, ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
-def test_every_type_of_every_protocol_has_its_words(kind: type[Message]) -> None:
-    assert kind.in_words is not Message.in_words
+def test_every_type_of_every_protocol_has_its_words() -> None:
+    assert [kind for kind in TYPES if kind.in_words is Message.in_words] == []
 
 
 def test_a_solution_that_is_found_and_who_steps_aside() -> None:
@@ -110,10 +82,16 @@ def test_a_tree_names_the_robots_on_the_branch_only() -> None:
 FACT = re.compile(r"(V\S+) (?:=|cannot be) (-?\d+)")
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_robots_with_several_variables_are_told_by_those_that_matter(seed: int) -> None:
-    team = random_complex_team(Random(seed))
-    team = replace(team, robots=tuple(replace(robot, private=()) for robot in team.robots))  # what needs no solver
+def test_robots_with_several_variables_are_told_by_those_that_matter() -> None:
+    with cases() as each:
+        for seed in range(12):
+            with each(f"seed {seed}"):
+                team = random_complex_team(Random(seed))
+                robots = tuple(replace(robot, private=()) for robot in team.robots)  # the rest needs no solver
+                assert_facts_are_told(replace(team, robots=robots))
+
+
+def assert_facts_are_told(team: Team) -> None:
     feed = PageData(Trace.of(record(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, cache=False))))
     of = feed.trace.messages
     for message in range(len(of.t)):
@@ -162,59 +140,61 @@ def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
     return next(one for one in TYPES if one.__name__ == kind and set(one.__struct_fields__) == {*content})
 
 
-@pytest.mark.parametrize(
-    ("kind", "content", "words"),
-    [
-        ("Nogood", {"lhs": {"Robot2.1": [3]}, "value": [1, 2]},
-         "as long as V2.1 = 3, V = 1 and W = 2 cannot both hold"),
-        ("Nogood", {"lhs": {"Robot2.1": [3]}, "value": [None, 2]}, "as long as V2.1 = 3, W cannot be 2"),
-        ("Nogood", {"lhs": {"Robot2.1": [None]}, "value": [1, None]}, "V cannot be 1, whatever the others do"),
-        ("Nogood", {"lhs": {}, "value": [None, None]}, "Robot1.1 has no value left, whatever the others do"),
-        ("Nogood", {"lhs": {"Robot9.9": [3]}, "value": [1, None]}, "as long as Robot9.9 = 3, V cannot be 1"),
-        ("Nogood", {"lhs": {"X": [3, 4]}, "value": [1, None]}, "as long as X[1] = 3 and X[2] = 4, V cannot be 1"),
-        ("Ok", {"value": [None]}, "I withdraw from now on"),
-        ("AddLink", {}, "tell me V and W from now on"),
-        ("NotOk", {"assignments": [], "sc": 1}, "there is no solution"),
-        ("Solved", {"solution": {"Robot1.1": [None, None], "Robot2.1": [3]}},
-         "a solution is found, and the search is over: Robot1.1 withdraws and V2.1 = 3"),
-        ("Placed", {"value": None}, "I withdraw"),
-        ("Cost", {"context": {}, "lb": math.inf, "ub": math.inf}, "my subtree has no solution"),
-        ("Cost", {"context": {"Robot1.1": [[1, 2], 4]}, "lb": 3, "ub": 3.0},
-         "as long as V = 1 and W = 2, my subtree costs 3"),
-        ("Cost", {"context": {}, "lb": 2.5, "ub": None}, "my subtree costs at least 2.5"),
-        ("Value", {"value": [3], "counter": 2, "threshold": None}, "V2.1 = 3 from now on (change 2)"),
-        ("Terminate", {"best": [None, []]}, "the search is over, and there is no solution"),
-        ("Terminate", {"context": {}}, "all above you have taken their last values"),
-        ("Backtrack", {"best": [None, []]}, "Robot1.1's value leads to no solution: take another one"),
-        ("CPA", {"assignments": [[[1, 2], 1]], "bound": None, "least": []},
-         "no solution has V = 1 and W = 2: take another value"),
-        ("CPAs", {"count": 1, "rows": "", "least": 7, "ceiling": 9},
-         "1 partial assignment for Robot1.1 to extend; the best solution so far costs 7"),
-        ("Below", {"domains": [], "charges": [], "runs": [], "most": 0}, "nobody is below me"),
-        ("UTIL", {"width": 1, "costs": bytes([3, 255, 9])},
-         "a piece of my table: 3 costs, from 3 to 9, and 1 infinite"),
-        ("UTIL", {"width": 2, "costs": "//8="}, "a piece of my table: 1 cost, and 1 infinite"),
-        ("VALUE", {"assignment": []}, "nobody above you has to do with your subtree: take your best value"),
-        ("Domain", {"values": [[1], [2], [None]]}, "V2.1 is 1 or 2, or I withdraw"),
-        ("Gain", {"broken": 2, "cost": 0}, "my move would save 2 broken constraints"),
-        ("Gain", {"broken": 1, "cost": 3}, "my move would save 1 broken constraint and 3 of cost"),
-        ("Gain", {"broken": 0, "cost": 0.0}, "my move would save nothing"),
-        ("Offer", {"gains": None}, "I have no offer for you"),
-        ("Go", {"go": True}, "go: of my neighbours, nobody is to move before us"),
-        ("R", {"rows": [[0, math.inf], [1, 2]]},
-         "by our 2 functions, one after the other, Robot1.1's values cost 0 and infinity; 1 and 2"),
-        ("Proceed", {"separator": []}, "all tables fit: make yours"),
-        ("InferCtxt", {"places": {"Robot1.1": 1}},
-         "what does your subtree cost at least with Robot1.1's value number 2?"),
-        ("InferCtxt", {"places": {}}, "what does your subtree cost at least with any values?"),
-        ("CtxtUtil", {"axes": [["Robot1.1", 0, 2]], "costs": [3, 9]},
-         "with these values my subtree costs at least 3 to 9, by the values of Robot1.1"),
-        ("CtxtUtil", {"axes": [], "costs": [math.inf]},
-         "with these values my subtree costs infinity, by the values of nobody"),
-    ],
-)  # fmt: skip
-def test_the_rarer_things_that_are_said(kind: str, content: dict[str, Any], words: str) -> None:
-    assert sentence(kind, content, TWO, type_with(kind, content)) == f"Robot2.1 says: {words}"
+RARER: list[tuple[str, dict[str, Any], str]] = [
+    ("Nogood", {"lhs": {"Robot2.1": [3]}, "value": [1, 2]},
+     "as long as V2.1 = 3, V = 1 and W = 2 cannot both hold"),
+    ("Nogood", {"lhs": {"Robot2.1": [3]}, "value": [None, 2]}, "as long as V2.1 = 3, W cannot be 2"),
+    ("Nogood", {"lhs": {"Robot2.1": [None]}, "value": [1, None]}, "V cannot be 1, whatever the others do"),
+    ("Nogood", {"lhs": {}, "value": [None, None]}, "Robot1.1 has no value left, whatever the others do"),
+    ("Nogood", {"lhs": {"Robot9.9": [3]}, "value": [1, None]}, "as long as Robot9.9 = 3, V cannot be 1"),
+    ("Nogood", {"lhs": {"X": [3, 4]}, "value": [1, None]}, "as long as X[1] = 3 and X[2] = 4, V cannot be 1"),
+    ("Ok", {"value": [None]}, "I withdraw from now on"),
+    ("AddLink", {}, "tell me V and W from now on"),
+    ("NotOk", {"assignments": [], "sc": 1}, "there is no solution"),
+    ("Solved", {"solution": {"Robot1.1": [None, None], "Robot2.1": [3]}},
+     "a solution is found, and the search is over: Robot1.1 withdraws and V2.1 = 3"),
+    ("Placed", {"value": None}, "I withdraw"),
+    ("Cost", {"context": {}, "lb": math.inf, "ub": math.inf}, "my subtree has no solution"),
+    ("Cost", {"context": {"Robot1.1": [[1, 2], 4]}, "lb": 3, "ub": 3.0},
+     "as long as V = 1 and W = 2, my subtree costs 3"),
+    ("Cost", {"context": {}, "lb": 2.5, "ub": None}, "my subtree costs at least 2.5"),
+    ("Value", {"value": [3], "counter": 2, "threshold": None}, "V2.1 = 3 from now on (change 2)"),
+    ("Terminate", {"best": [None, []]}, "the search is over, and there is no solution"),
+    ("Terminate", {"context": {}}, "all above you have taken their last values"),
+    ("Backtrack", {"best": [None, []]}, "Robot1.1's value leads to no solution: take another one"),
+    ("CPA", {"assignments": [[[1, 2], 1]], "bound": None, "least": []},
+     "no solution has V = 1 and W = 2: take another value"),
+    ("CPAs", {"count": 1, "rows": "", "least": 7, "ceiling": 9},
+     "1 partial assignment for Robot1.1 to extend; the best solution so far costs 7"),
+    ("Below", {"domains": [], "charges": [], "runs": [], "most": 0}, "nobody is below me"),
+    ("UTIL", {"width": 1, "costs": bytes([3, 255, 9])},
+     "a piece of my table: 3 costs, from 3 to 9, and 1 infinite"),
+    ("UTIL", {"width": 2, "costs": "//8="}, "a piece of my table: 1 cost, and 1 infinite"),
+    ("VALUE", {"assignment": []}, "nobody above you has to do with your subtree: take your best value"),
+    ("Domain", {"values": [[1], [2], [None]]}, "V2.1 is 1 or 2, or I withdraw"),
+    ("Gain", {"broken": 2, "cost": 0}, "my move would save 2 broken constraints"),
+    ("Gain", {"broken": 1, "cost": 3}, "my move would save 1 broken constraint and 3 of cost"),
+    ("Gain", {"broken": 0, "cost": 0.0}, "my move would save nothing"),
+    ("Offer", {"gains": None}, "I have no offer for you"),
+    ("Go", {"go": True}, "go: of my neighbours, nobody is to move before us"),
+    ("R", {"rows": [[0, math.inf], [1, 2]]},
+     "by our 2 functions, one after the other, Robot1.1's values cost 0 and infinity; 1 and 2"),
+    ("Proceed", {"separator": []}, "all tables fit: make yours"),
+    ("InferCtxt", {"places": {"Robot1.1": 1}},
+     "what does your subtree cost at least with Robot1.1's value number 2?"),
+    ("InferCtxt", {"places": {}}, "what does your subtree cost at least with any values?"),
+    ("CtxtUtil", {"axes": [["Robot1.1", 0, 2]], "costs": [3, 9]},
+     "with these values my subtree costs at least 3 to 9, by the values of Robot1.1"),
+    ("CtxtUtil", {"axes": [], "costs": [math.inf]},
+     "with these values my subtree costs infinity, by the values of nobody"),
+]  # fmt: skip
+
+
+def test_the_rarer_things_that_are_said() -> None:
+    with cases() as each:
+        for kind, content, words in RARER:
+            with each(words):
+                assert sentence(kind, content, TWO, type_with(kind, content)) == f"Robot2.1 says: {words}"
 
 
 def test_long_contents_are_cut() -> None:

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import pytest
@@ -26,12 +26,25 @@ from robochoc.sniffer import live_trace, server
 from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.session import SnifferSession
 from robochoc.sniffer.trace import Trace
+from tests.support.cases import cases
 from tests.support.limits import HANG_S, wait_until
 from tests.support.sniffer_server import TOKEN, SnifferServer, header, journal_of, run_events, sniffer_server
 
-EVENTS, OUTCOME = run_events()
-WHOLE = journal_of(EVENTS, OUTCOME)
-TRACE = Trace.of(read_journal(WHOLE))
+
+class Run(NamedTuple):
+    """A run in the simulator, its journal, and the trace of that."""
+
+    events: list[AnyEvent]
+    outcome: Outcome
+    whole: bytes
+    trace: Trace
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    events, outcome = run_events()
+    whole = journal_of(events, outcome)
+    return Run(events, outcome, whole, Trace.of(read_journal(whole)))
 
 
 @pytest.fixture(autouse=True)
@@ -41,9 +54,9 @@ def whole(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def file(tmp_path: Path, run: Run) -> Path:
     path = tmp_path / "run.journal"
-    path.write_bytes(WHOLE)
+    path.write_bytes(run.whole)
     return path
 
 
@@ -53,45 +66,47 @@ def page(file: Path) -> Iterator[SnifferServer]:
         yield running
 
 
-def test_every_answer_is_the_journals(page: SnifferServer, file: Path) -> None:
+def test_every_answer_is_the_journals(page: SnifferServer, file: Path, run: Run) -> None:
     about = page.json("about")
-    messages, steps = len(TRACE.messages.t), len(TRACE.steps.t)
+    messages, steps = len(run.trace.messages.t), len(run.trace.steps.t)
     assert (about["messages"], about["steps"], about["over"], about["chosen"]) == (messages, steps, True, ["Robot1.*"])
-    assert page.get(f"columns?from=0&to={messages}") == message_columns(TRACE, 0, messages)
-    assert page.get(f"columns?from=3&to={messages - 5}") == message_columns(TRACE, 3, messages - 5)
-    assert page.get(f"steps?from=2&to={steps}") == step_columns(TRACE, 2, steps)
-    assert page.json("decisions?from=0&to=2") == [list(decision) for decision in TRACE.decisions[:2]]
+    assert page.get(f"columns?from=0&to={messages}") == message_columns(run.trace, 0, messages)
+    assert page.get(f"columns?from=3&to={messages - 5}") == message_columns(run.trace, 3, messages - 5)
+    assert page.get(f"steps?from=2&to={steps}") == step_columns(run.trace, 2, steps)
+    assert page.json("decisions?from=0&to=2") == [list(decision) for decision in run.trace.decisions[:2]]
     details = page.json("details?chunk=0")
     assert len(details) == min(messages, 1024)
-    assert details[7]["content"] == TRACE.content(7)
+    assert details[7]["content"] == run.trace.content(7)
     assert page.get("journal") == file.read_bytes()
 
 
-def test_the_text_form_is_served_too(tmp_path: Path) -> None:
+def test_the_text_form_is_served_too(tmp_path: Path, run: Run) -> None:
     path = tmp_path / "run.jsonl"
-    path.write_bytes(b"".join(lines_of(read_journal(WHOLE))))
+    path.write_bytes(b"".join(lines_of(read_journal(run.whole))))
     with sniffer_server(SnifferSession(path)) as page:
-        assert page.get("columns?from=0&to=50") == message_columns(TRACE, 0, 50)
+        assert page.get("columns?from=0&to=50") == message_columns(run.trace, 0, 50)
 
 
-def test_what_a_robot_knew_comes_in_chunks(page: SnifferServer) -> None:
+def test_what_a_robot_knew_comes_in_chunks(page: SnifferServer, run: Run) -> None:
     why_not = page.json("about")["replay"]
     if why_not:
         assert page.refusal("states?robot=0&chunk=0")[0] == 400
         return
     states = page.json("states?robot=1&chunk=0")
-    own = [step for step in range(len(TRACE.steps.t)) if TRACE.steps.robot[step] == 1]
+    own = [step for step in range(len(run.trace.steps.t)) if run.trace.steps.robot[step] == 1]
     assert [state["step"] for state in states] == [*range(min(64, len(own)))]
     assert page.json("states?robot=1&chunk=1000") == []
 
 
-def test_the_scene_moves_by_decisions(page: SnifferServer) -> None:
+def test_the_scene_moves_by_decisions(page: SnifferServer, run: Run) -> None:
     scene = page.json("scene")
     assert len(scene["drones"]) == 16
     assert scene["commands"]
-    assert scene["decisions"] == len(TRACE.decisions)
-    step, values = next((step, values) for step, values in TRACE.decisions if values)
-    drone = next(n for n, one in enumerate(scene["drones"]) if one["robot"] == TRACE.robots[TRACE.steps.robot[step]])
+    assert scene["decisions"] == len(run.trace.decisions)
+    step, values = next((step, values) for step, values in run.trace.decisions if values)
+    drone = next(
+        n for n, one in enumerate(scene["drones"]) if one["robot"] == run.trace.robots[run.trace.steps.robot[step]]
+    )
     moved = next(move for move in scene["moves"] if move[:2] == [step, drone])
     x, y, ground = scene["drones"][drone]["ground"]
     assert moved[2:] == [x, y, ground + next(iter(values.values()))]
@@ -100,45 +115,52 @@ def test_the_scene_moves_by_decisions(page: SnifferServer) -> None:
     assert rest["moves"] == scene["moves"][-len(rest["moves"]) :]
 
 
-@pytest.mark.parametrize(
-    "what",
-    [
-        "columns",
-        "columns?from=0",
-        "columns?from=-1&to=2",
-        "columns?from=5&to=4",
-        "columns?from=0&to=999999999",
-        "steps?from=zero&to=2",
-        "steps?from=0&to=99999999999999999999",
-        "decisions?from=0&to=1e3",
-        "details?chunk=1000000",
-        "states?robot=999&chunk=0",
-        "scene?from=9999999999",
-        "states?robot=0&chunk=x",
-    ],
-)
-def test_what_there_is_not_is_told_in_words(page: SnifferServer, what: str) -> None:
-    status, why = page.refusal(what)
-    assert status == 400
-    assert len(why.splitlines()) == 1
+MISSING: list[str] = [
+    "columns",
+    "columns?from=0",
+    "columns?from=-1&to=2",
+    "columns?from=5&to=4",
+    "columns?from=0&to=999999999",
+    "steps?from=zero&to=2",
+    "steps?from=0&to=99999999999999999999",
+    "decisions?from=0&to=1e3",
+    "details?chunk=1000000",
+    "states?robot=999&chunk=0",
+    "scene?from=9999999999",
+    "states?robot=0&chunk=x",
+]
 
 
-@pytest.mark.parametrize("what", ["", "about", "columns?from=0&to=1", "journal", "scene", "news"])
-def test_nobody_else_gets_an_answer(page: SnifferServer, what: str) -> None:
-    assert page.refusal(what, Host="example.org")[0] == 404
+def test_what_there_is_not_is_told_in_words(page: SnifferServer) -> None:
+    with cases() as each:
+        for what in MISSING:
+            with each(what):
+                status, why = page.refusal(what)
+                assert status == 400
+                assert len(why.splitlines()) == 1
+
+
+def test_nobody_else_gets_an_answer(page: SnifferServer) -> None:
     known = page.url
-    for url in (known.replace(TOKEN, "a-path-that-somebody-guesses"), known.replace(f"{TOKEN}/", "")):
-        page.url = url
-        assert page.refusal(what)[0] == 404
+    with cases() as each:
+        for what in ("", "about", "columns?from=0&to=1", "journal", "scene", "news"):
+            with each(what):
+                page.url = known
+                assert page.refusal(what, Host="example.org")[0] == 404
+                for url in (known.replace(TOKEN, "a-path-that-somebody-guesses"), known.replace(f"{TOKEN}/", "")):
+                    page.url = url
+                    assert page.refusal(what)[0] == 404
 
 
-@pytest.mark.parametrize("what", ["", "about", "journal"])
-def test_no_other_site_gets_an_answer(page: SnifferServer, what: str) -> None:
-    assert page.refusal(what, Origin="http://example.org")[0] == 403
-    with page.ask(what, Origin=page.url.partition(f"/{TOKEN}")[0]) as answer:
-        assert "Access-Control-Allow-Origin" not in answer.headers
-        assert answer.headers["Cache-Control"] == "no-store"
-        assert answer.headers["Referrer-Policy"] == "no-referrer"
+def test_no_other_site_gets_an_answer(page: SnifferServer) -> None:
+    with cases() as each:
+        for what in ("", "about", "journal"):
+            with each(what):
+                assert page.refusal(what, Origin="http://example.org")[0] == 403
+                with page.ask(what, Origin=page.url.partition(f"/{TOKEN}")[0]) as answer:
+                    assert "Access-Control-Allow-Origin" not in answer.headers
+                    assert answer.headers["Cache-Control"] == "no-store"
+                    assert answer.headers["Referrer-Policy"] == "no-referrer"
 
 
 def test_json_is_compressed_where_the_browser_can(page: SnifferServer) -> None:
@@ -186,9 +208,10 @@ async def _news_until(socket: WebSocketClientConnection, enough: Callable[[dict[
                 return news
 
 
-def test_a_page_hears_of_a_file_that_grows(tmp_path: Path) -> None:
+def test_a_page_hears_of_a_file_that_grows(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "POLL_S", 0.01)
     path = tmp_path / "run.journal"
-    pieces = blocks(EVENTS, OUTCOME, 4)
+    pieces = blocks(run.events, run.outcome, 4)
     path.write_bytes(pieces[0])
     with sniffer_server(SnifferSession(path)) as page:
         socket = connected(page)
@@ -197,9 +220,9 @@ def test_a_page_hears_of_a_file_that_grows(tmp_path: Path) -> None:
             for piece in pieces[1:]:
                 writing.write(piece)
                 writing.flush()
-                time.sleep(0.15)
+                time.sleep(0.02)  # it may be looked at meanwhile, or not
         news = in_the_loop(page, lambda: _news_until(socket, lambda news: news["over"]))
-        assert (news["messages"], news["loaded"], news["generation"]) == (len(TRACE.messages.t), 1, 0)
+        assert (news["messages"], news["loaded"], news["generation"]) == (len(run.trace.messages.t), 1, 0)
         in_the_loop(page, lambda: _close(socket))
 
 
@@ -234,29 +257,29 @@ def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkey
     session.close()
 
 
-def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Path, run: Run) -> None:
     with sniffer_server(SnifferSession(file)) as page:
         assert page.json("about")["generation"] == 0
         other = tmp_path / "other"
-        other.write_bytes(journal_of(EVENTS, OUTCOME, header(team="another")))
+        other.write_bytes(journal_of(run.events, run.outcome, header(team="another")))
         other.replace(file)
         wait_until(lambda: page.json("about")["team"] == "another", "it was not noticed")
         assert page.json("about")["generation"] > 0
 
 
 @pytest.mark.parametrize("times", [0.2, 1.5])
-def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: float) -> None:
+def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: float, run: Run) -> None:
     """Also where there is more of it than there was."""
     with sniffer_server(SnifferSession(file)) as page:
         assert page.json("about")["generation"] == 0
-        some = EVENTS[: int(len(EVENTS) * times)] + EVENTS[: int(len(EVENTS) * max(0, times - 1))]
+        some = run.events[: int(len(run.events) * times)] + run.events[: int(len(run.events) * max(0, times - 1))]
         file.write_bytes(journal_of(some, None, header(team="another")))
         wait_until(lambda: page.json("about")["team"] == "another", "it was not noticed")
         assert page.json("about")["generation"] > 0
 
 
-def test_a_journal_without_an_end_is_over_when_nobody_writes(file: Path) -> None:
-    file.write_bytes(journal_of(EVENTS, None))
+def test_a_journal_without_an_end_is_over_when_nobody_writes(file: Path, run: Run) -> None:
+    file.write_bytes(journal_of(run.events, None))
     with sniffer_server(SnifferSession(file)) as page:
         assert not page.json("about")["over"]
     os.utime(file, (0, 0))
@@ -264,13 +287,13 @@ def test_a_journal_without_an_end_is_over_when_nobody_writes(file: Path) -> None
         wait_until(lambda: page.json("about")["over"], "it goes on for ever")
 
 
-def test_damage_is_told_and_what_is_before_it_shown(file: Path) -> None:
-    lines = [*lines_of(read_journal(WHOLE))]
+def test_damage_is_told_and_what_is_before_it_shown(file: Path, run: Run) -> None:
+    lines = [*lines_of(read_journal(run.whole))]
     file.write_bytes(b"".join(lines[:300]) + b"nonsense\n" + b"".join(lines[300:]))
     with sniffer_server(SnifferSession(file)) as page:
         about = page.json("about")
     assert "301" in about["damage"]
-    assert 0 < about["messages"] < len(TRACE.messages.t)
+    assert 0 < about["messages"] < len(run.trace.messages.t)
 
 
 def test_a_file_that_turns_out_to_be_none_is_told(tmp_path: Path) -> None:
@@ -281,9 +304,9 @@ def test_a_file_that_turns_out_to_be_none_is_told(tmp_path: Path) -> None:
         assert page.refusal("about")[0] == 400
 
 
-def test_numbers_that_no_machine_holds_are_told(tmp_path: Path) -> None:
+def test_numbers_that_no_machine_holds_are_told(tmp_path: Path, run: Run) -> None:
     """In text they stand like any other; what cannot be put in order is no reason to keep a page waiting."""
-    beginning, *_ = lines_of(read_journal(WHOLE))
+    beginning, *_ = lines_of(read_journal(run.whole))
     said = [
         b'{"event":"Sent","t":%d,"sender":"a","receiver":"b","type":"X","content":{"x":%d},"bytes":1,"clock":0}\n' % one
         for one in ((2, 1), (1, 10**30))
@@ -317,9 +340,9 @@ def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(
     in_the_loop(page, lambda: _close(socket))
 
 
-def test_the_download_is_the_file_as_it_stood(tmp_path: Path) -> None:
+def test_the_download_is_the_file_as_it_stood(tmp_path: Path, run: Run) -> None:
     path = tmp_path / 'a "strange" näme.journal'
-    path.write_bytes(WHOLE)
+    path.write_bytes(run.whole)
     with sniffer_server(SnifferSession(path)) as page, page.ask("journal") as answer:
         assert answer.headers["Content-Disposition"] == 'attachment; filename="a__strange__n_me.journal"'
-        assert read_journal(answer.read()) == read_journal(io.BytesIO(WHOLE).read())
+        assert read_journal(answer.read()) == read_journal(io.BytesIO(run.whole).read())

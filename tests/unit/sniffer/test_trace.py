@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from random import Random
 from typing import Any
 
@@ -20,6 +21,7 @@ from robochoc.run import Options, Runtime, ScheduleName
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLargeError
+from tests.support.cases import cases
 from tests.support.examples import examples
 from tests.support.recorded_journals import record, recorded
 
@@ -94,16 +96,17 @@ def whole(events: Sequence[AnyEvent]) -> Trace:
     return Trace.of(Journal(HEADER, tuple(events), None))
 
 
-@pytest.mark.parametrize("protocol", ["abt", "afc", "adopt", "mgm", "dpop", "awc"])
-@pytest.mark.parametrize("schedule", ScheduleName)
-def test_causes_are_those_of_the_steps_one_by_one(protocol: str, schedule: ScheduleName) -> None:
-    journal = recorded(protocol, schedule=schedule)
-    trace, naive = Trace.of(journal), Naive(journal.events)
-    is_sound(trace)
-    assert causes(trace) == naive.causes
-    taken = {key_of(trace, one) for one, step in enumerate(trace.messages.taken) if step != NOT_YET}
-    assert taken == naive.taken
-    assert trace.unseen == 0
+def test_causes_are_those_of_the_steps_one_by_one() -> None:
+    with cases() as each:
+        for protocol, schedule in product(("abt", "afc", "adopt", "mgm", "dpop", "awc"), ScheduleName):
+            with each((protocol, schedule)):
+                journal = recorded(protocol, schedule=schedule)
+                trace, naive = Trace.of(journal), Naive(journal.events)
+                is_sound(trace)
+                assert causes(trace) == naive.causes
+                taken = {key_of(trace, one) for one, step in enumerate(trace.messages.taken) if step != NOT_YET}
+                assert taken == naive.taken
+                assert trace.unseen == 0
 
 
 def test_processes_too() -> None:
@@ -175,10 +178,11 @@ def _whose(event: AnyEvent) -> str:
             return str(getattr(event, "robot", ""))
 
 
-@given(st.integers(0, len(recorded("abt").events)))
+@given(st.data())
 @examples(60)
-def test_a_journal_that_ends_early_is_a_shorter_one(end: int) -> None:
-    events = recorded("abt").events[:end]
+def test_a_journal_that_ends_early_is_a_shorter_one(data: st.DataObject) -> None:
+    events = recorded("abt").events
+    events = events[: data.draw(st.integers(0, len(events)))]
     trace = whole(events)
     is_sound(trace)
     assert causes(trace) == Naive(events).causes
