@@ -15,6 +15,7 @@ from robochoc.authority.authority import Authority
 from robochoc.authority.certificates import fingerprint, new_key, signing_request
 from robochoc.authority.token import EnrolmentToken
 from robochoc.cli.group import cli
+from tests.support.cases import cases
 from tests.support.program import ROOT
 
 
@@ -125,37 +126,36 @@ def test_revoked_and_readmitted(folder: Path) -> None:
     assert states(folder) == {"A": "invited"}
 
 
-@pytest.mark.parametrize(
-    ("words", "status", "told"),
-    [
-        (["enrol"], 2, "--team"),
-        (["enrol", "A/B"], 2, "'A/B' is no robot's name"),
-        (["enrol", "A\x1b[2J"], 2, r"\x1b"),
-        (["enrol", "Good", "MASTER"], 2, "MASTER"),
-        (["enrol", "A", "--role", "master"], 2, "--role"),
-        (["enrol", "A", "--may", "fly"], 2, "--may"),
-        (["enrol", "A", "--token-ttl", "0"], 2, "--token-ttl"),
-        (["enrol", "A", "--token-ttl", "nan"], 2, "--token-ttl"),
-        (["enrol", "--team", "/no/such/folder"], 1, "does not exist"),
-        (["revoke", "Robot1.2"], 2, "did you mean 'Robot1.1'?"),
-        (["revoke", "MASTER"], 2, "cannot be revoked"),
-    ],
-)
-def test_what_cannot_be_done_is_said(folder: Path, words: list[str], status: int, told: str) -> None:
-    say(folder, "enrol", "Robot1.1")
-    result = say(folder, *words)
-    assert (result.exit_code, result.stdout) == (status, "")
-    assert told in result.stderr
-    assert "\x1b" not in result.stderr
-    assert set(states(folder)) == {"Robot1.1"}
+def test_what_cannot_be_done_is_said(folder: Path) -> None:
+    with cases() as each:
+        for words, status, told in [
+            (["enrol"], 2, "--team"),
+            (["enrol", "A/B"], 2, "'A/B' is no robot's name"),
+            (["enrol", "A\x1b[2J"], 2, r"\x1b"),
+            (["enrol", "Good", "MASTER"], 2, "MASTER"),
+            (["enrol", "A", "--role", "master"], 2, "--role"),
+            (["enrol", "A", "--may", "fly"], 2, "--may"),
+            (["enrol", "A", "--token-ttl", "0"], 2, "--token-ttl"),
+            (["enrol", "A", "--token-ttl", "nan"], 2, "--token-ttl"),
+            (["enrol", "--team", "/no/such/folder"], 1, "does not exist"),
+            (["revoke", "Robot1.2"], 2, "did you mean 'Robot1.1'?"),
+            (["revoke", "MASTER"], 2, "cannot be revoked"),
+        ]:
+            with each(words):
+                say(folder, "enrol", "Robot1.1")
+                result = say(folder, *words)
+                assert (result.exit_code, result.stdout) == (status, "")
+                assert told in result.stderr
+                assert "\x1b" not in result.stderr
+                assert set(states(folder)) == {"Robot1.1"}
 
 
-@pytest.mark.parametrize("words", [["enrol", "A"], ["list"], ["revoke", "A"]])
-def test_without_an_authority_the_next_step_is_said(tmp_path: Path, words: list[str]) -> None:
-    result = say(tmp_path / "nowhere", *words)
-    assert result.exit_code == 1
-    assert result.stderr.endswith("say: robochoc authority init\n")
-    assert not (tmp_path / "nowhere").exists()
+def test_without_an_authority_the_next_step_is_said(tmp_path: Path) -> None:
+    for words in [["enrol", "A"], ["list"], ["revoke", "A"]]:
+        result = say(tmp_path / "nowhere", *words)
+        assert result.exit_code == 1
+        assert result.stderr.endswith("say: robochoc authority init\n")
+        assert not (tmp_path / "nowhere").exists()
 
 
 def test_a_damaged_authority(folder: Path) -> None:

@@ -17,8 +17,12 @@ from robochoc.cli.group import COMMANDS, cli
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.problem import Constraint, ConstraintModel, Relation, Robot, Semantics
-from tests.support.broken import CASES
-from tests.support.broken_case import Broken
+from tests.support.broken_costs import COSTS
+from tests.support.broken_files import FILES, SCHEMA, WELL_FORMED
+from tests.support.broken_robots import CONSTRAINTS, DEFINITIONS, DOMAINS
+from tests.support.broken_scenarios import CHANGES
+from tests.support.broken_teams import MANY, NEIGHBOURS, SCENARIOS
+from tests.support.cases import cases
 from tests.support.problems import team_of
 from tests.support.program import ROOT, on_a_terminal, robochoc, robochoc_within, unmeasured
 
@@ -62,9 +66,9 @@ def test_force_does_not_replace_a_folder_that_is_no_team(tmp_path: Path) -> None
     assert (tmp_path / "home" / "thesis.tex").exists()
 
 
-@pytest.mark.parametrize("n", ["0", "65", "four", "-1"])
-def test_generate_refuses_absurd_sizes_as_wrong_usage(tmp_path: Path, n: str) -> None:
-    assert robochoc_within("generate", "queens3d", "--n", n, folder=tmp_path).returncode == 2
+def test_generate_refuses_absurd_sizes_as_wrong_usage(tmp_path: Path) -> None:
+    for n in ["0", "65", "four", "-1"]:
+        assert robochoc_within("generate", "queens3d", "--n", n, folder=tmp_path).returncode == 2
 
 
 # validate
@@ -114,19 +118,21 @@ def test_an_empty_place_says_what_to_do(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("program", [robochoc_within, pytest.param(robochoc, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("command", ["validate", "solve"])
-@pytest.mark.parametrize("case", CASES, ids=str)
 def test_broken_input_is_status_1_and_one_clear_message(
-    case: Broken, command: str, program: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
+    program: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
-    if (case.name, command) == ("a file for a folder", "validate"):
-        return  # a single robot's file may be validated
-    case.write(tmp_path)
-    done = program(command, tmp_path / case.target)
-    assert done.returncode == 1
-    told = done.stdout.splitlines()[1:] if command == "validate" else done.stderr.splitlines()
-    assert len(told) == len(case.expected(tmp_path))
-    assert done.stdout == "" or command == "validate"
+    """Try one case of each kind of input; `tests/unit/formats/test_bad_input.py` tries all."""
+    kinds = (FILES, WELL_FORMED, SCHEMA, DOMAINS, DEFINITIONS, CONSTRAINTS, COSTS, NEIGHBOURS, SCENARIOS, CHANGES, MANY)
+    with cases() as each:
+        for case, command in itertools.product([kind[-1] for kind in kinds], ["validate", "solve"]):
+            folder = tmp_path / f"{case} {command}"
+            with each((case, command)):
+                case.write(folder)
+                done = program(command, folder / case.target)
+                assert done.returncode == 1
+                told = done.stdout.splitlines()[1:] if command == "validate" else done.stderr.splitlines()
+                assert len(told) == len(case.expected(folder))
+                assert done.stdout == "" or command == "validate"
 
 
 # solve
@@ -202,37 +208,36 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     assert json.loads(done.stdout)["verdict"] == "unknown"
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--protocol", "abtt"], "no protocol 'abtt' is installed; did you mean 'abt'"),
-        (["--protocol", "qqq"], "no protocol 'qqq' is installed; 'robochoc protocols' lists them"),
-        (["--runtime", "threads"], "threads"),
-        (["--seed", "-1"], "--seed"),
-        (["--timeout", "0"], "--timeout"),
-        (["--withdraw=most"], "minimum"),
-        (["--set", "cycles"], "NAME=VALUE"),
-        (["--protocol", "abt", "--set", "cycles=5"], "no setting"),
-        (["--protocol", "dsa", "--set", "cycles=0"], "cycles"),
-        (["--protocol", "dsa", "--set", "cycles=many"], "cycles"),
-        (["--protocol", "dsa", "--set", "circles=5"], "cycles"),
-        (["--protocol", "dsa", "--withdraw"], "proves nothing"),
-        (["--protocol", "central", "--set", "cycles=5"], "--set"),
-        (["--explain", "--json"], "--explain"),
-        (["--nonsense"], "--nonsense"),
-        (["--timeout", "nan"], "--timeout"),
-        (["--html", ""], "--html"),
-        (["--html", "x", "--journal", "./x"], "are one place"),
-        ([""], "empty"),
-        (["--delay", "3"], "--runtime simulator"),
-        (["--schedule", "random"], "--runtime simulator"),
-        (["--runtime", "simulator", "--schedule", "random", "--delay", "3"], "--schedule concurrent"),
-    ],
-)
-def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> None:
-    done = robochoc_within("solve", four, *words)
-    assert done.returncode == 2
-    assert said in done.stderr
+def test_wrong_usage_is_status_2(four: Path) -> None:
+    with cases() as each:
+        for words, said in [
+            (["--protocol", "abtt"], "no protocol 'abtt' is installed; did you mean 'abt'"),
+            (["--protocol", "qqq"], "no protocol 'qqq' is installed; 'robochoc protocols' lists them"),
+            (["--runtime", "threads"], "threads"),
+            (["--seed", "-1"], "--seed"),
+            (["--timeout", "0"], "--timeout"),
+            (["--withdraw=most"], "minimum"),
+            (["--set", "cycles"], "NAME=VALUE"),
+            (["--protocol", "abt", "--set", "cycles=5"], "no setting"),
+            (["--protocol", "dsa", "--set", "cycles=0"], "cycles"),
+            (["--protocol", "dsa", "--set", "cycles=many"], "cycles"),
+            (["--protocol", "dsa", "--set", "circles=5"], "cycles"),
+            (["--protocol", "dsa", "--withdraw"], "proves nothing"),
+            (["--protocol", "central", "--set", "cycles=5"], "--set"),
+            (["--explain", "--json"], "--explain"),
+            (["--nonsense"], "--nonsense"),
+            (["--timeout", "nan"], "--timeout"),
+            (["--html", ""], "--html"),
+            (["--html", "x", "--journal", "./x"], "are one place"),
+            ([""], "empty"),
+            (["--delay", "3"], "--runtime simulator"),
+            (["--schedule", "random"], "--runtime simulator"),
+            (["--runtime", "simulator", "--schedule", "random", "--delay", "3"], "--schedule concurrent"),
+        ]:
+            with each(words):
+                done = robochoc_within("solve", four, *words)
+                assert done.returncode == 2
+                assert said in done.stderr
 
 
 def test_a_process_ends_with_the_status_of_its_command(four: Path) -> None:

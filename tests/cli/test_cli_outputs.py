@@ -13,6 +13,7 @@ import pytest
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import read_journal
+from tests.support.cases import cases
 from tests.support.journal_entries import entries_of
 from tests.support.limits import HANG_S
 from tests.support.program import PROGRAM, ROOT, robochoc_within
@@ -31,16 +32,24 @@ def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> No
     assert robochoc_within("animate", folder / "result.json", "-o", folder / "alone.html").returncode == 0
 
 
-@pytest.mark.parametrize(
-    "content", ["", "{}", "nonsense", '{"event":"Journal"}', '{"event":"Journal","team":"x"}\n{', "[" * 100_000, "\xff"]
-)
-def test_animate_refuses_what_is_neither(tmp_path: Path, content: str) -> None:
-    saved = tmp_path / "saved"
-    saved.write_text(content, encoding="latin-1")
-    done = robochoc_within("animate", saved, "-o", tmp_path / "page.html")
-    assert done.returncode == 1
-    assert len(done.stderr.splitlines()) == 1
-    assert not (tmp_path / "page.html").exists()
+def test_animate_refuses_what_is_neither(tmp_path: Path) -> None:
+    with cases() as each:
+        for content in [
+            "",
+            "{}",
+            "nonsense",
+            '{"event":"Journal"}',
+            '{"event":"Journal","team":"x"}\n{',
+            "[" * 100_000,
+            "\xff",
+        ]:
+            with each(content[:20]):
+                saved = tmp_path / "saved"
+                saved.write_text(content, encoding="latin-1")
+                done = robochoc_within("animate", saved, "-o", tmp_path / "page.html")
+                assert done.returncode == 1
+                assert len(done.stderr.splitlines()) == 1
+                assert not (tmp_path / "page.html").exists()
 
 
 def test_animate_refuses_another_team(four: Path) -> None:
@@ -57,13 +66,13 @@ def test_animate_says_what_is_missing(tmp_path: Path) -> None:
     assert robochoc_within("animate", tmp_path / "nothing").returncode == 2
 
 
-@pytest.mark.parametrize("place", ["no/such/folder/page", "queens3d-4", "queens3d-4/Robot1.1.xml/page"])
-def test_an_output_that_cannot_be_written_is_said_before_the_work(four: Path, place: str) -> None:
-    for option in ("--html", "--journal"):
-        done = robochoc_within("solve", four, option, four.parent / place)
-        assert done.returncode == 2
-        assert option in done.stderr
-        assert done.stdout == ""
+def test_an_output_that_cannot_be_written_is_said_before_the_work(four: Path) -> None:
+    for place in ["no/such/folder/page", "queens3d-4", "queens3d-4/Robot1.1.xml/page"]:
+        for option in ("--html", "--journal"):
+            done = robochoc_within("solve", four, option, four.parent / place)
+            assert done.returncode == 2
+            assert option in done.stderr
+            assert done.stdout == ""
 
 
 def test_what_goes_to_standard_output_does_not_replace_it(four: Path) -> None:

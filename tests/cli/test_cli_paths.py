@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from robochoc.system.files import AppendableFile, PendingFile, resolved, write_atomically
+from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
 RESULT = {
@@ -63,106 +64,105 @@ def test_a_result_that_no_robochoc_wrote_is_one_line(
     assert not Path("page.html").exists()
 
 
-@pytest.mark.parametrize(
-    ("words", "content"),
-    [
-        (("journal", "show", "{file}"), b'{"event":"Journal","team":"\xff","protocol":"abt","runtime":"s","seed":0}\n'),
+def test_text_that_is_not_utf_8_is_said_to_be_so(four: Path, tmp_path: Path) -> None:
+    for words, content in [
+        (
+            ("journal", "show", "{file}"),
+            b'{"event":"Journal","team":"\xff","protocol":"abt","runtime":"s","seed":0}\n',
+        ),
         (("solve", "{team}", "--runtime", "simulator", "--channel", "{file}"), b"latency_ms = 1 # \xff"),
         (("solve", "{team}", "--order", "{file}"), b"Robot1.1\xff"),
-    ],
-)
-def test_text_that_is_not_utf_8_is_said_to_be_so(
-    words: tuple[str, ...], content: bytes, four: Path, tmp_path: Path
-) -> None:
-    file = tmp_path / "file"
-    file.write_bytes(content)
-    status, said = line(*(word.format(file=file, team=four) for word in words))
-    assert status == 1
-    assert said.startswith(f"{file}: ")
-    assert "not UTF-8" in said
+    ]:
+        file = tmp_path / "file"
+        file.write_bytes(content)
+        status, said = line(*(word.format(file=file, team=four) for word in words))
+        assert status == 1
+        assert said.startswith(f"{file}: ")
+        assert "not UTF-8" in said
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("export", "{team}", "-o", "{file}"),
-        ("export", "{team}", "-o", "{file}/below"),
-        ("solve", "{team}", "--html", "{file}"),
-        ("solve", "{team}", "--journal", "{file}"),
-        ("solve", "{team}", "--ros", "mcap:{file}"),
-        ("solve", "{team}", "--ros", "rosbag:{file}"),
-        ("solve", "{team}", "--situation", "mcap:{file}"),
-        ("solve", "{team}", "--order", "{file}"),
-        ("solve", "{file}"),
-        ("compile", "{file}"),
-        ("export", "{file}"),
-        ("fly", "{file}"),
-        ("privacy", "{file}"),
-        ("replay", "{file}"),
-        ("sniff", "{file}"),
-        ("journal", "show", "{file}"),
-        ("generate", "queens3d", "--n", "4", "-o", "{file}"),
-        ("generate", "queens3d", "--n", "4", "-o", "{file}/below"),
-    ],
-)
-def test_links_in_a_circle_are_one_line(words: tuple[str, ...], circle: Path, four: Path) -> None:
-    status, said = line(*(word.format(file=circle, team=four) for word in words))
-    assert status in {1, 2}
-    assert len(said.splitlines()) == 1
-    assert str(circle) in said
-    assert "exists already" in said or "Too many levels of symbolic links" in said
-    assert circle.is_symlink()
+def test_links_in_a_circle_are_one_line(circle: Path, four: Path) -> None:
+    with cases() as each:
+        for words in [
+            ("export", "{team}", "-o", "{file}"),
+            ("export", "{team}", "-o", "{file}/below"),
+            ("solve", "{team}", "--html", "{file}"),
+            ("solve", "{team}", "--journal", "{file}"),
+            ("solve", "{team}", "--ros", "mcap:{file}"),
+            ("solve", "{team}", "--ros", "rosbag:{file}"),
+            ("solve", "{team}", "--situation", "mcap:{file}"),
+            ("solve", "{team}", "--order", "{file}"),
+            ("solve", "{file}"),
+            ("compile", "{file}"),
+            ("export", "{file}"),
+            ("fly", "{file}"),
+            ("privacy", "{file}"),
+            ("replay", "{file}"),
+            ("sniff", "{file}"),
+            ("journal", "show", "{file}"),
+            ("generate", "queens3d", "--n", "4", "-o", "{file}"),
+            ("generate", "queens3d", "--n", "4", "-o", "{file}/below"),
+        ]:
+            with each(words):
+                status, said = line(*(word.format(file=circle, team=four) for word in words))
+                assert status in {1, 2}
+                assert len(said.splitlines()) == 1
+                assert str(circle) in said
+                assert "exists already" in said or "Too many levels of symbolic links" in said
+                assert circle.is_symlink()
 
 
-@pytest.mark.parametrize(
-    "write", [resolved, PendingFile, lambda path: write_atomically(path, b""), lambda path: AppendableFile(path, b"")]
-)
-def test_what_writes_files_says_it_as_an_os_error(write: Callable[[Path], object], circle: Path) -> None:
-    with pytest.raises(OSError, match="Too many levels"):
-        write(circle)
-    assert circle.is_symlink()
+def test_what_writes_files_says_it_as_an_os_error(circle: Path) -> None:
+    for write in (
+        resolved,
+        PendingFile,
+        partial(write_atomically, content=b""),
+        partial(AppendableFile, beginning=b""),
+    ):
+        with pytest.raises(OSError, match="Too many levels"):
+            write(circle)
+        assert circle.is_symlink()
 
 
-@pytest.mark.parametrize("command", [["solve", "--runtime", "simulator"], ["compile"]])
-def test_nothing_is_done_by_half_where_a_path_is_wrong(command: list[str], four: Path, tmp_path: Path) -> None:
-    status, said = line(*command, four, tmp_path / "missing", tmp_path / "empty")
-    assert status == 1
-    assert [part.split(":")[0] for part in said.splitlines()] == [f"{tmp_path}/missing", f"{tmp_path}/empty"]
+def test_nothing_is_done_by_half_where_a_path_is_wrong(four: Path, tmp_path: Path) -> None:
+    for command in [["solve", "--runtime", "simulator"], ["compile"]]:
+        status, said = line(*command, four, tmp_path / "missing", tmp_path / "empty")
+        assert status == 1
+        assert [part.split(":")[0] for part in said.splitlines()] == [
+            f"{tmp_path}/missing",
+            f"{tmp_path}/empty",
+        ]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_a_misspelt_value_of_an_option_that_may_stand_alone(four: Path) -> None:
+    for words, said in [
         (["--withdraw", "minimal"], "'minimal' is no kind of withdrawal and no folder: minimum or maximal"),
         (["--withdraw", "maximla"], "'maximla' is no kind of withdrawal and no folder: minimum or maximal"),
         (["--spare", "two"], "'two' is no number of robots and no folder"),
         (["--sniff", "Robto1.*"], "no robot of queens3d-4 is called 'Robto1.*'"),
         (["--sniff=Robot1.1,Nobody"], "no robot of queens3d-4 is called 'Nobody'"),
-    ],
-)
-def test_a_misspelt_value_of_an_option_that_may_stand_alone(words: list[str], said: str, four: Path) -> None:
-    status, told = line("solve", four, *words)
-    assert status == 2
-    assert said in " ".join(told.split())
+    ]:
+        status, told = line("solve", four, *words)
+        assert status == 2
+        assert said in " ".join(told.split())
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("export", "{team}", "-o", "{team}/Robot1.1.xml"), "would be a file of the team"),
-        (("solve", "{team}", "--html", "{team}/page.xml"), "would be a file of the team"),
-        (("solve", "{team}", "--order", "{file}", "--journal", "{file}"), "are one place"),
-        (("animate", "{file}", "-o", "{file}"), "are one place"),
-        (("fly", "{file}", "--html", "{link}"), "are one place"),
-        (("journal", "export", "{file}", "--format", "csv", "-o", "{file}"), "are one place"),
-    ],
-)
-def test_nothing_that_is_read_is_written_over(words: tuple[str, ...], said: str, four: Path, tmp_path: Path) -> None:
+def test_nothing_that_is_read_is_written_over(four: Path, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_bytes(json.dumps(RESULT).encode())
     (tmp_path / "link").symlink_to("file")
     before = {path: path.read_bytes() for path in (file, *four.iterdir())}
-    status, told = line(*(word.format(file=file, team=four, link=tmp_path / "link") for word in words))
-    assert status == 2
-    assert said in " ".join(told.split())
-    assert {path: path.read_bytes() for path in (file, *four.iterdir())} == before
+    with cases() as each:
+        for words, said in [
+            (("export", "{team}", "-o", "{team}/Robot1.1.xml"), "would be a file of the team"),
+            (("solve", "{team}", "--html", "{team}/page.xml"), "would be a file of the team"),
+            (("solve", "{team}", "--order", "{file}", "--journal", "{file}"), "are one place"),
+            (("animate", "{file}", "-o", "{file}"), "are one place"),
+            (("fly", "{file}", "--html", "{link}"), "are one place"),
+            (("journal", "export", "{file}", "--format", "csv", "-o", "{file}"), "are one place"),
+        ]:
+            with each(words):
+                status, told = line(*(word.format(file=file, team=four, link=tmp_path / "link") for word in words))
+                assert status == 2
+                assert said in " ".join(told.split())
+                assert {path: path.read_bytes() for path in (file, *four.iterdir())} == before

@@ -202,12 +202,10 @@ def test_solve_says_in_words_which_limit_was_reached(rows: Path) -> None:
     assert robochoc_within("compile", "--local-solutions", 40, rows).returncode == 0
 
 
-@pytest.mark.parametrize(
-    "words", [["--local-solutions", 0], ["--local-timeout", 0], ["--local-timeout", "nan"], ["--local-timeout", -1]]
-)
-@pytest.mark.parametrize("command", ["compile", "solve"])
-def test_limits_that_are_none_are_wrong_usage(command: str, words: list[object]) -> None:
-    assert robochoc_within(command, *words, SMALL_QUEENS).returncode == 2
+def test_limits_that_are_none_are_wrong_usage() -> None:
+    for words in ("--local-solutions=0", "--local-timeout=0", "--local-timeout=nan", "--local-timeout=-1"):
+        for command in ("compile", "solve"):
+            assert robochoc_within(command, words, SMALL_QUEENS).returncode == 2, (command, words)
 
 
 # Verdicts
@@ -261,20 +259,16 @@ def test_rows_have_the_solutions_that_cells_have(rows: Path) -> None:
     assert not list(violations(read_team(QUEENS), answer["assignment"]))
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
+def test_what_would_be_ignored_is_wrong_usage(tmp_path: Path) -> None:
+    for words in [
         ["--protocol", "abt", "--count"],
         ["--protocol", "central", "--verify"],
         ["--protocol", "central", "--withdraw", "maximal"],
         ["--protocol", "central", "--count", "--html", "page.html"],
-    ],
-    ids=" ".join,
-)
-def test_what_would_be_ignored_is_wrong_usage(words: list[str], tmp_path: Path) -> None:
-    done = robochoc_within("solve", SMALL_QUEENS, *words, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert next(word for word in reversed(words) if word.startswith("--")) in done.stderr
+    ]:
+        done = robochoc_within("solve", SMALL_QUEENS, *words, folder=tmp_path)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert next(word for word in reversed(words) if word.startswith("--")) in done.stderr
 
 
 # Export, and what is broken

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from robochoc.cli.commands.completion import SHELLS, VARIABLE
 from robochoc.cli.group import COMMANDS, cli
 from robochoc.run.registry import protocol_names
+from tests.support.cases import cases
 
 WANTED = """
 source <("{robochoc}" completion bash)
@@ -29,31 +30,30 @@ def completions(*words: str) -> list[str]:
     return [one.value for one in ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(before, last)]
 
 
-@pytest.mark.parametrize("shell", SHELLS)
-def test_each_shell_is_given_a_script(shell: str) -> None:
-    done = CliRunner().invoke(cli, ["completion", shell])
-    assert done.exit_code == 0
-    assert VARIABLE in done.stdout
+def test_each_shell_is_given_a_script() -> None:
+    for shell in SHELLS:
+        done = CliRunner().invoke(cli, ["completion", shell])
+        assert done.exit_code == 0
+        assert VARIABLE in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("words", "found"),
-    [
-        (("so",), ["solve"]),
-        (("solve", "--proto"), ["--protocol"]),
-        (("solve", "--protocol", "AFC"), ["afc", "afc-ng", "afc-tree"]),
-        (("master", "--protocol", "dpo"), ["dpop"]),
-        (("protocols", "dpo"), ["dpop"]),
-        (("solve", "--order", "d"), ["dom-deg", "dfs"]),
-        (("solve", "--channel", "wp"), ["wpan"]),
-        (("solve", "--runtime", "si"), ["simulator"]),
-        (("solve", "--withdraw", "--runtime", "ne"), ["network"]),
-        (("solve", "--withdraw", "max"), ["maximal"]),
-        (("completion", ""), [*SHELLS]),
-    ],
-)
-def test_names_are_completed(words: tuple[str, ...], found: list[str]) -> None:
-    assert completions(*words) == found
+def test_names_are_completed() -> None:
+    with cases() as each:
+        for words, found in [
+            (("so",), ["solve"]),
+            (("solve", "--proto"), ["--protocol"]),
+            (("solve", "--protocol", "AFC"), ["afc", "afc-ng", "afc-tree"]),
+            (("master", "--protocol", "dpo"), ["dpop"]),
+            (("protocols", "dpo"), ["dpop"]),
+            (("solve", "--order", "d"), ["dom-deg", "dfs"]),
+            (("solve", "--channel", "wp"), ["wpan"]),
+            (("solve", "--runtime", "si"), ["simulator"]),
+            (("solve", "--withdraw", "--runtime", "ne"), ["network"]),
+            (("solve", "--withdraw", "max"), ["maximal"]),
+            (("completion", ""), [*SHELLS]),
+        ]:
+            with each(words):
+                assert completions(*words) == found
 
 
 def test_all_commands_and_protocols_are_completed() -> None:

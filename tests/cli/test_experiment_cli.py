@@ -8,9 +8,8 @@ import json
 import os
 import random
 import signal
-import sqlite3
 import time
-from contextlib import closing, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -24,12 +23,11 @@ from robochoc.formats import write_team
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import read_journal
+from tests.support.cases import cases
 from tests.support.faults import PROGRAM, running
 from tests.support.limits import wait_until
 from tests.support.program import robochoc_within
-from tests.support.studies import COSTS, SMALL, comparable, finished, results_of, study
-
-slow = pytest.mark.slow
+from tests.support.studies import COSTS, SMALL, RunsHere, altered, comparable, finished, results_of, study
 
 
 @pytest.fixture
@@ -37,6 +35,12 @@ def small(tmp_path: Path) -> Path:
     path = tmp_path / "small.toml"
     path.write_text(SMALL)
     return path
+
+
+@pytest.fixture
+def runs_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let this process run what workers would."""
+    monkeypatch.setattr("robochoc.experiments.runner.LocalWorkers", lambda *_: RunsHere())
 
 
 def test_run_show_and_export(small: Path) -> None:
@@ -65,34 +69,28 @@ def test_run_show_and_export(small: Path) -> None:
     assert "12 are there, 8 are to be run; about " in told
 
 
+@pytest.mark.usefixtures("runs_here")
 def test_journals_are_files_that_other_commands_read(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(f'record = "journal"\n{SMALL}')
     assert robochoc_within("experiment", "run", tmp_path / "study.toml").returncode == 0
     path = tmp_path / "study.sqlite"
-    refused = robochoc_within("experiment", "export", path, "--format", "journals")
+    export = ("experiment", "export", path, "--format", "journals")
+    refused = robochoc_within(*export)
     assert (refused.returncode, "name a folder" in refused.stderr) == (2, True)
-    done = robochoc_within("experiment", "export", path, "--format", "journals", "-o", tmp_path / "journals")
+    done = robochoc_within(*export, "-o", tmp_path / "journals")
     assert (done.returncode, "12 journals" in done.stderr) == (0, True)
     rows = {row["key"]: row for row in read(path)}
     files = list((tmp_path / "journals").iterdir())
     assert {file.name for file in files} == {f"{key}.journal" for key in rows}
     for file in files:
         assert read_journal(file.read_bytes()).header.protocol == rows[file.stem]["protocol"]
-    with closing(sqlite3.connect(path)) as database, database:
-        database.execute("UPDATE journals SET content = x'00'")
-        database.execute("UPDATE runs SET status = 'error'")
+    altered(path, "UPDATE journals SET content = x'00'", "UPDATE runs SET status = 'error'")
     assert robochoc_within("experiment", "run", tmp_path / "study.toml").returncode == 0
     assert {key for key, content in journals(path) if content != b"\0"} == set(rows)
-
-
-def test_a_journal_called_like_another_place_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(f'record = "journal"\n{SMALL}')
-    assert robochoc_within("experiment", "run", tmp_path / "study.toml").returncode == 0
-    path = tmp_path / "study.sqlite"
-    with closing(sqlite3.connect(path)) as database, database:
-        for table in ("plan", "journals"):
-            database.execute(f"UPDATE {table} SET key = '../out' WHERE key = (SELECT min(key) FROM journals)")  # noqa: S608
-    refused = robochoc_within("experiment", "export", path, "--format", "journals", "-o", tmp_path / "journals")
+    # A key that would be a path to another folder is refused.
+    for table in ("plan", "journals"):
+        altered(path, f"UPDATE {table} SET key = '../out' WHERE key = (SELECT min(key) FROM journals)")  # noqa: S608
+    refused = robochoc_within(*export, "-o", tmp_path / "other")
     assert refused.returncode == 1
     assert "../out is no key of a run" in refused.stderr
     assert not (tmp_path / "out.journal").exists()
@@ -114,6 +112,10 @@ def test_export(tmp_path: Path) -> None:
     assert r"dsa variant=A & dsa variant=B \\" in latex
     refused = robochoc_within("experiment", "export", path, "--format", "parquet")
     assert (refused.returncode, "name a file with -o" in refused.stderr) == (2, True)
+    parquet = pytest.importorskip("pyarrow.parquet")
+    assert robochoc_within("experiment", "export", path, "-o", tmp_path / "costs.parquet").returncode == 0
+    table = parquet.read_table(tmp_path / "costs.parquet").to_pylist()
+    assert [row["messages"] for row in table] == [row["messages"] for row in rows]
 
 
 def test_a_report_in_markdown(tmp_path: Path) -> None:
@@ -140,8 +142,7 @@ def test_ways_to_run_have_the_same_names_in_all_tables(tmp_path: Path) -> None:
 
 def test_a_dry_run_knows_runs_that_another_plan_has_made(small: Path) -> None:
     finished(SMALL, small.with_suffix(".sqlite"))
-    with closing(sqlite3.connect(small.with_suffix(".sqlite"))) as database, database:
-        database.execute("DELETE FROM plan")
+    altered(small.with_suffix(".sqlite"), "DELETE FROM plan")
     planned = robochoc_within("experiment", "run", small, "--dry-run").stdout
     assert "12 are there, 0 are to be run" in planned
 
@@ -152,13 +153,13 @@ def test_what_a_file_says_does_not_reach_the_terminal_as_it_is(tmp_path: Path) -
     refused = robochoc_within("experiment", "run", path)
     assert (refused.returncode, "without control characters" in refused.stderr) == (1, True)
     path.write_text(SMALL)
-    assert robochoc_within("experiment", "run", path).returncode == 0
     results = path.with_suffix(".sqlite")
-    with closing(sqlite3.connect(results)) as database, database:
-        database.execute(
-            "UPDATE plan SET label = char(27) || '[2J' || label, parameters = '{\"tightness\": \"\\u001b[3J\"}'"
-        )
-        database.execute("UPDATE study SET title = char(27) || '[2J' || title, stopped = char(27) || '[2J'")
+    finished(SMALL, results)
+    altered(
+        results,
+        "UPDATE plan SET label = char(27) || '[2J' || label, parameters = '{\"tightness\": \"\\u001b[3J\"}'",
+        "UPDATE study SET title = char(27) || '[2J' || title, stopped = char(27) || '[2J'",
+    )
     told = [robochoc_within("experiment", "show", results)]
     told.append(robochoc_within("experiment", "export", results, "--format", "latex"))
     assert [done.returncode for done in told] == [0, 0]
@@ -184,25 +185,24 @@ STRANGE = {
 }
 
 
-@pytest.mark.parametrize("name", STRANGE)
-def test_strange_content_is_a_message(name: str, small: Path) -> None:
-    path = small.with_suffix(".sqlite")
-    finished(SMALL, path)
-    with closing(sqlite3.connect(path)) as database, database:
-        database.executescript(STRANGE[name])
-    for words in (["show"], ["export"], ["export", "--format", "latex"]):
-        done = robochoc_within("experiment", *words, path)
-        assert (done.returncode, "holds no results of a study" in done.stderr) == (1, True), done.stderr
+def test_strange_content_is_a_message(small: Path) -> None:
+    with cases() as each:
+        for name, change in STRANGE.items():
+            with each(name):
+                path = small.with_suffix(".sqlite")
+                finished(SMALL, path)
+                altered(path, change)
+                for words in (["show"], ["export"], ["export", "--format", "latex"]):
+                    done = robochoc_within("experiment", *words, path)
+                    assert (done.returncode, "holds no results of a study" in done.stderr) == (1, True), done.stderr
 
 
+@pytest.mark.usefixtures("runs_here")
 def test_what_has_failed_can_be_run_again(small: Path) -> None:
     path = small.with_suffix(".sqlite")
     whole = finished(SMALL, path)
-    with closing(sqlite3.connect(path)) as database, database:
-        for status, first in (("invalid", 0), ("crashed", 1), ("refused", 2), ("memory", 3)):
-            database.execute(
-                "UPDATE runs SET status = ?, messages = 1 WHERE key = ?", (status, whole.rows[first]["key"])
-            )
+    for status, row in zip(("invalid", "crashed", "refused", "memory"), whole.rows, strict=False):
+        altered(path, f"UPDATE runs SET status = '{status}', messages = 1 WHERE key = '{row['key']}'")  # noqa: S608
     planned = robochoc_within("experiment", "run", small, "--dry-run")
     assert "10 are there, 2 are to be run" in planned.stdout
     assert robochoc_within("experiment", "run", small).returncode == 0
@@ -222,36 +222,32 @@ def test_results_that_are_removed_meanwhile_are_missed(small: Path) -> None:
             store.check_place()
 
 
-def test_parquet(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    finished(COSTS, tmp_path / "costs.sqlite")
-    done = robochoc_within("experiment", "export", tmp_path / "costs.sqlite", "-o", tmp_path / "costs.parquet")
-    assert done.returncode == 0
-    table = parquet.read_table(tmp_path / "costs.parquet").to_pylist()
-    assert [row["messages"] for row in table] == [row["messages"] for row in read(tmp_path / "costs.sqlite")]
-
-
-@pytest.mark.parametrize(
-    ("words", "status", "said"),
-    [
-        (["run", "nothing.toml"], 1, "nothing.toml: cannot be read"),
-        (["show", "nothing.sqlite"], 1, "is no file (name the file that 'robochoc experiment run' writes)"),
-        (["show", "{}", "--over", "tight"], 2, "there is no parameter 'tight'; there are agents,"),
-        (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
-        (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),
-        (["report", "{}", "-o", "figures.pdf"], 2, "figures in SVG and PDF go to a folder, whose name has no ending"),
-        (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
-        (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "there is no folder /nothing"),
-    ],
-)
-def test_mistakes_are_told(words: list[str], status: int, said: str, tmp_path: Path) -> None:
-    if "report" in words:
-        pytest.importorskip("matplotlib")
-    finished(SMALL, tmp_path / "s.sqlite")
-    done = robochoc_within("experiment", *(word.format(tmp_path / "s.sqlite") for word in words), folder=tmp_path)
-    assert done.returncode == status
-    assert said in done.stderr
-    assert not (tmp_path / "page.html").exists()
+def test_mistakes_are_told(tmp_path: Path) -> None:
+    with cases() as each:
+        for words, status, said in [
+            (["run", "nothing.toml"], 1, "nothing.toml: cannot be read"),
+            (["show", "nothing.sqlite"], 1, "is no file (name the file that 'robochoc experiment run' writes)"),
+            (["show", "{}", "--over", "tight"], 2, "there is no parameter 'tight'; there are agents,"),
+            (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
+            (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),
+            (
+                ["report", "{}", "-o", "figures.pdf"],
+                2,
+                "figures in SVG and PDF go to a folder, whose name has no ending",
+            ),
+            (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
+            (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "there is no folder /nothing"),
+        ]:
+            with each(words):
+                if "report" in words:
+                    pytest.importorskip("matplotlib")
+                finished(SMALL, tmp_path / "s.sqlite")
+                done = robochoc_within(
+                    "experiment", *(word.format(tmp_path / "s.sqlite") for word in words), folder=tmp_path
+                )
+                assert done.returncode == status
+                assert said in done.stderr
+                assert not (tmp_path / "page.html").exists()
 
 
 def test_a_contradiction_ends_with_status_4(small: Path) -> None:
@@ -270,23 +266,17 @@ def test_a_contradiction_ends_with_status_4(small: Path) -> None:
     assert "contradict each other" in shown.stdout
 
 
+@pytest.mark.usefixtures("runs_here")
 def test_compare_a_family_and_folders(tmp_path: Path) -> None:
-    words = [
-        "random",
-        "agents=6",
-        "domain=3",
-        "density=0.5",
-        "tightness=0.2,0.5",
-        "seed=1..3",
-        "--protocols",
-        "abt,AFC-ng",
-    ]
-    done = robochoc_within("compare", *words, "--save", tmp_path / "kept.sqlite")
+    words = "random agents=6 domain=3 density=0.5 tightness=0.2,0.5 seed=1..3 --protocols abt,AFC-ng"
+    done = robochoc_within("compare", *words.split(), "--save", tmp_path / "kept.sqlite")
     assert done.returncode == 0, done.stderr
     assert "messages, median\ntightness" in done.stdout
-    assert _counts(tmp_path / "kept.sqlite") == [
-        (row["label"], row["messages"], row["ncccs"]) for row in finished(SMALL).rows
-    ]
+    found, expected = (
+        [(row["label"], row["messages"], row["ncccs"]) for row in rows]
+        for rows in (read(tmp_path / "kept.sqlite"), finished(SMALL).rows)
+    )
+    assert found == expected
     for size in (2, 3):
         write_team(queens3d(size), tmp_path / f"queens-{size}")
     done = robochoc_within("compare", "queens-2", "queens-3", "--protocols", "abt,afc-ng", folder=tmp_path)
@@ -295,25 +285,21 @@ def test_compare_a_family_and_folders(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("compare*"))
 
 
-def _counts(path: Path) -> list[tuple[str, int, int]]:
-    return [(row["label"], row["messages"], row["ncccs"]) for row in read(path)]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_what_compare_cannot_take_is_wrong_usage() -> None:
+    for words, said in [
         ("random --protocols ,", "--protocols names no protocol"),
         ("rando --protocols abt", "did you mean 'random'?"),
         ("random agents --protocols abt", "random takes NAME=VALUE, not 'agents'"),
         ("random agents=3 --protocols abt --set x", "--set takes NAME=VALUE"),
-    ],
+    ]:
+        done = robochoc_within("compare", *words.split())
+        assert (done.returncode, said in done.stderr) == (2, True), done.stderr
+
+
+@pytest.mark.parametrize(
+    "strikes",
+    [pytest.param(3, id="three", marks=pytest.mark.more), pytest.param(50, id="fifty", marks=pytest.mark.slow)],
 )
-def test_what_compare_cannot_take_is_wrong_usage(words: str, said: str) -> None:
-    done = robochoc_within("compare", *words.split())
-    assert (done.returncode, said in done.stderr) == (2, True), done.stderr
-
-
-@pytest.mark.parametrize("strikes", [pytest.param(3, id="three"), pytest.param(50, id="fifty", marks=slow)])
 def test_whoever_is_killed_nothing_is_lost_and_nothing_is_there_twice(strikes: int, tmp_path: Path) -> None:
     """The runner, or one of its workers, or both at once, at random moments; SIGINT and SIGTERM, too."""
     text = SMALL.replace("1..3", "1..20")
@@ -344,6 +330,7 @@ def _strike(pid: int, signum: signal.Signals) -> None:
         os.kill(pid, signum)
 
 
+@pytest.mark.more
 def test_workers_end_with_their_runner(tmp_path: Path) -> None:
     """A worker that is at a long run does not outlive the runner, and leaves nothing."""
     (tmp_path / "study.toml").write_text(_LONG)

@@ -18,6 +18,7 @@ from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from tests.support.cases import cases
 from tests.support.program import ROOT, robochoc_within
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
@@ -248,47 +249,50 @@ def test_the_page_and_names_that_are_hostile(tmp_path: Path) -> None:
 # What is refused
 
 
-@pytest.mark.parametrize(
-    ("words", "status", "why"),
-    [
-        (
-            ("--distance", 9),
-            1,
-            "the homes of V1.1 and V1.2 are 1.00 m apart, and 9 m are to be kept: ask for a smaller",
-        ),
-        (
-            ("--distance", 1),
-            1,
-            "are 1.00 m apart, and 1 m are to be kept, which takes 1.1 m: ask for a smaller distance",
-        ),
-        (("--scale", 1e-6), 1, "the homes of V1.1 and V1.2 are 1e-06 m apart, and 0.01 m are to be kept: ask for a l"),
-        (("--scale", 1e9), 2, "--scale"),
-        (("--scale", 1e5), 1, "m is the most: ask for a smaller scale"),
-        (("--scale", 1e5), 1, "V1.2 would have 200,000 m to fly, and 2,000 m is the most: ask for a smaller scale"),
-        (("--distance", 1e-9), 2, "positive number of metres, 0.01 at least"),
-        (("--distance", "nan"), 2, "nan"),
-        (("--downwash", 2, "--fail", "V1.1"), 2, "with downwash neither motors can fail"),
-        (("--downwash", 1000), 2, "downwash has to be a number from 1 to 100"),
-        (("--wind", 500), 2, "faster than 200 m/s"),
-        (("--gusts", 1e9), 2, "gusts have to be"),
-        (("--fail", "nobody"), 2, "there is no drone 'nobody' that could fail, but V1.1, V1.2"),
-        (("--fail", "V1.1@-1"), 2, "is not ROBOT or ROBOT@SECONDS"),
-        (("--ros", "mcap:run.mcap"), 2, "give their folder with --team"),
-        (("--team", HANGAR), 1, "this is not the team of"),
-    ],
-)
-def test_what_cannot_be_flown_is_one_clear_line(two: Path, words: tuple[object, ...], status: int, why: str) -> None:
-    result = ran("fly", two, *words)
-    assert (result.exit_code, result.stdout) == (status, "")
-    assert why in result.stderr.splitlines()[-1]
+def test_what_cannot_be_flown_is_one_clear_line(two: Path) -> None:
+    with cases() as each:
+        for words, status, why in [
+            (
+                ("--distance", 9),
+                1,
+                "the homes of V1.1 and V1.2 are 1.00 m apart, and 9 m are to be kept: ask for a smaller",
+            ),
+            (
+                ("--distance", 1),
+                1,
+                "are 1.00 m apart, and 1 m are to be kept, which takes 1.1 m: ask for a smaller distance",
+            ),
+            (
+                ("--scale", 1e-6),
+                1,
+                "the homes of V1.1 and V1.2 are 1e-06 m apart, and 0.01 m are to be kept: ask for a l",
+            ),
+            (("--scale", 1e9), 2, "--scale"),
+            (("--scale", 1e5), 1, "m is the most: ask for a smaller scale"),
+            (("--scale", 1e5), 1, "V1.2 would have 200,000 m to fly, and 2,000 m is the most: ask for a smaller scale"),
+            (("--distance", 1e-9), 2, "positive number of metres, 0.01 at least"),
+            (("--distance", "nan"), 2, "nan"),
+            (("--downwash", 2, "--fail", "V1.1"), 2, "with downwash neither motors can fail"),
+            (("--downwash", 1000), 2, "downwash has to be a number from 1 to 100"),
+            (("--wind", 500), 2, "faster than 200 m/s"),
+            (("--gusts", 1e9), 2, "gusts have to be"),
+            (("--fail", "nobody"), 2, "there is no drone 'nobody' that could fail, but V1.1, V1.2"),
+            (("--fail", "V1.1@-1"), 2, "is not ROBOT or ROBOT@SECONDS"),
+            (("--ros", "mcap:run.mcap"), 2, "give their folder with --team"),
+            (("--team", HANGAR), 1, "this is not the team of"),
+        ]:
+            with each(words):
+                result = ran("fly", two, *words)
+                assert (result.exit_code, result.stdout) == (status, "")
+                assert why in result.stderr.splitlines()[-1]
 
 
-@pytest.mark.parametrize("far", [10**6, 10**18, 10**400])
-def test_vast_numbers_are_told_soon(far: int, tmp_path: Path) -> None:
-    result = ran("fly", saved(tmp_path, {"V1.1": 1, "V1.2": far}))
-    assert result.exit_code == 1
-    assert "the homes of V1.1 and V1.2 are" in result.stderr
-    assert "ask for a larger scale" in result.stderr
+def test_vast_numbers_are_told_soon(tmp_path: Path) -> None:
+    for far in [10**6, 10**18, 10**400]:
+        result = ran("fly", saved(tmp_path, {"V1.1": 1, "V1.2": far}))
+        assert result.exit_code == 1
+        assert "the homes of V1.1 and V1.2 are" in result.stderr
+        assert "ask for a larger scale" in result.stderr
 
 
 def test_too_many_drones_are_told_soon(tmp_path: Path) -> None:

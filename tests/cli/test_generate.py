@@ -32,6 +32,7 @@ from robochoc.generators.tracking import tracking
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team
+from tests.support.cases import cases
 from tests.support.evaluation import best
 from tests.support.program import ROOT, robochoc_within
 
@@ -81,57 +82,64 @@ def test_very_many_robots_are_not_proposed_as_processes() -> None:
     assert next_step("out", 1001) == "next: robochoc solve out --runtime simulator"
 
 
-@pytest.mark.parametrize("words", FAMILIES)
 @pytest.mark.usefixtures("in_a_folder")
-def test_a_family_is_written_under_its_name(words: str, tmp_path: Path) -> None:
+def test_a_family_is_written_under_its_name(tmp_path: Path) -> None:
     """The files mean the same: definitions may have got names of their own."""
-    team = FAMILIES[words]()
-    done = robochoc_within("generate", *words.split())
-    assert (done.returncode, done.stderr) == (0, "")
-    folder = Path("instances") / team.name
-    assert f"; next: robochoc solve {folder}\n" in done.stdout
-    read = read_team(tmp_path / folder)
-    assert set(read.order) == set(team.order)
-    assert read.variables.keys() == team.variables.keys()
-    assert best(read) == best(team)
+    with cases() as each:
+        for words, made in FAMILIES.items():
+            with each(words):
+                team = made()
+                done = robochoc_within("generate", *words.split())
+                assert (done.returncode, done.stderr) == (0, "")
+                folder = Path("instances") / team.name
+                assert f"; next: robochoc solve {folder}\n" in done.stdout
+                read = read_team(tmp_path / folder)
+                assert set(read.order) == set(team.order)
+                assert read.variables.keys() == team.variables.keys()
+                assert best(read) == best(team)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("random --domain 3 --tightness 0.2", "--agents is missing"),
-        ("random --domain 3 --tightness 0.2 --agents 3", "--density is missing"),
-        ("random --domain 3 --tightness 0.2 --agents 3 --graph tre", "did you mean 'tree'?"),
-        ("random --domain 3 --tightness 0.2 --agents 3 --graph tree --density 0.2", "--density is for --graph random"),
-        ("random --domain 3 --tightness 0.2 --agents 3 --graph tree --links 2", "--links is for --graph scale-free"),
-        (
-            "random --domain 3 --tightness 0.2 --agents 3 --graph tree --connected",
-            "--connected is for --graph random or",
-        ),
-        ("random --domain 3 --tightness 0.2 --agents 7 --graph grid --rows 2", "7 robots do not fill 2 rows"),
-        ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --places 2", "give --max-cost, too"),
-        ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --maximize", "give --max-cost, too"),
-        ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --asymmetric", "give --max-cost, too"),
-        ("random --domain 3 --tightness 2 --agents 5 --graph tree", "tightness is 2.0"),
-        ("coloring --agents 5 --graph small-world --neighbours 3", "must be even"),
-        ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),
-        ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
-        ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
-        (f"formation --map {BUILDING}", "agents is missing, as at names no places"),
-        (
-            f"formation --map {BUILDING} --agents 2 --anchor 80,2.5",
-            "the anchor 80,2.5 is not on the map, which lies between -0.25,-0.25 and 10.25,6.25",
-        ),
-        (f"formation --map {HOUSE} --at 4.8,1", "at has '4.8,1'; expected X,Y,Z on a three-dimensional map"),
-        (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 stands where it does not fit"),
-    ],
-)
 @pytest.mark.usefixtures("in_a_folder")
-def test_what_does_not_fit_is_wrong_usage(words: str, said: str, tmp_path: Path) -> None:
-    done = robochoc_within("generate", *words.split())
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert not list(tmp_path.iterdir())
+def test_what_does_not_fit_is_wrong_usage(tmp_path: Path) -> None:
+    with cases() as each:
+        for words, said in [
+            ("random --domain 3 --tightness 0.2", "--agents is missing"),
+            ("random --domain 3 --tightness 0.2 --agents 3", "--density is missing"),
+            ("random --domain 3 --tightness 0.2 --agents 3 --graph tre", "did you mean 'tree'?"),
+            (
+                "random --domain 3 --tightness 0.2 --agents 3 --graph tree --density 0.2",
+                "--density is for --graph random",
+            ),
+            (
+                "random --domain 3 --tightness 0.2 --agents 3 --graph tree --links 2",
+                "--links is for --graph scale-free",
+            ),
+            (
+                "random --domain 3 --tightness 0.2 --agents 3 --graph tree --connected",
+                "--connected is for --graph random or",
+            ),
+            ("random --domain 3 --tightness 0.2 --agents 7 --graph grid --rows 2", "7 robots do not fill 2 rows"),
+            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --places 2", "give --max-cost, too"),
+            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --maximize", "give --max-cost, too"),
+            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --asymmetric", "give --max-cost, too"),
+            ("random --domain 3 --tightness 2 --agents 5 --graph tree", "tightness is 2.0"),
+            ("coloring --agents 5 --graph small-world --neighbours 3", "must be even"),
+            ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),
+            ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
+            ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
+            (f"formation --map {BUILDING}", "agents is missing, as at names no places"),
+            (
+                f"formation --map {BUILDING} --agents 2 --anchor 80,2.5",
+                "the anchor 80,2.5 is not on the map, which lies between -0.25,-0.25 and 10.25,6.25",
+            ),
+            (f"formation --map {HOUSE} --at 4.8,1", "at has '4.8,1'; expected X,Y,Z on a three-dimensional map"),
+            (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 stands where it does not fit"),
+        ]:
+            with each(words):
+                done = robochoc_within("generate", *words.split())
+                assert done.returncode == 2
+                assert said in done.stderr
+                assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.usefixtures("in_a_folder")

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
-import pytest
 from click.testing import CliRunner
 
 from robochoc import load
 from robochoc.cli.group import COMMANDS, cli
 from robochoc.cli.options.sections import COMMON, REST, SectionedCommand
 from robochoc.run.registry import installed_spelling
+from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
 MANY = 12
@@ -39,23 +39,26 @@ def options_of(command: click.Command) -> list[click.Option]:
     return [one for one in command.get_params(click.Context(command)) if isinstance(one, click.Option)]
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_every_command_has_help_without_an_option_that_is_not_explained(name: str) -> None:
-    done = CliRunner().invoke(cli, [*name.split(), "--help"])
-    assert done.exit_code == 0
-    assert REST not in done.stdout
-    assert [one.opts for one in options_of(ALL[name]) if not one.help] == []
+def test_every_command_has_help_without_an_option_that_is_not_explained() -> None:
+    with cases() as each:
+        for name, command in ALL.items():
+            with each(name):
+                done = CliRunner().invoke(cli, [*name.split(), "--help"])
+                assert done.exit_code == 0
+                assert REST not in done.stdout
+                assert [one.opts for one in options_of(command) if not one.help] == []
 
 
-@pytest.mark.parametrize("name", SECTIONED)
-def test_every_option_is_in_one_section(name: str) -> None:
-    command = SECTIONED[name]
-    named = Counter(spelling for spellings in command.sections.values() for spelling in spellings)
-    there = options_of(command)
-    spelt = {spelling for one in there for spelling in one.opts}
-    assert set(named) <= spelt | {"--help"}
-    assert [one.opts for one in there if sum(named[spelling] for spelling in one.opts) != 1] == []
-    assert next(iter(command.sections)) == COMMON
+def test_every_option_is_in_one_section() -> None:
+    with cases() as each:
+        for name, command in SECTIONED.items():
+            with each(name):
+                named = Counter(spelling for spellings in command.sections.values() for spelling in spellings)
+                there = options_of(command)
+                spelt = {spelling for one in there for spelling in one.opts}
+                assert set(named) <= spelt | {"--help"}
+                assert [one.opts for one in there if sum(named[spelling] for spelling in one.opts) != 1] == []
+                assert next(iter(command.sections)) == COMMON
 
 
 def test_commands_with_many_options_have_sections() -> None:
@@ -76,22 +79,22 @@ def test_help_on_robochoc_names_every_command() -> None:
     assert all(f"\n  {name} " in words for name in COMMANDS)
 
 
-@pytest.mark.parametrize(("typed", "name"), [("ABT", "abt"), ("AFC-ng", "afc-ng"), ("Central", "central"), ("?", "?")])
-def test_a_protocol_is_known_in_any_case(typed: str, name: str, four: Path) -> None:
-    assert installed_spelling(typed) == name
-    done = robochoc_within("solve", str(four), "--runtime", "simulator", "--protocol", typed)
-    assert done.returncode == (2 if name == "?" else 0)
-    assert name in (done.stderr if name == "?" else done.stdout)
+def test_a_protocol_is_known_in_any_case(four: Path) -> None:
+    for typed, name in [("ABT", "abt"), ("AFC-ng", "afc-ng"), ("Central", "central"), ("?", "?")]:
+        assert installed_spelling(typed) == name
+        done = robochoc_within("solve", str(four), "--runtime", "simulator", "--protocol", typed)
+        assert done.returncode == (2 if name == "?" else 0)
+        assert name in (done.stderr if name == "?" else done.stdout)
 
 
 def test_a_protocol_is_known_in_any_case_from_python(four: Path) -> None:
     assert load(four).solve("DisFC", "simulator").protocol == "disfc"
 
 
-@pytest.mark.parametrize("word", ["minimum", "fewest", "", "Fewest"])
-def test_the_minimum_withdrawal_has_its_former_name_too(word: str, four: Path) -> None:
-    option = f"--withdraw={word}" if word else "--withdraw"
-    done = robochoc_within("solve", str(four), "--runtime", "simulator", option)
-    assert done.returncode == (2 if word == "Fewest" else 0)
-    if word == "Fewest":
-        assert "minimum" in done.stderr
+def test_the_minimum_withdrawal_has_its_former_name_too(four: Path) -> None:
+    for word in ["minimum", "fewest", "", "Fewest"]:
+        option = f"--withdraw={word}" if word else "--withdraw"
+        done = robochoc_within("solve", str(four), "--runtime", "simulator", option)
+        assert done.returncode == (2 if word == "Fewest" else 0)
+        if word == "Fewest":
+            assert "minimum" in done.stderr

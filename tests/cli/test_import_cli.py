@@ -11,6 +11,7 @@ from robochoc import load
 from robochoc.cli.options.problems import READ, WRITTEN
 from robochoc.formats import InvalidInputError, read_team
 from robochoc.formats.dialects.registry import NAMES
+from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
 FRODO = """<instance><presentation name="p" format="XCSP 2.1_FRODO" maximize="{maximize}"/>
@@ -207,26 +208,25 @@ def test_epochs_of_an_imported_scenario_have_original_names(tmp_path: Path) -> N
     assert "name it with the file of the variables" in robochoc_within("solve", files[1]).stderr
 
 
-@pytest.mark.parametrize("command", ["solve", "validate", "export", "import"])
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (PYDCOP.encode("utf-16"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
-        (PYDCOP.encode("utf-16-le"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
-        (PYDCOP.replace("pairs", "p\xe4rs").encode("latin-1"), "{file}: is not UTF-8 (save it in UTF-8)"),
-        (PYDCOP.replace("min", "Minimise").encode(), "{file}:2: has the objective 'Minimise' (write objective: min)"),
-        (b"print()\n", "{file}: is of no format that is read here ("),
-    ],
-    ids=["utf-16", "utf-16-le", "latin-1", "objective", "none"],
-)
-def test_a_file_that_cannot_be_read_is_told_in_one_line(
-    content: bytes, message: str, command: str, tmp_path: Path
-) -> None:
-    file = tmp_path / ("program.py" if content.startswith(b"print") else "pairs.yaml")
-    file.write_bytes(content)
-    done = robochoc_within(command, file, *(("-o", tmp_path / "team") if command == "import" else ()))
-    assert done.returncode == 1
-    assert message.format(file=file) in done.stdout + done.stderr
+def test_a_file_that_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
+    with cases() as each:
+        for command in ["solve", "validate", "export", "import"]:
+            for content, message in [
+                (PYDCOP.encode("utf-16"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
+                (PYDCOP.encode("utf-16-le"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
+                (PYDCOP.replace("pairs", "p\xe4rs").encode("latin-1"), "{file}: is not UTF-8 (save it in UTF-8)"),
+                (
+                    PYDCOP.replace("min", "Minimise").encode(),
+                    "{file}:2: has the objective 'Minimise' (write objective: min)",
+                ),
+                (b"print()\n", "{file}: is of no format that is read here ("),
+            ]:
+                with each((command, message)):
+                    file = tmp_path / ("program.py" if content.startswith(b"print") else "pairs.yaml")
+                    file.write_bytes(content)
+                    done = robochoc_within(command, file, *(("-o", tmp_path / "team") if command == "import" else ()))
+                    assert done.returncode == 1
+                    assert message.format(file=file) in done.stdout + done.stderr
 
 
 NETWORK = """{"problem": {"name": "b", "mustbe": "<8.0"}, "variables": {"x": 2, "y": 2, "z": 2}, "functions": {

@@ -25,6 +25,7 @@ from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.patterns import matching, patterns_in
 from robochoc.sniffer.trace import Trace
+from tests.support.cases import cases
 from tests.support.recorded_journals import recorded
 
 NAME = "R;#1\nend"
@@ -269,21 +270,20 @@ def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: p
     assert "too many for one page: at most 10 (look at them" in result.output
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--types", "Okay"), "no type of message is called 'Okay'; there are AddLink, Nogood, Ok"),
-        (("--robots", "Robot1.1,X*"), "no robot is called 'X*'; there are Robot1.1, "),
-        (("--conversation", "2"), "there is no conversation 2, only 1 to 1"),
-        (("--from", "-1"), "'-1' is no whole number of at least 0"),
-        (("--from", "5", "--to", "3"), "there is no message from 5 to 3, only 0 to "),
-        (("--from", "999999"), "there is no message from 999999 on, only 0 to "),
-    ],
-)
-def test_a_choice_that_fits_nothing_is_told(file: Path, arguments: tuple[str, ...], words: str) -> None:
-    result = journal("export", file, "--format", "csv", *arguments)
-    assert result.exit_code == USAGE
-    assert words in result.output
+def test_a_choice_that_fits_nothing_is_told(file: Path) -> None:
+    with cases() as each:
+        for arguments, words in [
+            (("--types", "Okay"), "no type of message is called 'Okay'; there are AddLink, Nogood, Ok"),
+            (("--robots", "Robot1.1,X*"), "no robot is called 'X*'; there are Robot1.1, "),
+            (("--conversation", "2"), "there is no conversation 2, only 1 to 1"),
+            (("--from", "-1"), "'-1' is no whole number of at least 0"),
+            (("--from", "5", "--to", "3"), "there is no message from 5 to 3, only 0 to "),
+            (("--from", "999999"), "there is no message from 999999 on, only 0 to "),
+        ]:
+            with each(arguments):
+                result = journal("export", file, "--format", "csv", *arguments)
+                assert result.exit_code == USAGE
+                assert words in result.output
 
 
 def test_an_export_that_finds_no_room_says_which(file: Path) -> None:

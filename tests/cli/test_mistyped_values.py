@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
@@ -11,17 +10,14 @@ from tests.support.program import ROOT
 HANGAR = str(ROOT / "docs" / "examples" / "hangar")
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
+def test_a_mistyped_value_is_told() -> None:
+    for words, told in [
         (("--situation", "flight", "--wind", "strong"), "'strong' is no speed such as 3, nor three numbers"),
         (("--situation", "flite"), "rospy; did you mean 'flight'?"),
         (("--seed", "x"), "'x' is no whole number of at least 0"),
         (("--message-loss", "3"), "'3' is no number from 0 to 0.9"),
         (("--deadline", "0"), "'0' is no number greater than 0"),
-    ],
-)
-def test_a_mistyped_value_is_told(words: tuple[str, ...], told: str) -> None:
-    done = CliRunner().invoke(cli, ["solve", HANGAR, *words])
-    assert done.exit_code == 2
-    assert told in " ".join(done.stderr.split())
+    ]:
+        done = CliRunner().invoke(cli, ["solve", HANGAR, *words])
+        assert done.exit_code == 2
+        assert told in " ".join(done.stderr.split())

@@ -49,27 +49,22 @@ def test_solve_in_the_order_of_a_file(four: Path) -> None:
     assert lines[-1]["outcome"]["witness"] == "Robot4.4"
 
 
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [
+def test_every_mistake_of_an_order_file_is_told_with_its_line(tmp_path: Path) -> None:
+    for content, told in [
         ("RA\nRB\n", [(2, "1 robot is missing: RC")]),
         ("", [(1, "3 robots are missing: RA RB RC")]),
         ("RA\n\nRX # who\nRC\nRB\n", [(3, "'RX' is no robot of random")]),
         ("RC\nRB\nRA\nRB\n", [(4, "'RB' stands here again")]),
         ("RC\nRC\nRX\nRA RB\n", [(2, "again"), (3, "'RX'"), (4, "'RA RB'"), (4, "2 robots are missing: RA RB")]),
-    ],
-)
-def test_every_mistake_of_an_order_file_is_told_with_its_line(
-    tmp_path: Path, content: str, told: list[tuple[int, str]]
-) -> None:
-    listed = tmp_path / "order.txt"
-    listed.write_text(content)
-    with pytest.raises(InvalidInputError) as caught:
-        read_order(listed, graph_team(["AB", "BC"]))
-    found = caught.value.diagnostics
-    assert [one.line for one in found] == [line for line, _ in told]
-    assert all(words in one.message for one, (_, words) in zip(found, told, strict=True))
-    assert all(one.file == str(listed) and one.hint for one in found)
+    ]:
+        listed = tmp_path / "order.txt"
+        listed.write_text(content)
+        with pytest.raises(InvalidInputError) as caught:
+            read_order(listed, graph_team(["AB", "BC"]))
+        found = caught.value.diagnostics
+        assert [one.line for one in found] == [line for line, _ in told]
+        assert all(words in one.message for one, (_, words) in zip(found, told, strict=True))
+        assert all(one.file == str(listed) and one.hint for one in found)
 
 
 def test_a_wrong_order_file_is_invalid_input(four: Path) -> None:
@@ -93,19 +88,16 @@ def test_what_is_no_text_is_no_order(tmp_path: Path, content: bytes | None, said
         read_order(listed, graph_team(["AB"]))
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_wrong_orders_are_wrong_usage(four: Path) -> None:
+    for words, said in [
         (["--order", "max-degre"], "did you mean 'max-degree'"),
         (["--order", "no/such/file"], "no order and no file"),
         (["--order", ""], "no order"),
         (["--order", "dfs", "--protocol", "central"], "--protocol central"),
-    ],
-)
-def test_wrong_orders_are_wrong_usage(four: Path, words: list[str], said: str) -> None:
-    done = robochoc_within("solve", four, *words)
-    assert done.returncode == 2
-    assert said in done.stderr
+    ]:
+        done = robochoc_within("solve", four, *words)
+        assert done.returncode == 2
+        assert said in done.stderr
 
 
 def test_links_that_cannot_be_turned_are_said_in_one_sentence(tmp_path: Path) -> None:

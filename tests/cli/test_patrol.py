@@ -11,6 +11,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import least_cost
+from tests.support.cases import cases
 from tests.support.program import ROOT
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
@@ -29,13 +30,15 @@ WITHOUT_ANSWER = {"async-maxsum", "bounded-maxsum"}
 """Their robots have no cycles of which the best is taken, and their last values break something hard here."""
 
 
-@pytest.mark.parametrize("protocol", MINIMISING)
-def test_every_protocol_that_minimises_comes_to_the_tutorials_answer(protocol: str) -> None:
-    outcome = solve(read_team(PATROL), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
-    if protocol in WITHOUT_ANSWER:
-        assert (outcome.verdict, outcome.assignment) == (Verdict.UNKNOWN, {})
-        return
-    complete = protocol_named(protocol).traits.complete
-    assert outcome.verdict is (Verdict.OPTIMAL if complete else Verdict.SOLUTION)
-    assert (outcome.assignment, outcome.cost) == (BEST, 6) or not complete
-    assert outcome.verified
+def test_every_protocol_that_minimises_comes_to_the_tutorials_answer() -> None:
+    with cases() as each:
+        for protocol in MINIMISING:
+            with each(protocol):
+                outcome = solve(read_team(PATROL), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+                if protocol in WITHOUT_ANSWER:
+                    assert (outcome.verdict, outcome.assignment) == (Verdict.UNKNOWN, {})
+                    return
+                complete = protocol_named(protocol).traits.complete
+                assert outcome.verdict is (Verdict.OPTIMAL if complete else Verdict.SOLUTION)
+                assert (outcome.assignment, outcome.cost) == (BEST, 6) or not complete
+                assert outcome.verified

@@ -22,6 +22,7 @@ from robochoc.run.registry import (
     protocol_named,
     protocol_names,
 )
+from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
 WITHOUT_DOCSTRING = """
@@ -159,31 +160,30 @@ def test_other_packages_protocols_are_listed_beside_ours() -> None:
 
 
 @pytest.mark.usefixtures("package")
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("zz-gone", "no_such_module:Gone (package others-protocols 1.2) cannot be imported: ModuleNotFoundError"),
-        ("zz-without", "others:Without (package others-protocols 1.2) cannot be imported: AttributeError"),
-        ("zz-leaving", "cannot be imported: SystemExit: 3"),
-        ("zz-garbled", "cannot be imported: SyntaxError"),
-        ("zz-number", "is no subclass of Protocol"),
-        ("zz-odd", "traits that are no Traits"),
-        ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
-    ],
-)
-def test_what_is_broken_is_shown_with_its_reason(name: str, reason: str) -> None:
-    table = run()
-    assert table.exit_code == 0
-    assert f"{name} " in table.stdout
-    assert "broken" in next(line for line in table.stdout.splitlines() if line.split()[:1] == [name])
-    assert reason in next(line for line in table.stdout.splitlines() if line.startswith(f"{name}: "))
-    assert reason.rpartition(")")[2].strip() in str(objects(run("--json"))[name]["broken"])
-    asked = run(name)
-    assert asked.exit_code == 2
-    assert reason in asked.stderr
-    assert len(asked.stderr.splitlines()) == 1
-    with pytest.raises(UnknownProtocolError, match=name):
-        protocol_named(name)
+def test_what_is_broken_is_shown_with_its_reason() -> None:
+    with cases() as each:
+        for name, reason in [
+            ("zz-gone", "no_such_module:Gone (package others-protocols 1.2) cannot be imported: ModuleNotFoundError"),
+            ("zz-without", "others:Without (package others-protocols 1.2) cannot be imported: AttributeError"),
+            ("zz-leaving", "cannot be imported: SystemExit: 3"),
+            ("zz-garbled", "cannot be imported: SyntaxError"),
+            ("zz-number", "is no subclass of Protocol"),
+            ("zz-odd", "traits that are no Traits"),
+            ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
+        ]:
+            with each(name):
+                table = run()
+                assert table.exit_code == 0
+                assert f"{name} " in table.stdout
+                assert "broken" in next(line for line in table.stdout.splitlines() if line.split()[:1] == [name])
+                assert reason in next(line for line in table.stdout.splitlines() if line.startswith(f"{name}: "))
+                assert reason.rpartition(")")[2].strip() in str(objects(run("--json"))[name]["broken"])
+                asked = run(name)
+                assert asked.exit_code == 2
+                assert reason in asked.stderr
+                assert len(asked.stderr.splitlines()) == 1
+                with pytest.raises(UnknownProtocolError, match=name):
+                    protocol_named(name)
 
 
 def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
@@ -233,31 +233,31 @@ def test_a_protocol_without_docstring_says_so() -> None:
     assert "no docstring" in run("zz-other").stdout
 
 
-@pytest.mark.parametrize(("name", "near"), [("abtt", "abt"), ("centrl", "central"), ("ABT ", None)])
-def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None:
-    done = robochoc_within("protocols", name)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert len(done.stderr.splitlines()) == 1
-    if near:
-        assert f"; did you mean '{near}'" in done.stderr
+def test_an_unknown_protocol_is_wrong_usage() -> None:
+    for name, near in [("abtt", "abt"), ("centrl", "central"), ("ABT ", None)]:
+        done = robochoc_within("protocols", name)
+        assert done.returncode == 2
+        assert done.stdout == ""
+        assert len(done.stderr.splitlines()) == 1
+        if near:
+            assert f"; did you mean '{near}'" in done.stderr
 
 
 def test_solve_points_to_the_list() -> None:
     assert "robochoc protocols" in " ".join(robochoc_within("solve", "--help").stdout.split())
 
 
-@pytest.mark.parametrize("columns", [60, 80, 200])
 def test_the_list_is_wrapped_to_the_terminal(
-    columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    monkeypatch.setenv("COLUMNS", str(columns))
-    print_protocols(rows())
-    *table, last = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
-    assert all(len(line) <= columns for line in table)
-    assert (len(table) == 1 + len(rows())) is (columns == 200)
-    assert last.startswith("next: robochoc protocols NAME")
+    for columns in [60, 80, 200]:
+        monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+        monkeypatch.setenv("COLUMNS", str(columns))
+        print_protocols(rows())
+        *table, last = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+        assert all(len(line) <= columns for line in table)
+        assert (len(table) == 1 + len(rows())) is (columns == 200)
+        assert last.startswith("next: robochoc protocols NAME")
 
 
 def test_how_a_protocol_is_chosen_is_explained() -> None:

@@ -110,22 +110,19 @@ def test_no_process_shows_the_secret_address_to_others(
 # robochoc sniff
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
+def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path) -> None:
+    for content, said in [
         (b"what is this?", "it does not begin as a journal does"),
         (b"<html>" * 1000, "it does not begin as a journal does"),
         (b'{"event":"Journal"}\n', "is missing"),
-    ],
-)
-def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path, content: bytes, said: str) -> None:
-    file = tmp_path / "file"
-    file.write_bytes(content)
-    done = robochoc_within("sniff", file)
-    assert done.returncode == 1
-    assert re.fullmatch(
-        rf".*/file: .*{re.escape(said)}.* \(give what 'robochoc solve --journal' wrote\)\n", done.stderr
-    )
+    ]:
+        file = tmp_path / "file"
+        file.write_bytes(content)
+        done = robochoc_within("sniff", file)
+        assert done.returncode == 1
+        assert re.fullmatch(
+            rf".*/file: .*{re.escape(said)}.* \(give what 'robochoc solve --journal' wrote\)\n", done.stderr
+        )
 
 
 def test_a_file_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
@@ -243,33 +240,27 @@ def test_an_invalid_team_has_no_page(tmp_path: Path) -> None:
     assert "http://" not in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_what_does_not_go_together_is_wrong_usage(teams: Path) -> None:
+    for words, said in [
         (["{teams}", "--sniff"], "for one team; 2 were found"),
         (["{teams}/short", "--sniff", "--serve"], "both stay until Ctrl-C"),
         (["{teams}/short", "--open"], "--open is for the page of --sniff"),
         (["{teams}/short", "--sniff", "--protocol", "central", "--count"], "--count gives only a number"),
-    ],
-)
-def test_what_does_not_go_together_is_wrong_usage(teams: Path, words: list[str], said: str) -> None:
-    done = robochoc_within("solve", *(word.format(teams=teams) for word in words))
-    assert done.returncode == 2
-    assert said in " ".join(done.stderr.split())
+    ]:
+        done = robochoc_within("solve", *(word.format(teams=teams) for word in words))
+        assert done.returncode == 2
+        assert said in " ".join(done.stderr.split())
 
 
-@pytest.mark.parametrize(
-    ("words", "sniff"),
-    [
+def test_patterns_may_be_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    for words, sniff in [
         (["team", "--sniff"], ""),
         (["--sniff", "tests", "--json"], ""),
         (["team", "--sniff", "Robot3.1,Robot2.*"], "Robot3.1,Robot2.*"),
         (["team", "--sniff=Robot1.?", "--json"], "Robot1.?"),
         (["team", "--sniff", "--json"], ""),
         (["team"], None),
-    ],
-)
-def test_patterns_may_be_left_out(monkeypatch: pytest.MonkeyPatch, words: list[str], sniff: str | None) -> None:
-    monkeypatch.chdir(ROOT)
-    assert isinstance(solve, SolveCommand)
-    assert solve.make_context("solve", list(words)).params["sniff"] == sniff
+    ]:
+        monkeypatch.chdir(ROOT)
+        assert isinstance(solve, SolveCommand)
+        assert solve.make_context("solve", list(words)).params["sniff"] == sniff

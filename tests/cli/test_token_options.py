@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 
 import click
-import pytest
 from click.testing import CliRunner, Result
 
 from robochoc.cli.options.tokens import LONGEST, token_options
@@ -40,41 +39,38 @@ def test_the_command_line_and_the_environment() -> None:
     assert said(given=TOKEN).output == f"{TOKEN!r}\n"
 
 
-@pytest.mark.parametrize("content", ["abc.def", " abc.def\r\n", "Scout abc.def\n"])
-def test_a_file(tmp_path: Path, content: str) -> None:
-    assert said("--token-file", file_of(tmp_path, content.encode()), given="x.y").output == f"{TOKEN!r}\n"
+def test_a_file(tmp_path: Path) -> None:
+    for content in ["abc.def", " abc.def\r\n", "Scout abc.def\n"]:
+        assert said("--token-file", file_of(tmp_path, content.encode()), given="x.y").output == f"{TOKEN!r}\n"
 
 
-@pytest.mark.parametrize("option", [("--token", "-"), ("--token-file", "-")])
-def test_standard_input(option: tuple[str, str]) -> None:
-    assert said(*option, stdin="Scout abc.def\nanother line\n").output == f"{TOKEN!r}\n"
+def test_standard_input() -> None:
+    for option in [("--token", "-"), ("--token-file", "-")]:
+        assert said(*option, stdin="Scout abc.def\nanother line\n").output == f"{TOKEN!r}\n"
 
 
-@pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o644, 0o777])
-def test_a_file_that_others_may_read_is_refused_as_ssh_does(tmp_path: Path, mode: int) -> None:
-    path = file_of(tmp_path, b"abc.def", mode)
-    result = said("--token-file", path)
-    assert result.exit_code == 1
-    why = f"{path}: others may read it (mode {mode:03o}), and so have the token; say: chmod 600 {path}\n"
-    assert result.output == why
-    assert TOKEN not in result.output
+def test_a_file_that_others_may_read_is_refused_as_ssh_does(tmp_path: Path) -> None:
+    for mode in [0o640, 0o604, 0o660, 0o644, 0o777]:
+        path = file_of(tmp_path, b"abc.def", mode)
+        result = said("--token-file", path)
+        assert result.exit_code == 1
+        why = f"{path}: others may read it (mode {mode:03o}), and so have the token; say: chmod 600 {path}\n"
+        assert result.output == why
+        assert TOKEN not in result.output
 
 
-@pytest.mark.parametrize(
-    ("content", "found"),
-    [
+def test_a_file_that_holds_no_token(tmp_path: Path) -> None:
+    for content, found in [
         (b"", "nothing"),
         (b" \n", "nothing"),
         (b"A a.b\nB c.d\n", "more than one token"),
         (b"x" * (LONGEST + 1), "more than one token"),
         (b"\0 \xff \x1b[2J", "more than one token"),
-    ],
-)
-def test_a_file_that_holds_no_token(tmp_path: Path, content: bytes, found: str) -> None:
-    path = file_of(tmp_path, content)
-    result = said("--token-file", path)
-    expected = f"{path}: there is {found} (expected one line of 'robochoc authority enrol')\n"
-    assert (result.exit_code, result.output) == (1, expected)
+    ]:
+        path = file_of(tmp_path, content)
+        result = said("--token-file", path)
+        expected = f"{path}: there is {found} (expected one line of 'robochoc authority enrol')\n"
+        assert (result.exit_code, result.output) == (1, expected)
 
 
 def test_a_file_that_is_not_there_or_is_a_folder(tmp_path: Path) -> None:

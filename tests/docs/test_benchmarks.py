@@ -27,11 +27,11 @@ def test_the_results_lead_to_every_page() -> None:
     assert set(re.findall(r"\]\(results/([\w-]+\.md)\)", results)) == {page.name for page in PAGES}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_page_quotes_its_study(page: Path) -> None:
-    study = read_study(STUDIES / f"{page.stem}.toml")
-    text = page.read_text()
-    assert text.startswith(f"# {study.title}\n\n{study.report.text.strip()}\n\n")
+def test_a_page_quotes_its_study() -> None:
+    for page in PAGES:
+        study = read_study(STUDIES / f"{page.stem}.toml")
+        text = page.read_text()
+        assert text.startswith(f"# {study.title}\n\n{study.report.text.strip()}\n\n")
 
 
 @pytest.mark.slow

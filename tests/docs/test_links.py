@@ -6,8 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-import pytest
-
+from tests.support.cases import cases
 from tests.support.program import ROOT
 
 PAGES = sorted(
@@ -33,17 +32,19 @@ def anchors_of(page: Path) -> set[str]:
     return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", heading.strip().lower())) for heading in plain}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_to_what_is_there(page: Path) -> None:
-    for link in links_of(page):
-        target, _, anchor = link.partition("#")
-        if re.match(r"[a-z]+:", target):
-            continue
-        there = (page.parent / target).resolve() if target else page
-        if GENERATED.fullmatch(str(there.relative_to(ROOT))):
-            continue
-        assert there.exists(), f"{link}: no such file"
-        assert not anchor or anchor in anchors_of(there), f"{link}: no such heading"
+def test_links_lead_to_what_is_there() -> None:
+    with cases() as each:
+        for page in PAGES:
+            with each(page):
+                for link in links_of(page):
+                    target, _, anchor = link.partition("#")
+                    if re.match(r"[a-z]+:", target):
+                        continue
+                    there = (page.parent / target).resolve() if target else page
+                    if GENERATED.fullmatch(str(there.relative_to(ROOT))):
+                        continue
+                    assert there.exists(), f"{link}: no such file"
+                    assert not anchor or anchor in anchors_of(there), f"{link}: no such heading"
 
 
 def test_there_are_links() -> None:

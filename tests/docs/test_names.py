@@ -6,11 +6,11 @@ import importlib
 import re
 from pathlib import Path
 
-import pytest
-
+from tests.support.cases import cases
 from tests.support.program import ROOT
 
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if "examples" not in path.parts)
+FILE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.(?:py|toml|xsd|md)|(?:robochoc|tests|benchmarks)/[a-z_/]+/)`")
 FOLDERS = [
     ROOT,
     ROOT / "robochoc",
@@ -24,17 +24,20 @@ def outside_of_blocks(page: Path) -> str:
     return re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_files_that_a_page_names_are_there(page: Path) -> None:
-    for name in re.findall(r"`((?:[a-z_]+/)+[a-z_0-9]+\.(?:py|toml|xsd|md)|(?:robochoc|tests|benchmarks)/[a-z_/]+/)`",
-                           outside_of_blocks(page)):  # fmt: skip
-        assert any((folder / name).exists() for folder in FOLDERS), name
+def test_files_that_a_page_names_are_there() -> None:
+    with cases() as each:
+        for page in PAGES:
+            with each(page):
+                for name in FILE.findall(outside_of_blocks(page)):
+                    assert any((folder / name).exists() for folder in FOLDERS), name
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_dotted_names_on_a_page_can_be_imported(page: Path) -> None:
-    for name in re.findall(r"(?:`|^::: )(robochoc(?:\.\w+)+)", outside_of_blocks(page), re.MULTILINE):
-        importable(name)
+def test_dotted_names_on_a_page_can_be_imported() -> None:
+    with cases() as each:
+        for page in PAGES:
+            with each(page):
+                for name in re.findall(r"(?:`|^::: )(robochoc(?:\.\w+)+)", outside_of_blocks(page), re.MULTILINE):
+                    importable(name)
 
 
 def importable(name: str) -> None:

@@ -6,10 +6,7 @@ import ast
 import io
 import json
 from contextlib import redirect_stdout
-from pathlib import Path
 from typing import Any
-
-import pytest
 
 from tests.support.program import ROOT
 from tests.support.snippets import agrees
@@ -30,18 +27,18 @@ def run(source: str, names: dict[str, object]) -> tuple[str, object]:
     return printed.getvalue(), value
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
-def test_the_cells_of_a_notebook_give_what_stands_below_them(notebook: Path) -> None:
-    names: dict[str, object] = {"__name__": "__main__"}
-    cells: list[dict[str, Any]] = json.loads(notebook.read_text())["cells"]
-    code = [cell for cell in cells if cell["cell_type"] == "code"]
-    assert len(code) > 2
-    for cell in code:
-        printed, value = run("".join(cell["source"]), names)
-        said = {output["output_type"]: output for output in cell["outputs"]}
-        stream = "".join(said["stream"]["text"]) if "stream" in said else ""
-        assert agrees(stream, printed), cell["source"]
-        shown = "".join(said["execute_result"]["data"]["text/plain"]) if "execute_result" in said else "None"
-        assert agrees(shown, repr(value)), cell["source"]
-        if hasattr(value, "_repr_html_"):
-            assert value._repr_html_()
+def test_the_cells_of_a_notebook_give_what_stands_below_them() -> None:
+    for notebook in NOTEBOOKS:
+        names: dict[str, object] = {"__name__": "__main__"}
+        cells: list[dict[str, Any]] = json.loads(notebook.read_text())["cells"]
+        code = [cell for cell in cells if cell["cell_type"] == "code"]
+        assert len(code) > 2
+        for cell in code:
+            printed, value = run("".join(cell["source"]), names)
+            said = {output["output_type"]: output for output in cell["outputs"]}
+            stream = "".join(said["stream"]["text"]) if "stream" in said else ""
+            assert agrees(stream, printed), cell["source"]
+            shown = "".join(said["execute_result"]["data"]["text/plain"]) if "execute_result" in said else "None"
+            assert agrees(shown, repr(value)), cell["source"]
+            if hasattr(value, "_repr_html_"):
+                assert value._repr_html_()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.cases import cases
 from tests.support.ports import free_port
 from tests.support.program import ROOT
 from tests.support.snippets import Block, Reader, Step, agrees, blocks_of, steps_of
@@ -95,12 +96,16 @@ def test_the_snippets_of_a_page_do_what_it_says_those_that_take_long_too(page: P
     follow(page, reader_of, slow=True)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_block_has_a_language_and_those_that_are_not_run_a_reason(page: Path) -> None:
-    for block in blocks_of(page.read_text()):
-        assert block.kind in LANGUAGES, f"line {block.line}: ```{block.kind}"
-        reason = block.words.removeprefix("not run:")
-        assert len(reason.strip()) > 5 or reason == block.words, f"line {block.line}: not run, without a reason"
+def test_every_block_has_a_language_and_those_that_are_not_run_a_reason() -> None:
+    with cases() as each:
+        for page in PAGES:
+            with each(name_of(page)):
+                for block in blocks_of(page.read_text()):
+                    assert block.kind in LANGUAGES, f"line {block.line}: ```{block.kind}"
+                    reason = block.words.removeprefix("not run:")
+                    assert len(reason.strip()) > 5 or reason == block.words, (
+                        f"line {block.line}: not run, without a reason"
+                    )
 
 
 def test_pages_that_are_run_elsewhere_say_so() -> None:
@@ -131,20 +136,19 @@ def test_a_console_block_is_a_step_for_each_command() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("said", "printed", "agree"),
-    [
-        ("in 0.3 s", "in 12 s\n", True),
-        ("9 s in 0.3 s (30.0 times as fast as real time)", "9 s in 9.9 s (1.1 times slower than real time)", True),
-        ("3 times as fast as the others", "4 times as fast as the others", False),
-        ("a\n...\nz", "a\nb\nc\nz", True),
-        ("3 messages", "4 messages", False),
-        ("a", "a\nb", False),
-        ("# a ... b", "# a x b", True),
-    ],
-)
-def test_what_is_said_is_compared_with_what_is_printed(said: str, printed: str, *, agree: bool) -> None:
-    assert agrees(said, printed) is agree
+def test_what_is_said_is_compared_with_what_is_printed() -> None:
+    with cases() as each:
+        for said, printed, agree in [
+            ("in 0.3 s", "in 12 s\n", True),
+            ("9 s in 0.3 s (30.0 times as fast as real time)", "9 s in 9.9 s (1.1 times slower than real time)", True),
+            ("3 times as fast as the others", "4 times as fast as the others", False),
+            ("a\n...\nz", "a\nb\nc\nz", True),
+            ("3 messages", "4 messages", False),
+            ("a", "a\nb", False),
+            ("# a ... b", "# a x b", True),
+        ]:
+            with each(said):
+                assert agrees(said, printed) is agree
 
 
 def test_a_page_that_is_wrong_fails(reader_of: Reader) -> None:

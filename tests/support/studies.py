@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+import sqlite3
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import msgspec
+
+from robochoc.experiments.execute import Bench
 from robochoc.experiments.results import Results, read_results
 from robochoc.experiments.runner import StudyProgress, run_study
 from robochoc.experiments.store import Store
 from robochoc.experiments.study import Study, study_of
 from robochoc.experiments.table import Place
+from robochoc.experiments.task import Row, Task
 
 SMALL = """
 [problems]
@@ -52,12 +59,21 @@ def study(text: str, place: Path = Path("study.toml")) -> Study:
     return study_of(tomllib.loads(text), Place(place, text))
 
 
+class RunsHere(Bench):
+    """Runs the tasks of a study in this process, in place of workers, which take half a second to start."""
+
+    def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
+        """Yield what comes of all tasks, as a worker sends it."""
+        for task in itertools.chain.from_iterable(bundles):
+            yield task, msgspec.json.decode(msgspec.json.encode(self.run(task)), type=Row)
+
+
 def results_of(
-    text: str, path: Path | None = None, jobs: int = 1, progress: Callable[[StudyProgress], None] | None = None
+    text: str, path: Path | None = None, jobs: int = 0, progress: Callable[[StudyProgress], None] | None = None
 ) -> Results:
-    """Carry out the study whose file has this text, and return its results."""
+    """Carry out the study whose file has this text, in this process or by `jobs` workers; return its results."""
     with Store(path) as store:
-        run_study(study(text), store, jobs, progress=progress)
+        run_study(study(text), store, jobs, progress=progress, workers=None if jobs else lambda _: RunsHere())
         return store.results()
 
 
@@ -77,6 +93,13 @@ def _finished(text: str) -> bytes:
         path = Path(folder) / "results.sqlite"
         results_of(text, path)
         return path.read_bytes()
+
+
+def altered(path: Path, *changes: str) -> None:
+    """Execute SQL on the file of results at `path`."""
+    with closing(sqlite3.connect(path)) as database, database:
+        for change in changes:
+            database.executescript(change)
 
 
 def comparable(results: Results | Path) -> list[dict[str, Any]]:

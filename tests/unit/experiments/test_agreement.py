@@ -11,6 +11,7 @@ import pytest
 from robochoc.experiments.agreement import Agreement, DisagreementError, contradiction, repeat
 from robochoc.experiments.execute import Bench
 from robochoc.experiments.task import Limits, ProblemSpec, Row, Setup, Status, Task
+from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
 SOLUTION, NONE = ("solution", None), ("no-solution", None)
@@ -22,30 +23,29 @@ def row(verdict: str, cost: str | None = None, *, maximises: bool = False, withd
     )
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "why"),
-    [
-        (row("solution"), row("solution"), ""),
-        (row("no-solution"), row("no-solution"), ""),
-        (row("solution"), row("no-solution"), "solution and no-solution"),
-        (row("optimal", "3"), row("no-solution"), "optimal and no-solution"),
-        (row("optimal", "3"), row("optimal", "3"), ""),
-        (row("optimal", "3.0"), row("optimal", "3"), ""),
-        (row("optimal", "3"), row("optimal", "4"), "3 is said to be optimal, and 4 was found"),
-        (row("optimal", "3"), row("solution", "4"), ""),
-        (row("optimal", "3"), row("solution", "2.99"), "2.99 was found"),
-        (row("optimal", "3", maximises=True), row("solution", "2", maximises=True), ""),
-        (row("optimal", "3", maximises=True), row("solution", "4", maximises=True), "4 was found"),
-        (row("solution", "4"), row("solution", "2"), ""),
-        (row("optimal", withdrawn=1), row("optimal", withdrawn=2), "1 and 2 robots"),
-        (row("optimal", "3", withdrawn=1), row("solution", "1", withdrawn=2), ""),
-    ],
-)
-def test_contradictions(one: Row, other: Row, why: str) -> None:
-    for pair in ((one, other), (other, one)):
-        found = contradiction(*pair)
-        assert bool(found) == bool(why)
-    assert why in contradiction(one, other)
+def test_contradictions() -> None:
+    with cases() as each:
+        for one, other, why in [
+            (row("solution"), row("solution"), ""),
+            (row("no-solution"), row("no-solution"), ""),
+            (row("solution"), row("no-solution"), "solution and no-solution"),
+            (row("optimal", "3"), row("no-solution"), "optimal and no-solution"),
+            (row("optimal", "3"), row("optimal", "3"), ""),
+            (row("optimal", "3.0"), row("optimal", "3"), ""),
+            (row("optimal", "3"), row("optimal", "4"), "3 is said to be optimal, and 4 was found"),
+            (row("optimal", "3"), row("solution", "4"), ""),
+            (row("optimal", "3"), row("solution", "2.99"), "2.99 was found"),
+            (row("optimal", "3", maximises=True), row("solution", "2", maximises=True), ""),
+            (row("optimal", "3", maximises=True), row("solution", "4", maximises=True), "4 was found"),
+            (row("solution", "4"), row("solution", "2"), ""),
+            (row("optimal", withdrawn=1), row("optimal", withdrawn=2), "1 and 2 robots"),
+            (row("optimal", "3", withdrawn=1), row("solution", "1", withdrawn=2), ""),
+        ]:
+            with each((one.verdict, one.cost, other.verdict, other.cost)):
+                for pair in ((one, other), (other, one)):
+                    found = contradiction(*pair)
+                    assert bool(found) == bool(why)
+                assert why in contradiction(one, other)
 
 
 def test_the_commands_leave_the_users_files_alone() -> None:

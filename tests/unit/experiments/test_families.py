@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import click
-import pytest
 
 from robochoc.cli.commands.generate import generate
 from robochoc.generators.families import FAMILIES, parameters_of, required_of
+from tests.support.cases import cases
 from tests.support.program import ROOT
 
 OF_THE_COMMAND = {"output", "force", "help"}
@@ -27,20 +27,22 @@ EXAMPLES: dict[str, dict[str, int | float | str]] = {
 }
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_parameters_are_the_options_of_the_command(family: str) -> None:
-    command = generate.commands[family]
-    options = {option.name: option for option in command.params if isinstance(option, click.Option)}
-    assert set(parameters_of(family)) == set(options) - OF_THE_COMMAND
-    made = FAMILIES[family](**EXAMPLES[family])
-    same = {
-        name: option.default
-        for name, option in options.items()
-        if name not in {*OF_THE_COMMAND, *EXAMPLES[family]} and option.default is not None
-    }
-    plain = {name: value for name, value in same.items() if isinstance(value, (int, float, str))}
-    assert FAMILIES[family](**EXAMPLES[family], **plain) == made
-    assert set(required_of(family)) <= set(EXAMPLES[family])
+def test_parameters_are_the_options_of_the_command() -> None:
+    with cases() as each:
+        for family in FAMILIES:
+            with each(family):
+                command = generate.commands[family]
+                options = {option.name: option for option in command.params if isinstance(option, click.Option)}
+                assert set(parameters_of(family)) == set(options) - OF_THE_COMMAND
+                made = FAMILIES[family](**EXAMPLES[family])
+                same = {
+                    name: option.default
+                    for name, option in options.items()
+                    if name not in {*OF_THE_COMMAND, *EXAMPLES[family]} and option.default is not None
+                }
+                plain = {name: value for name, value in same.items() if isinstance(value, (int, float, str))}
+                assert FAMILIES[family](**EXAMPLES[family], **plain) == made
+                assert set(required_of(family)) <= set(EXAMPLES[family])
 
 
 def test_every_family_is_a_command() -> None:

@@ -12,6 +12,7 @@ pytest.importorskip("matplotlib")
 
 from robochoc.experiments.axes import MOST_WAYS, styles_of
 from robochoc.experiments.figures import Drawing, Figures, figures_of, told_apart
+from tests.support.cases import cases
 
 
 def row(label: str, problem: int, messages: float | None, status: str = "done", **more: object) -> dict[str, Any]:
@@ -68,27 +69,24 @@ def test_kinds_of_problems_lie_side_by_side_in_natural_order() -> None:
     assert [[round(mark) for mark in marks].count(place) for place in range(4)] == [3, 3, 3, 3]
 
 
-@pytest.mark.parametrize(
-    ("names", "shown", "what"),
-    [
+def test_names_below_the_axis_are_short_and_apart() -> None:
+    for names, shown, what in [
         ([f"warehouse-problem-{n}" for n in range(1, 7)], [str(n) for n in range(1, 7)], "(warehouse-problem-…)"),
         (["sparse", "dense"], ["sparse", "dense"], "problems"),
         (["a long name of problems", "colouring", "meetings"], ["a long na…problems", "colouring", "meetings"], ""),
         ([f"{n} very long names of problems" for n in range(12)], [f"{n} very lo…problems" for n in range(10)], ""),
-    ],
-)
-def test_names_below_the_axis_are_short_and_apart(names: list[str], shown: list[str], what: str) -> None:
-    figure = drawn(
-        by_name(figures_of(rows("problems", names, ["a", "b"]), "problems", ["messages"]))["messages-over-problems"]
-    )
-    axes = figure.axes[0]
-    assert [len(text) <= 18 for text in ticks(axes)] == [True] * len(names)
-    assert ticks(axes)[: len(shown)] == shown
-    assert what in axes.get_xlabel()
-    labels = [one for one in axes.get_xticklabels() if one.get_text()]
-    if labels[0].get_rotation() == 0:
-        boxes = [one.get_window_extent() for one in labels]
-        assert all(one.x1 <= other.x0 for one, other in itertools.pairwise(boxes))
+    ]:
+        figure = drawn(
+            by_name(figures_of(rows("problems", names, ["a", "b"]), "problems", ["messages"]))["messages-over-problems"]
+        )
+        axes = figure.axes[0]
+        assert [len(text) <= 18 for text in ticks(axes)] == [True] * len(names)
+        assert ticks(axes)[: len(shown)] == shown
+        assert what in axes.get_xlabel()
+        labels = [one for one in axes.get_xticklabels() if one.get_text()]
+        if labels[0].get_rotation() == 0:
+            boxes = [one.get_window_extent() for one in labels]
+            assert all(one.x1 <= other.x0 for one, other in itertools.pairwise(boxes))
 
 
 def test_over_many_problems_nothing_is_drawn_but_profiles() -> None:
@@ -137,25 +135,27 @@ def test_profiles_go_on_to_the_right_edge() -> None:
     assert [text for text in ticks(drawn(figures["profile-messages"]).axes[0]) if text] == ["1", "2", "5"]
 
 
-@pytest.mark.parametrize(
-    ("values", "scale", "shown"),
-    [
-        ([0, 10, 100, 1000], "symlog", ["0", "10", "100", "1,000"]),
-        ([1, 10, 100, 1000], "log", ["1", "10", "100", "1,000"]),
-        ([1, 2, 4, 8, 16, 32], "log", ["1", "2", "4", "8", "16", "32"]),
-        ([0, 20, 50, 100], "linear", ["0", "20", "50", "100"]),
-        ([5, 10, 20], "linear", ["5", "10", "20"]),
-        ([0.2, 0.30000000000000004, 0.4], "linear", ["0.2", "0.3", "0.4"]),
-        (list(range(1, 41)), "linear", [str(value) for value in range(1, 41, 3)]),
-        ([-5, 0, 500], "linear", ["-5", "500"]),
-    ],
-)
-def test_ticks_are_at_the_values_that_were_run(values: list[float], scale: str, shown: list[str]) -> None:
-    given = rows("n", values, ["a", "b"], problems=1)
-    axes = axes_of(by_name(figures_of(given, "n", ["messages"]))["messages-over-n"])
-    assert axes.get_xscale() == scale
-    assert ticks(axes) == shown
-    assert not len(axes.xaxis.get_minorticklocs())
+TICKS: list[tuple[Sequence[float], str, list[str]]] = [
+    ([0, 10, 100, 1000], "symlog", ["0", "10", "100", "1,000"]),
+    ([1, 10, 100, 1000], "log", ["1", "10", "100", "1,000"]),
+    ([1, 2, 4, 8, 16, 32], "log", ["1", "2", "4", "8", "16", "32"]),
+    ([0, 20, 50, 100], "linear", ["0", "20", "50", "100"]),
+    ([5, 10, 20], "linear", ["5", "10", "20"]),
+    ([0.2, 0.30000000000000004, 0.4], "linear", ["0.2", "0.3", "0.4"]),
+    (list(range(1, 41)), "linear", [str(value) for value in range(1, 41, 3)]),
+    ([-5, 0, 500], "linear", ["-5", "500"]),
+]
+
+
+def test_ticks_are_at_the_values_that_were_run() -> None:
+    with cases() as each:
+        for values, scale, shown in TICKS:
+            with each(values):
+                given = rows("n", values, ["a", "b"], problems=1)
+                axes = axes_of(by_name(figures_of(given, "n", ["messages"]))["messages-over-n"])
+                assert axes.get_xscale() == scale
+                assert ticks(axes) == shown
+                assert not len(axes.xaxis.get_minorticklocs())
 
 
 def test_what_says_nothing_is_left_out() -> None:

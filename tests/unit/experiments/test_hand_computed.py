@@ -24,6 +24,7 @@ from robochoc.experiments.figures import figures_of
 from robochoc.experiments.ranking import answers
 from robochoc.experiments.results import Results
 from robochoc.experiments.statistics import Band, Comparison, median_ratio
+from tests.support.cases import cases
 
 pytest.importorskip("scipy")
 
@@ -103,15 +104,20 @@ def test_pairs() -> None:
     assert statistics.comparisons(study(), "cost") == [Comparison("a", "b", 4, 2, 1, None, -1.0, None)]
 
 
-@pytest.mark.parametrize(
-    ("pairs", "ratio"),
-    [
-        ([(0, 0)], 1), ([(3, 0)], None), ([(0, 3)], 0), ([(0, 0), (4, 2), (3, 0)], 2), ([(1, 2), (3, 0)], None),
-        ([(-1, 2)], None), ([(2, -1), (1, 1)], None), ([], None),
-    ],
-)  # fmt: skip
-def test_median_ratios(pairs: list[tuple[float, float]], ratio: float | None) -> None:
-    assert median_ratio(pairs) == ratio
+def test_median_ratios() -> None:
+    with cases() as each:
+        for pairs, ratio in [
+            ([(0, 0)], 1),
+            ([(3, 0)], None),
+            ([(0, 3)], 0),
+            ([(0, 0), (4, 2), (3, 0)], 2),
+            ([(1, 2), (3, 0)], None),
+            ([(-1, 2)], None),
+            ([(2, -1), (1, 1)], None),
+            ([], None),
+        ]:
+            with each(pairs):
+                assert median_ratio(pairs) == ratio
 
 
 def test_the_table_of_pairs() -> None:

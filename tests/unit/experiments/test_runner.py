@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sqlite3
 from pathlib import Path
 
 import pytest
@@ -13,12 +12,13 @@ from robochoc.experiments import read
 from robochoc.experiments.agreement import DisagreementError
 from robochoc.experiments.plan import plan_of
 from robochoc.experiments.results import read_results
-from robochoc.experiments.runner import StudyProgress, run_study
+from robochoc.experiments.runner import StudyProgress
 from robochoc.experiments.store import Store, StudyInUseError
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.experiments.workers import LocalWorkers
 from robochoc.formats.diagnostics import InvalidInputError
-from tests.support.studies import COSTS, SMALL, comparable, finished, results_of, study
+from tests.support.cases import cases
+from tests.support.studies import COSTS, SMALL, altered, comparable, finished, results_of, study
 
 
 class _EnoughError(Exception):
@@ -29,7 +29,7 @@ def test_a_study_that_was_broken_off_goes_on(tmp_path: Path) -> None:
     whole = finished(SMALL)
     assert [row["status"] for row in whole.rows] == ["done"] * 12
     path = tmp_path / "broken.sqlite"
-    for enough in (1, 4):
+    for enough, jobs in ((1, 0), (4, 2)):
         seen: list[StudyProgress] = []
 
         def stop(now: StudyProgress, seen: list[StudyProgress] = seen, enough: int = enough) -> None:
@@ -38,7 +38,7 @@ def test_a_study_that_was_broken_off_goes_on(tmp_path: Path) -> None:
                 raise _EnoughError
 
         with pytest.raises(_EnoughError):
-            results_of(SMALL, path, jobs=2, progress=stop)
+            results_of(SMALL, path, jobs, progress=stop)
     there = len(read(path))
     assert 5 <= there < 12
     seen = []
@@ -51,7 +51,7 @@ def test_a_study_that_was_broken_off_goes_on(tmp_path: Path) -> None:
 
 def test_a_changed_study_runs_what_is_new(tmp_path: Path) -> None:
     path = tmp_path / "study.sqlite"
-    results_of(SMALL, path)
+    finished(SMALL, path)
     changed = SMALL.replace("[0.2, 0.5]", "[0.5, 0.3]").replace('"afc-ng"', '"awc"')
     seen: list[StudyProgress] = []
     found = results_of(changed, path, progress=seen.append)
@@ -80,9 +80,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="is no file"):
         read(tmp_path / "nothing.sqlite")
     (tmp_path / "text.sqlite").write_text("no database, but long enough to be one" * 100)
-    with sqlite3.connect(tmp_path / "other.sqlite") as other:
-        other.execute("CREATE TABLE mine (x)")
-    other.close()
+    altered(tmp_path / "other.sqlite", "CREATE TABLE mine (x)")
     for name in ("text", "other"):
         before = (tmp_path / f"{name}.sqlite").read_bytes()
         with pytest.raises(InvalidInputError, match=r"holds no results|none of 'robochoc experiment run'"):
@@ -92,43 +90,36 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
         assert (tmp_path / f"{name}.sqlite").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        "UPDATE runs SET messages = 'many'",
-        "UPDATE runs SET loads = '{'",
-        "UPDATE runs SET messages_by_type = NULL",
-        "UPDATE plan SET parameters = '[1]'",
-        "UPDATE plan SET settings = x'ff'",
-        "DROP TABLE runs",
-    ],
-)
-def test_results_that_somebody_has_altered_are_refused(change: str, tmp_path: Path) -> None:
+def test_results_that_somebody_has_altered_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "study.sqlite"
-    results_of(SMALL.replace('"1..3"', "1"), path)
-    database = sqlite3.connect(path)
-    with database:
-        database.execute(change)
-    database.close()
-    with pytest.raises(InvalidInputError, match=r"study\.sqlite: holds no results of a study"):
-        read(path)
+    with cases() as each:
+        for change in [
+            "UPDATE runs SET messages = 'many'",
+            "UPDATE runs SET loads = '{'",
+            "UPDATE runs SET messages_by_type = NULL",
+            "UPDATE plan SET parameters = '[1]'",
+            "UPDATE plan SET settings = x'ff'",
+            "DROP TABLE runs",
+        ]:
+            with each(change):
+                finished(SMALL, path)
+                altered(path, change)
+                with pytest.raises(InvalidInputError, match=r"study\.sqlite: holds no results of a study"):
+                    read(path)
 
 
 def test_a_file_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
     path = tmp_path / "study.sqlite"
-    results_of(SMALL, path)
-    database = sqlite3.connect(path)
-    with database:
-        database.execute("CREATE TRIGGER full BEFORE INSERT ON plan BEGIN SELECT RAISE(ABORT, 'disk is full'); END")
-    database.close()
+    finished(SMALL, path)
+    altered(path, "CREATE TRIGGER full BEFORE INSERT ON plan BEGIN SELECT RAISE(ABORT, 'disk is full'); END")
     with pytest.raises(InvalidInputError, match=r"study\.sqlite: cannot be written to: disk is full"):
         results_of(SMALL, path)
 
 
 def test_two_at_once_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "study.sqlite"
-    with Store(path) as store:
-        run_study(study(SMALL), store, 1)
+    finished(SMALL, path)
+    with Store(path):
         with pytest.raises(StudyInUseError, match=r"is being written to by another"):
             Store(path)
         assert len(read(path)) == 12

@@ -47,11 +47,9 @@ def test_medians_say_where_limits_leave_them_open() -> None:
     assert summary.cell(summary.sample([row("a", 1, None, "refused")], "messages")) == "-"
 
 
-@pytest.mark.parametrize(
-    ("value", "text"), [(3, "3"), (2.5, "2.50"), (0.01234, "0.0123"), (12345.6, "12,346"), (1e6, "1,000,000")]
-)
-def test_numbers_are_short(value: float, text: str) -> None:
-    assert summary.number(value) == text
+def test_numbers_are_short() -> None:
+    for value, text in [(3, "3"), (2.5, "2.50"), (0.01234, "0.0123"), (12345.6, "12,346"), (1e6, "1,000,000")]:
+        assert summary.number(value) == text
 
 
 def test_what_is_drawn_over() -> None:

@@ -12,34 +12,34 @@ from robochoc.experiments.study import read_study, study_of_tables
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.formats.folder import write_team
 from robochoc.generators.queens3d import queens3d
+from tests.support.cases import cases
 from tests.support.studies import COSTS, SMALL, study
 
 
-@pytest.mark.parametrize(
-    ("text", "numbers"),
-    [
-        ("1..4", [1, 2, 3, 4]),
-        ("-2..2:2", [-2, 0, 2]),
-        ("0.1..0.4:0.1", [0.1, 0.2, 0.3, 0.4]),
-        ("0.2..0.6:0.25", [0.2, 0.45]),
-        ("0..1.0", [0.0, 1.0]),
-        ("3..3", [3]),
-        ("instances", None),
-        ("1..", None),
-        ("1...2", None),
-        ("9" * 200, None),
-    ],
-)
-def test_a_range_stands_for_its_numbers(text: str, numbers: list[float] | None) -> None:
-    found = range_of(text)
-    assert found == numbers
-    assert found is None or [type(one) for one in found] == [type(one) for one in numbers or ()]
+def test_a_range_stands_for_its_numbers() -> None:
+    with cases() as each:
+        for text, numbers in [
+            ("1..4", [1, 2, 3, 4]),
+            ("-2..2:2", [-2, 0, 2]),
+            ("0.1..0.4:0.1", [0.1, 0.2, 0.3, 0.4]),
+            ("0.2..0.6:0.25", [0.2, 0.45]),
+            ("0..1.0", [0.0, 1.0]),
+            ("3..3", [3]),
+            ("instances", None),
+            ("1..", None),
+            ("1...2", None),
+            ("9" * 200, None),
+        ]:
+            with each(text):
+                found = range_of(text)
+                assert found == numbers
+                assert found is None or [type(one) for one in found] == [type(one) for one in numbers or ()]
 
 
-@pytest.mark.parametrize("text", ["4..1", "1..2:0", "1..2:-1", "0..1:0.000001"])
-def test_a_range_without_values_or_with_too_many_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"has no value|has 1,000,001 values"):
-        range_of(text)
+def test_a_range_without_values_or_with_too_many_is_refused() -> None:
+    for text in ["4..1", "1..2:0", "1..2:-1", "0..1:0.000001"]:
+        with pytest.raises(ValueError, match=r"has no value|has 1,000,001 values"):
+            range_of(text)
 
 
 def test_lists_and_ranges_stand_for_all_combinations() -> None:
@@ -169,17 +169,18 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_said_with_its_line(name: str, tmp_path: Path) -> None:
-    text, line, said = WRONG[name]
-    path = tmp_path / "study.toml"
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(InvalidInputError) as caught:
-        read_study(path)
-    assert said in str(caught.value)
-    if line:
-        assert [one.line for one in caught.value.diagnostics] == [line]
+def test_what_is_wrong_is_said_with_its_line(tmp_path: Path) -> None:
+    with cases() as each:
+        for name, (text, line, said) in WRONG.items():
+            with each(name):
+                path = tmp_path / "study.toml"
+                if text is not None:
+                    path.write_text(text)
+                with pytest.raises(InvalidInputError) as caught:
+                    read_study(path)
+                assert said in str(caught.value)
+                if line:
+                    assert [one.line for one in caught.value.diagnostics] == [line]
 
 
 def test_ways_that_are_called_alike_tell_their_protocols_and_limits() -> None:

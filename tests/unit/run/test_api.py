@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from decimal import Decimal
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -22,6 +23,7 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import cases
 from tests.support.deployments import Deployment
 from tests.support.problems import team_of
 from tests.support.program import ROOT
@@ -76,21 +78,23 @@ def test_the_protocol_that_suits_costs(tmp_path: Path) -> None:
     assert (outcome.verdict, outcome.protocol) == (Verdict.OPTIMAL, "sfb")
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "told"),
-    [
-        ({"protocol": "nonsense"}, UnknownProtocolError, "nonsense"),
-        ({"runtime": "clouds"}, ValueError, "clouds"),
-        ({"order": "clouds"}, ValueError, "clouds"),
-        ({"withdraw": "clouds"}, ValueError, "clouds"),
-        ({"colour": "red"}, TypeError, "colour"),
-        ({"settings": {"colour": "red"}}, UnsupportedError, "colour"),
-    ],
-)
-def test_what_is_no_option(options: dict[str, object], error: type[Exception], told: str) -> None:
-    problem = robochoc.load(SCOUTS)
-    with pytest.raises(error, match=told):
-        problem.solve(**{"runtime": "simulator", **options})  # type: ignore[arg-type]
+NO_OPTIONS: list[tuple[dict[str, Any], type[Exception], str]] = [
+    ({"protocol": "nonsense"}, UnknownProtocolError, "nonsense"),
+    ({"runtime": "clouds"}, ValueError, "clouds"),
+    ({"order": "clouds"}, ValueError, "clouds"),
+    ({"withdraw": "clouds"}, ValueError, "clouds"),
+    ({"colour": "red"}, TypeError, "colour"),
+    ({"settings": {"colour": "red"}}, UnsupportedError, "colour"),
+]
+
+
+def test_what_is_no_option() -> None:
+    with cases() as each:
+        for options, error, told in NO_OPTIONS:
+            with each(options):
+                problem = robochoc.load(SCOUTS)
+                with pytest.raises(error, match=told):
+                    problem.solve(**{"runtime": "simulator", **options})
 
 
 def test_what_is_no_team(tmp_path: Path) -> None:
@@ -118,11 +122,15 @@ def test_the_library_comes_when_it_is_asked_for() -> None:
 # Containers
 
 
-@pytest.mark.parametrize(
-    ("word", "name"), [("ABT", "abt"), ("abt", "abt"), ("AFCng", "afc-ng"), ("afc-ng", "afc-ng"), ("MaxSum", "maxsum")]
-)
-def test_protocols_as_the_paper_calls_them(word: str, name: str) -> None:
-    assert protocol_called(word) == name
+def test_protocols_as_the_paper_calls_them() -> None:
+    for word, name in [
+        ("ABT", "abt"),
+        ("abt", "abt"),
+        ("AFCng", "afc-ng"),
+        ("afc-ng", "afc-ng"),
+        ("MaxSum", "maxsum"),
+    ]:
+        assert protocol_called(word) == name
 
 
 def test_every_protocol_has_a_class_that_names_it() -> None:
@@ -131,10 +139,10 @@ def test_every_protocol_has_a_class_that_names_it() -> None:
     assert sum(map(len, words)) == len(set().union(*words))
 
 
-@pytest.mark.parametrize("word", ["", "XYZ", "ABT "])
-def test_protocols_that_nobody_knows(word: str) -> None:
-    with pytest.raises(UnknownProtocolError, match="robochoc protocols"):
-        protocol_called(word)
+def test_protocols_that_nobody_knows() -> None:
+    for word in ["", "XYZ", "ABT "]:
+        with pytest.raises(UnknownProtocolError, match="robochoc protocols"):
+            protocol_called(word)
 
 
 def test_containers_that_were_not_told_all(tmp_path: Path) -> None:

@@ -68,10 +68,10 @@ def test_the_central_solver_adds_what_both_sides_pay(seeds: int, tmp_path_factor
         assert read_team(folder) == team
 
 
-@pytest.mark.parametrize("protocol", ["dpop", "adopt", "afb", "dsa"])
-def test_protocols_refuse_it_by_name(protocol: str) -> None:
-    with pytest.raises(UnsupportedError, match=rf"has costs of its own for .*PKC, C\d\d\), which {protocol} does not"):
-        solve(asymmetric_team(1), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+def test_protocols_refuse_it_by_name() -> None:
+    for protocol in ["dpop", "adopt", "afb", "dsa"]:
+        with pytest.raises(UnsupportedError, match=rf"has costs of its own for .*C\d\d\), which {protocol} does not"):
+            solve(asymmetric_team(1), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
 
 
 def test_a_trait_says_who_takes_it() -> None:

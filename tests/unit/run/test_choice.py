@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import log2, prod
 from random import Random
+from typing import Any
 
 import pytest
 
@@ -23,6 +24,7 @@ from robochoc.run.facts import Facts, TreeTables
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.brute_force import solutions
+from tests.support.cases import cases
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs
 from tests.support.examples import count
@@ -167,9 +169,8 @@ def test_each_epoch_of_a_problem_that_changes_is_that_of_brute_force(many: int) 
 PART = pkc_part("AB", (0, 0))
 
 
-@pytest.mark.parametrize(
-    ("team", "options", "protocol", "order"),
-    [
+def test_what_is_chosen() -> None:
+    chosen: list[tuple[Team, dict[str, Any], str, Order | None]] = [
         (random_csp(10, 4, 0.5, 0.3), {}, "sfb", Order.MIN_WIDTH),
         (random_csp(10, 4, 0.5, 0.3), {"order": Order.DFS}, "sfb", Order.DFS),
         (random_csp(10, 4, 0.5, 0.3), {"order": Order.GIVEN}, "sfb", None),
@@ -196,17 +197,18 @@ PART = pkc_part("AB", (0, 0))
         (random_scenario(random_csp(12, 5, 0.5, 0.2), 2, 0.1), {"message_loss": 0.1}, "gdba", None),
         (pkc_pair(PART, PART), {"message_loss": 0.1}, "acls", None),
         (with_costs(pkc_pair(PART, PART)), {"message_loss": 0.1}, "acls", None),
-    ],
-)
-def test_what_is_chosen(team: Team, options: dict[str, object], protocol: str, order: Order | None) -> None:
-    runtime = Runtime.SIMULATOR if "message_loss" in options else Runtime.PROCESSES
-    asked = replace(Options(runtime=runtime), **options)  # type: ignore[arg-type]
-    found = decided(team, asked)
-    assert (found.options.protocol, found.options.order) == (protocol, order)
-    assert ("order" in found.options.chosen) is (order is not None and asked.order is None)
-    assert found.facts
-    assert protocol not in dict(found.rejected)
-    assert decided(team, found.options).options == found.options
+    ]
+    with cases() as each:
+        for team, options, protocol, order in chosen:
+            with each((protocol, options)):
+                runtime = Runtime.SIMULATOR if "message_loss" in options else Runtime.PROCESSES
+                asked = replace(Options(runtime=runtime), **options)
+                found = decided(team, asked)
+                assert (found.options.protocol, found.options.order) == (protocol, order)
+                assert ("order" in found.options.chosen) is (order is not None and asked.order is None)
+                assert found.facts
+                assert protocol not in dict(found.rejected)
+                assert decided(team, found.options).options == found.options
 
 
 def test_what_was_asked_for_is_not_changed() -> None:

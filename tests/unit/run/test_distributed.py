@@ -125,15 +125,16 @@ def test_all_are_lost() -> None:
         solve_distributed(MadeUp(Options(protocol="abt"), [losing("A"), losing("B")], robots="AB"), ABT, HEADER)
 
 
-@pytest.mark.parametrize(
-    ("options", "result", "reason"),
-    [
+def test_why_there_is_no_verdict() -> None:
+    for options, result, reason in [
         (Options(messages=2), BROKEN_OFF, "so many messages have been sent (--messages 2)"),
         (Options(timeout=1.5, messages=3), BROKEN_OFF, "the time was over (--timeout 1.5)"),
         (Options(), replace(BROKEN_OFF, witness="C"), "C gave up, as its protocol has it"),
-        (Options(protocol="dsa"), SOLVED, "dsa has come to its end, and all that it came by breaks a hard constraint"),
-    ],
-)
-def test_why_there_is_no_verdict(options: Options, result: RunResult, reason: str) -> None:
-    outcome = solve_distributed(MadeUp(options, [result]), DSA if options.protocol == "dsa" else ABT, HEADER)
-    assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, reason)
+        (
+            Options(protocol="dsa"),
+            SOLVED,
+            "dsa has come to its end, and all that it came by breaks a hard constraint",
+        ),
+    ]:
+        outcome = solve_distributed(MadeUp(options, [result]), DSA if options.protocol == "dsa" else ABT, HEADER)
+        assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, reason)

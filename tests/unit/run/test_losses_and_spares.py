@@ -72,12 +72,12 @@ def test_so_many_come_back_as_there_are_spares(team: Team) -> None:
     assert [now.order for now in teams[1:]] == [("RA", "RB", "RC"), ("RB", "RC")]
 
 
-@pytest.mark.parametrize("name", ["RA", "RB", "RC", "RD"])
-def test_who_comes_back_after_changes_has_them_too(team: Team, name: str) -> None:
-    scenario = (ScenarioEvent(tuple(CHANGES)),)
-    *_, last = travel(replace(team, scenario=scenario), ["", name], spares=1)[2]
-    now = team_after_events(replace(team, scenario=scenario), 1)
-    assert {robot.name: robot for robot in last.robots} == {robot.name: robot for robot in now.robots}
+def test_who_comes_back_after_changes_has_them_too(team: Team) -> None:
+    for name in ["RA", "RB", "RC", "RD"]:
+        scenario = (ScenarioEvent(tuple(CHANGES)),)
+        *_, last = travel(replace(team, scenario=scenario), ["", name], spares=1)[2]
+        now = team_after_events(replace(team, scenario=scenario), 1)
+        assert {robot.name: robot for robot in last.robots} == {robot.name: robot for robot in now.robots}
 
 
 def test_changes_of_one_who_left_do_not_concern_who_comes_under_its_name(team: Team) -> None:

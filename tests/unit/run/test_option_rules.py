@@ -14,6 +14,7 @@ from robochoc.journal.reader import read_journal
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import cases
 from tests.support.refusals import costly_team, refusal_of
 
 WLAN = CHANNELS["wlan"]
@@ -44,9 +45,13 @@ REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("options", "said"), REFUSED_OPTIONS, ids=[said for _, said in REFUSED_OPTIONS])
-def test_options_that_do_not_go_together_are_refused_in_python_too(options: dict[str, Any], said: str) -> None:
-    assert said in refusal_of(costly_team(3), Options(**{"protocol": "sfb", "runtime": Runtime.SIMULATOR, **options}))
+def test_options_that_do_not_go_together_are_refused_in_python_too() -> None:
+    with cases() as each:
+        for options, said in REFUSED_OPTIONS:
+            with each(said):
+                assert said in refusal_of(
+                    costly_team(3), Options(**{"protocol": "sfb", "runtime": Runtime.SIMULATOR, **options})
+                )
 
 
 def test_no_rule_refuses_the_defaults() -> None:
@@ -55,15 +60,15 @@ def test_no_rule_refuses_the_defaults() -> None:
     refuse_options(Options(protocol="central", count=True))
 
 
-@pytest.mark.parametrize("seed", [2**64, -(2**63) - 1])
-def test_a_seed_has_64_bits_as_journals_and_networks_tell_it(seed: int) -> None:
-    with pytest.raises(UnsupportedError, match="--seed is a number of 64 bits"):
+def test_a_seed_has_64_bits_as_journals_and_networks_tell_it() -> None:
+    for seed in [2**64, -(2**63) - 1]:
+        with pytest.raises(UnsupportedError, match="--seed is a number of 64 bits"):
+            refuse_options(Options(seed=seed))
+
+
+def test_the_largest_seeds_can_be_recorded() -> None:
+    for seed in [2**64 - 1, -(2**63)]:
         refuse_options(Options(seed=seed))
-
-
-@pytest.mark.parametrize("seed", [2**64 - 1, -(2**63)])
-def test_the_largest_seeds_can_be_recorded(seed: int) -> None:
-    refuse_options(Options(seed=seed))
-    recorder = JournalRecorder(Header(team="team", protocol="abt", runtime="simulator", seed=seed))
-    recorder.flush()
-    assert read_journal(recorder.content()).header.seed == seed
+        recorder = JournalRecorder(Header(team="team", protocol="abt", runtime="simulator", seed=seed))
+        recorder.flush()
+        assert read_journal(recorder.content()).header.seed == seed

@@ -89,16 +89,16 @@ def test_who_is_left_after_a_loss_has_the_exact_optimum(runtime: Runtime, tmp_pa
         assert (None if outcome.cost is None else Fraction(outcome.cost)) == best, seed
 
 
-@pytest.mark.parametrize("protocol", ["dsa", "mgm", "mgm2", "maxsum"])
-def test_incomplete_protocols_tell_what_their_answer_costs(protocol: str) -> None:
-    for seed in range(10):
-        team = random_costs_team(seed)
-        outcome = solve(team, in_simulator(protocol))
-        best = best_cost(team)
-        if outcome.cost is not None:
-            assert best is not None
-            better = outcome.cost <= best if team.robots[0].costs.maximize else outcome.cost >= best
-            assert better, seed  # and `solve` has checked it against the files
+def test_incomplete_protocols_tell_what_their_answer_costs() -> None:
+    for protocol in ["dsa", "mgm", "mgm2", "maxsum"]:
+        for seed in range(10):
+            team = random_costs_team(seed)
+            outcome = solve(team, in_simulator(protocol))
+            best = best_cost(team)
+            if outcome.cost is not None:
+                assert best is not None
+                better = outcome.cost <= best if team.robots[0].costs.maximize else outcome.cost >= best
+                assert better, seed  # and `solve` has checked it against the files
 
 
 def tutored() -> Team:

@@ -6,6 +6,7 @@ import pytest
 
 from robochoc.protocols.settings import MOST, SettingsError, settings_of
 from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.cases import cases
 
 NUMBERS = [
     (name, field)
@@ -15,11 +16,13 @@ NUMBERS = [
 ]
 
 
-@pytest.mark.parametrize(("protocol", "field"), NUMBERS)
-def test_no_number_is_beyond_the_limit(protocol: str, field: str) -> None:
-    for value in (str(MOST + 1), "9" * 60, str(-MOST - 1), "1e400", "nan"):
-        with pytest.raises(SettingsError, match=field):
-            settings_of(protocol_named(protocol), {field: value})
+def test_no_number_is_beyond_the_limit() -> None:
+    with cases() as each:
+        for protocol, field in NUMBERS:
+            with each((protocol, field)):
+                for value in (str(MOST + 1), "9" * 60, str(-MOST - 1), "1e400", "nan"):
+                    with pytest.raises(SettingsError, match=field):
+                        settings_of(protocol_named(protocol), {field: value})
 
 
 def test_the_limit_is_told_and_a_long_number_cut() -> None:
@@ -28,9 +31,9 @@ def test_the_limit_is_told_and_a_long_number_cut() -> None:
     assert getattr(settings_of(protocol_named("dsa"), {"cycles": str(MOST)}), "cycles") == MOST  # noqa: B009 - of a subclass
 
 
-@pytest.mark.parametrize(("protocol", "field", "most"), [("p2-dpop", "ciphers", 10**6), ("p-dpop", "cells", 10**8)])
-def test_tables_that_no_machine_holds_cannot_be_asked_for(protocol: str, field: str, most: int) -> None:
-    assert getattr(settings_of(protocol_named(protocol), {field: str(most)}), field) == most
-    for wrong in (0, most + 1):
-        with pytest.raises(SettingsError, match=f"{field} is a number of {field} from 1 to {most:,}, not {wrong}"):
-            settings_of(protocol_named(protocol), {field: str(wrong)})
+def test_tables_that_no_machine_holds_cannot_be_asked_for() -> None:
+    for protocol, field, most in [("p2-dpop", "ciphers", 10**6), ("p-dpop", "cells", 10**8)]:
+        assert getattr(settings_of(protocol_named(protocol), {field: str(most)}), field) == most
+        for wrong in (0, most + 1):
+            with pytest.raises(SettingsError, match=f"{field} is a number of {field} from 1 to {most:,}, not {wrong}"):
+                settings_of(protocol_named(protocol), {field: str(wrong)})

@@ -9,6 +9,7 @@ import pytest
 
 from robochoc.model.outcome import Verdict
 from robochoc.system.decode_errors import describe_decode_error
+from tests.support.cases import cases
 
 
 class Part(msgspec.Struct):
@@ -28,26 +29,28 @@ class Whole(msgspec.Struct, forbid_unknown_fields=True):
 VERDICTS = "allowed: solution, optimal, no-solution, unknown"
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ('{"name": 1}', "name: expected a text, found an integer"),
-        ("{}", "the field 'name' is missing"),
-        ("[]", "expected an object, found a list"),
-        (
-            '{"name": "", "other": 1}',
-            "there is no field 'other'; allowed: name, parts, by_name, count, letter, pair",
-        ),
-        ('{"name": "", "parts": [{"verdict": "Z"}]}', f"parts[0].verdict: 'Z' is not allowed; {VERDICTS}"),
-        ('{"name": "", "by_name": {"x": {"verdict": "Z"}}}', f"by_name[...].verdict: 'Z' is not allowed; {VERDICTS}"),
-        ('{"name": "", "letter": "r"}', "letter: 'r' is not allowed; allowed: p, q"),
-        ('{"name": "", "count": 1.5}', "count: expected an integer or null, found a number"),
-        ('{"name": "", "pair": [1]}', "pair: expected a list of length 2"),
-        ('{"name": ', "it is no JSON: it ends too early"),
-        ('{"name" 1}', "it is no JSON: expected ':' (byte 8)"),
-    ],
-)
-def test_what_is_wrong_where_and_what_is_allowed(content: str, message: str) -> None:
-    with pytest.raises(msgspec.MsgspecError) as caught:
-        msgspec.json.decode(content, type=Whole)
-    assert describe_decode_error(caught.value, Whole) == message
+def test_what_is_wrong_where_and_what_is_allowed() -> None:
+    with cases() as each:
+        for content, message in [
+            ('{"name": 1}', "name: expected a text, found an integer"),
+            ("{}", "the field 'name' is missing"),
+            ("[]", "expected an object, found a list"),
+            (
+                '{"name": "", "other": 1}',
+                "there is no field 'other'; allowed: name, parts, by_name, count, letter, pair",
+            ),
+            ('{"name": "", "parts": [{"verdict": "Z"}]}', f"parts[0].verdict: 'Z' is not allowed; {VERDICTS}"),
+            (
+                '{"name": "", "by_name": {"x": {"verdict": "Z"}}}',
+                f"by_name[...].verdict: 'Z' is not allowed; {VERDICTS}",
+            ),
+            ('{"name": "", "letter": "r"}', "letter: 'r' is not allowed; allowed: p, q"),
+            ('{"name": "", "count": 1.5}', "count: expected an integer or null, found a number"),
+            ('{"name": "", "pair": [1]}', "pair: expected a list of length 2"),
+            ('{"name": ', "it is no JSON: it ends too early"),
+            ('{"name" 1}', "it is no JSON: expected ':' (byte 8)"),
+        ]:
+            with each(content):
+                with pytest.raises(msgspec.MsgspecError) as caught:
+                    msgspec.json.decode(content, type=Whole)
+                assert describe_decode_error(caught.value, Whole) == message

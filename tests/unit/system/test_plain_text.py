@@ -13,6 +13,7 @@ from robochoc.communication.network.control_messages import Joined, Leave
 from robochoc.communication.network.refusals import Refusals
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.system.plain_text import LONGEST, LONGEST_REASON, on_one_line
+from tests.support.cases import cases
 from tests.support.lone_robot import played
 
 HOSTILE = {
@@ -31,11 +32,13 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize(("text", "shown"), HOSTILE.items(), ids=map(ascii, HOSTILE))
-def test_nothing_speaks_to_the_terminal(text: str, shown: str) -> None:
-    assert on_one_line(text) == shown
-    assert on_one_line(text).isprintable()
-    on_one_line(text).encode()
+def test_nothing_speaks_to_the_terminal() -> None:
+    with cases() as each:
+        for text, shown in HOSTILE.items():
+            with each(text):
+                assert on_one_line(text) == shown
+                assert on_one_line(text).isprintable()
+                on_one_line(text).encode()
 
 
 def test_nothing_fills_the_screen() -> None:
