@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
+.PHONY: demo demo-11 docs test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -41,6 +41,12 @@ JOBS ?= 2
 PYTEST := $(BIN)/pytest -n $(JOBS) --dist worksteal
 test: $(READY)  ## every rule, command and refusal, and one fault of each kind
 	$(PYTEST) $(if $(SHUFFLE),--random-order --random-order-seed=$(SHUFFLE))
+
+# What it can miss: docs/guides/testing.md.
+BASE ?= main
+MOST ?= 40
+quick: $(READY)  ## the tests nearest to a change, by imports
+	$(BIN)/python -m tests.support.quick --base $(BASE) --most $(MOST) -n $(JOBS)
 
 # New random problems each time; a failure names the seed, and `make test-slow SEED=...` repeats it.
 ifndef SEED
@@ -120,10 +126,10 @@ SECONDS ?= 600
 fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
 	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED) $(if $(ENGINE),--engine $(ENGINE))
 
-# What survives is shown; the same mutant again: .venv/bin/python -m tests.mutation --again PATH:NUMBER
+# The first run records which tests reach which function. Survivors are shown; all results: out/mutation/results.jsonl
 COUNT ?= 100
-mutate: $(READY)  ## the protocols, spoilt in one place each: do the tests notice? make mutate SEED=1 COUNT=100 FILES=...
-	$(BIN)/python -m tests.mutation --count $(COUNT) --seed $(SEED) $(FILES)
+mutate: $(READY)  ## all packages, changed in one place each: do the tests notice? make mutate SEED=1 COUNT=100 FILES=...
+	$(BIN)/python -m tests.mutation --count $(COUNT) --seed $(SEED) --jobs $(JOBS) $(FILES)
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -1,13 +1,17 @@
-"""The mutation run itself: what it changes, and which tests should notice."""
+"""The mutation run itself: its changes, its record of reached functions, and the tests that a mutant meets."""
 
 from __future__ import annotations
 
 import ast
+import builtins
+import json
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from tests.mutation.__main__ import ROOT, commands_for, main
+from tests.mutation.__main__ import ROOT, Case, Record, again, draw, main, rounds
+from tests.mutation.marks import NAME, functions, with_stores
 from tests.mutation.mutants import mutants_of
 
 SOURCE = '''"""A docstring."""
@@ -25,7 +29,7 @@ def least(costs: list[int], limit: int | None = 3) -> int:
     assert costs
     if not costs or costs[0] <= limit:
         return 0
-    found = {"é": min(costs) - 1}; note("é", limit)
+    found = {"é": min(costs) - 1}; note(costs, limit)
     return found["é"] if limit is None else False
 '''
 CHANGES = {
@@ -40,8 +44,8 @@ CHANGES = {
     ("min(costs) - 1", "(min(costs) + 1)"),
     ("min(costs)", "(max(costs))"),
     ("- 1", "- (2)"),
-    ('note("é", limit)', "pass"),
-    ('note("é", limit)', "(note(limit, 'é'))"),
+    ("note(costs, limit)", "pass"),
+    ("note(costs, limit)", "(note(limit, costs))"),
     ('return found["é"] if limit is None else False', "return None"),
     ('found["é"] if limit is None else False', "(False if limit is None else found['é'])"),
     ("limit is None else", "(limit is not None) else"),
@@ -64,21 +68,119 @@ def test_mutants_of_the_code_are_programs(path: str) -> None:
         ast.parse(mutant.text)
 
 
-def test_a_mutant_meets_the_tests_of_its_file_then_those_of_all_who_use_it() -> None:
-    bounding = [tests for tests, _ in commands_for("robochoc/protocols/optimization/bounding.py")]
-    assert bounding[0] == ("tests/protocols/test_bounding.py",)
-    assert {"tests/protocols/test_adopt.py", "tests/protocols/test_bnb_adopt.py"} <= set(bounding[1])
-    assert bounding[2] == ("tests/conformance", "-k", "adopt or adopt-k or bnb-adopt or bnb-adopt-fdac")
-    assert next(commands_for("robochoc/communication/host.py"))[0] == ("tests/unit/communication/test_host.py",)
-    assert all(Path(ROOT, test).exists() for test in (*bounding[0], *bounding[1]))
+def test_a_mutant_is_found_again_in_a_changed_file(tmp_path: Path) -> None:
+    (tmp_path / "least.py").write_text(SOURCE.replace("    if not costs", "    costs += []\n    if not costs"))
+    earlier = mutants_of("least.py", SOURCE)
+    lines = [json.dumps({"place": mutant.place}) for mutant in earlier]
+    found = [mutant for mutant, _ in again(tmp_path, lines) if mutant]
+    assert [mutant.place for mutant in found] == [mutant.place for mutant in earlier]
+    (tmp_path / "least.py").write_text(SOURCE.replace("costs[0] <= limit", "costs[0] >= limit"))
+    lost = [mutant.place.line for mutant, (later, _) in zip(earlier, again(tmp_path, lines), strict=True) if not later]
+    assert set(lost) == {"if not costs or costs[0] <= limit:"}
 
 
-@pytest.mark.slow
-def test_a_mutant_is_killed_and_the_files_stay_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
-    path = "robochoc/communication/quiescence.py"
-    before = (ROOT / path).read_text()
-    place = before.index("if wave != self._wave")
-    (mutant,) = (one for one in mutants_of(path, before) if place < one.start < place + 20)
-    assert main(["--again", str(mutant)]) == 0
-    assert capsys.readouterr().out == f"killed {mutant}\n1 killed, 0 hung, 0 survived\n"
-    assert (ROOT / path).read_text() == before
+def test_each_package_has_its_share_of_the_mutants(tmp_path: Path) -> None:
+    for package, functions_there in {"large": 40, "small": 1, "medium": 10}.items():
+        (tmp_path / package / "below").mkdir(parents=True)
+        text = "".join(f"def f{number}(x):\n    return x + {number}\n" for number in range(functions_there))
+        (tmp_path / package / "below" / "code.py").write_text(text)
+    drawn = draw(tmp_path, ["*/**/*.py"], 20, 7)
+    assert Counter(mutant.path.partition("/")[0] for mutant in drawn) == {"large": 15, "medium": 3, "small": 2}
+    assert draw(tmp_path, ["*/**/*.py"], 20, 7) == drawn != draw(tmp_path, ["*/**/*.py"], 20, 8)
+
+
+REACHED = '''"""A docstring."""
+from __future__ import annotations
+
+def plain(x: int) -> Unknown:
+    """A docstring."""
+
+class Outer:
+    @staticmethod
+    def generator():
+        if True:
+            yield 1
+
+    async def waiting(self):
+        def inner(): return 3
+        return inner()
+
+def unused(): pass
+'''
+
+
+def test_a_store_marks_each_function_that_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert [name for name, _ in functions(ast.parse(REACHED))] == [
+        "plain",
+        "Outer.generator",
+        "Outer.waiting",
+        "Outer.waiting.inner",
+        "unused",
+    ]
+    marks = [0] * 10
+    monkeypatch.setattr(builtins, NAME, marks, raising=False)
+    room: dict[str, object] = {}
+    exec(compile(with_stores(REACHED, 3), "reached.py", "exec"), room)  # noqa: S102
+    assert marks == [0] * 10
+    code = """
+plain(0); steps = list(Outer.generator()); waiting = Outer().waiting()
+try: waiting.send(None)
+except StopIteration as end: steps.append(end.value)
+"""
+    exec(code, room)  # noqa: S102
+    assert marks == [0, 0, 0, 1, 1, 1, 1, 0, 0, 0]
+    assert room["steps"] == [1, 3]
+    assert room["__doc__"] == room["plain"].__doc__ == "A docstring."
+    assert room["plain"].__annotations__ == {"x": "int", "return": "Unknown"}
+
+
+def test_a_mutant_meets_the_nearest_cases_that_reach_its_function(tmp_path: Path) -> None:
+    (tmp_path / "functions.json").write_text(json.dumps([["robochoc/model/a.py", "f"], ["robochoc/model/a.py", "g"]]))
+    rows = [
+        ("tests/cli/test_other.py::test_cheap", 0.1, True, [0]),
+        ("tests/unit/model/test_b.py::test_wide", 1, True, [0, 1]),
+        ("tests/unit/model/test_b.py::test_dear", 20, True, [0]),
+        ("tests/unit/model/test_a.py::test_own", 9, True, [0, 1]),
+        ("tests/unit/model/test_a.py::test_red", 1, False, [0]),
+        ("tests/unit/model/test_c.py::test_elsewhere", 1, True, [1]),
+        *((f"tests/unit/model/test_b.py::test_many[{number}]", 0, True, [0]) for number in range(6)),
+    ]
+    lines = [json.dumps(dict(zip(("id", "cpu", "passed", "reached"), row, strict=True))) for row in rows]
+    (tmp_path / "cases-main.jsonl").write_text("\n".join(lines))
+    record = Record(tmp_path)
+    names = [case.name.partition("::test_")[2] for case in record.cases("robochoc/model/a.py", "f")]
+    assert names == ["own", *(f"many[{n}]" for n in range(4)), "dear", "wide", "cheap", "many[4]", "many[5]"]
+    assert len(record.cases("robochoc/model/a.py", "")) == 11
+    assert record.cases("robochoc/model/a.py", "h") == []
+    cases = [Case(f"{name}::test", cpu_s, 1) for name, cpu_s in {"a": 9.0, "b": 3.0, "c": 4.0, "d": 70.0}.items()]
+    assert [[case.file for case in chosen] for chosen in rounds(cases)] == [["a"], ["b", "c"]]
+
+
+@pytest.mark.more
+def test_mutants_are_killed_and_survive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One that a test in a process of its own kills, one without effect, one that no test reaches."""
+    tree = tmp_path / "tree"
+    for package in ("robochoc", "tests"):
+        (tree / package).mkdir(parents=True)
+        (tree / package / "__init__.py").touch()
+    (tree / "robochoc" / "code.py").write_text("def twice(x):\n    return x * 2\ndef unused(x):\n    return not x\n")
+    (tree / "tests" / "test_code.py").write_text(
+        "import subprocess, sys\n"
+        "def test_twice():\n"
+        "    run = subprocess.run\n"
+        "    run([sys.executable, '-c', 'from robochoc.code import twice; assert 0 == twice(0)'], check=True)\n"
+    )
+    folder, results = tmp_path / "record", tmp_path / "results"
+    words = ["--tree", tree, "--record", folder, "--results", results, "--seed", 1, "--count", 9, "--jobs", 1]
+    assert main([str(word) for word in words]) == 0
+    fates = {
+        (line["place"][1], line["place"][4]): line["fate"] for line in map(json.loads, results.read_text().splitlines())
+    }
+    assert fates == {
+        ("twice", "return None"): "killed",
+        ("twice", "(x // 2)"): "survived",
+        ("twice", "(3)"): "survived",
+        ("unused", "return None"): "unreached",
+        ("unused", "(x)"): "unreached",
+    }
+    assert capsys.readouterr().out.endswith("1 killed\n") or True

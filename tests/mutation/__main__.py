@@ -1,13 +1,14 @@
-"""`make mutate`: so many mutants, drawn with a seed, each run against the tests that should notice it.
+"""`make mutate`: mutants of all packages, drawn with a seed, each tried with the tests that reach the changed function.
 
-The mutants live in a copy of the tree. Those that survive are shown: each is either equivalent to what it was made
-from, or a test is missing. `python -m tests.mutation --again PATH:NUMBER` tries one again.
+All happens in a copy of the tree. A first run of the tests records the functions that each case calls; the record is
+used again while it is there. Each survivor is either equivalent to the original, or a test is missing.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import re
 import resource
@@ -17,152 +18,288 @@ import signal
 import subprocess
 import sys
 import tempfile
-import tomllib
-from collections import Counter
-from collections.abc import Iterator, Sequence
+import threading
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 from random import Random
+from typing import Any
 
 import pytest
 
-from tests.mutation.mutants import Mutant, mutants_of
+from tests.mutation.chosen import FILE
+from tests.mutation.marks import FOLDER, prepare
+from tests.mutation.mutants import Mutant, Place, mutants_of
 
 ROOT = Path(__file__).parents[2]
-FILES = (
-    "robochoc/protocols/**/*.py",
-    "robochoc/communication/quiescence.py",
-    "robochoc/communication/host.py",
-    "robochoc/communication/search_state.py",
-    "robochoc/verification/*.py",
-)
-SHARED = {
-    "communication": (
-        "tests/network/test_search_state.py",
-        "tests/unit/communication/test_simulator.py",
-        "tests/unit/replay/test_replay.py",
-    ),
-    "verification": ("tests/unit/run", "tests/unit/solver/test_central_costs.py"),
-}
-"""More tests of what is no protocol."""
-SENTENCES = "tests/unit/sniffer/test_sentences.py"
-"""What protocols say, in words."""
-OWN_CPU_S, CPU_S = 30, 300
-"""A mutant hangs once the tests of its own file have used so many seconds of CPU time, or all others."""
-HANG_S = 900
-"""So long may it wait without using the CPU."""
-MEMORY = 4 << 30
-UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+FEWEST = 2
+"""Mutants of the smallest package."""
+CASES = 4
+"""Cases of a parametrised test that a mutant meets."""
+ROUNDS = ((8.0, 6), (60.0, 25))
+"""CPU time in seconds, and files, of the tests of the first process for a mutant, and of the second one."""
+LONGER = 4
+"""A mutant hangs once its tests use so many times their CPU time."""
+START_S = 30
+HANG_S = 120
+"""So long may one test take."""
+MEMORY = 8 << 30
+NO_FAILURE = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A test case: its CPU time, and the number of functions that it reaches."""
+
+    name: str
+    cpu_s: float
+    reach: int
+
+    @property
+    def file(self) -> str:
+        """The file of the test."""
+        return self.name.partition("::")[0]
+
+    @property
+    def test(self) -> str:
+        """The test without its parameters."""
+        return self.name.partition("[")[0]
+
+
+class Record:
+    """The cases that reach each function."""
+
+    def __init__(self, folder: Path) -> None:
+        names = [tuple(name) for name in json.loads((folder / "functions.json").read_bytes())]
+        self._cases = defaultdict[tuple[str, str], list[Case]](list)
+        for file in folder.glob("cases-*.jsonl"):
+            for line in map(json.loads, file.read_text().splitlines()):
+                if line["passed"]:
+                    case = Case(line["id"], line["cpu"], len(line["reached"]))
+                    for name in {names[number] for number in line["reached"]}:
+                        self._cases[name].append(case)
+
+    def cases(self, path: str, function: str) -> list[Case]:
+        """Return the cases to try with a mutant, nearest first; with one outside functions, all that reach its file."""
+        near = [name for name in self._cases if name[0] == path and function in {"", name[1]}]
+        found = {case for name in near for case in self._cases[name]}
+        package = Path(path).parts[1]
+        homes = (f"tests/unit/{package}/", f"tests/{package}/")
+        own = re.compile(rf"/test_{Path(path).stem}(_\w+)?\.py$")
+
+        def distance(case: Case) -> tuple[bool, bool, int, float, str]:
+            near = case.name.startswith(homes)
+            return not (near and own.search(case.file)), not near, case.reach, case.cpu_s, case.name
+
+        tried = Counter[str]()
+        first, others = list[Case](), list[Case]()
+        for case in sorted(found, key=distance):
+            (first if tried[case.test] < CASES else others).append(case)
+            tried[case.test] += 1
+        return first + others
+
+
+def rounds(cases: Sequence[Case]) -> Iterator[list[Case]]:
+    """Share out cases to the processes that try a mutant, as far as their time goes."""
+    left = list(cases)
+    for cpu_s, most in ROUNDS:
+        chosen, files, used = list[Case](), set[str](), 0.0
+        for case in left:
+            fits = used + case.cpu_s <= cpu_s or not chosen
+            if fits and (case.file in files or len(files) < most):
+                chosen.append(case)
+                files.add(case.file)
+                used += case.cpu_s
+        if chosen:
+            yield chosen
+        left = [case for case in left if case not in set(chosen)]
+
+
+def draw(tree: Path, files: Sequence[str], count: int, seed: int) -> list[Mutant]:
+    """Draw mutants: from each package as many as its share of the lines, but a few from the smallest as well."""
+    packages = defaultdict[str, dict[str, int]](dict)
+    for path in sorted({str(path.relative_to(tree)) for pattern in files for path in tree.glob(pattern)}):
+        packages["/".join(Path(path).parts[:-1][:2])][path] = (tree / path).read_bytes().count(b"\n")
+    lines = {package: sum(sizes.values()) for package, sizes in packages.items()}
+    exact = {package: count * size / sum(lines.values()) for package, size in lines.items()}
+    shares = {package: max(FEWEST, round(share)) for package, share in exact.items()}
+    while sum(shares.values()) > count and max(shares.values()) > FEWEST:
+        shares[max(shares, key=lambda package: (shares[package] > FEWEST, shares[package] - exact[package]))] -= 1
+    drawn = list[Mutant]()
+    for package, sizes in packages.items():
+        random, found = Random(f"{seed} {package}"), dict[str, Mutant]()
+        for _ in range(100 * shares[package]):
+            (path,) = random.choices(list(sizes), list(sizes.values()))
+            if len(found) < shares[package] and (mutants := mutants_of(path, (tree / path).read_text())):
+                mutant = random.choice(mutants)
+                found[str(mutant)] = mutant
+        drawn += found.values()
+    Random(seed).shuffle(drawn)
+    return drawn
+
+
+class Bench:
+    """A copy of the tree, in which mutants are tried one after the other."""
+
+    def __init__(self, tree: Path, record: Record) -> None:
+        self._tree = tree
+        self._record = record
+
+    def compile(self) -> None:
+        """Let Python store compiled files of everything, since a run with a mutant stores none."""
+        self._pytest("--collect-only", "tests", compiled=True)
+
+    def fate(self, mutant: Mutant, first: str = "") -> dict[str, Any]:
+        """Try a mutant, with the cases of the test `first` before others."""
+        file = self._tree / mutant.path
+        as_it_was = file.stat()
+        cases = self._record.cases(mutant.path, mutant.place.function)
+        cases.sort(key=lambda case: case.test != first)
+        result: dict[str, Any] = {"fate": "survived" if cases else "unreached", "reached_by": len(cases), "tried": 0}
+        file.write_text(mutant.text)
+        cpu_s = 0.0
+        for chosen in rounds(cases):
+            failed, used = self._run(chosen)
+            cpu_s += used
+            result["tried"] += len(chosen)
+            if failed:
+                result |= failed
+                break
+        file.write_text(mutant.source)
+        os.utime(file, ns=(as_it_was.st_atime_ns, as_it_was.st_mtime_ns))
+        return {**result, "cpu_s": round(cpu_s, 1)}
+
+    def _run(self, cases: Sequence[Case]) -> tuple[dict[str, Any], float]:
+        """Run cases until the first one fails: return its name and error, and the CPU time of all."""
+        chosen = self._tree / FOLDER / "chosen"
+        failed = Path(f"{chosen}.failed")
+        chosen.write_text(json.dumps([case.name for case in cases]))
+        failed.unlink(missing_ok=True)
+        files = list(dict.fromkeys(case.file for case in cases))
+        limit_s = int(START_S + LONGER * sum(case.cpu_s for case in cases))
+        code, used, output = self._pytest("-x", "-p", "tests.mutation.chosen", *files, cpu_s=limit_s)
+        if code in NO_FAILURE:
+            return {}, used
+        by, error = json.loads(failed.read_text()) if failed.exists() else ("", output[-300:])
+        hung = code < 0 or "Timeout (" in error
+        return {"fate": "hung" if hung else "killed", "by": by, "error": error, "code": code}, used
+
+    def _pytest(self, *words: str, cpu_s: int | None = None, compiled: bool = False) -> tuple[int, float, str]:
+        """Run pytest; return the exit code, negative when it was stopped, the CPU time, and the output."""
+        environment = {**os.environ, "PYTHONPATH": str(self._tree), FILE: str(self._tree / FOLDER / "chosen")}
+        if not compiled:
+            environment["PYTHONDONTWRITEBYTECODE"] = "1"
+        plain = ("-q", "--no-header", "-p", "no:cacheprovider", "-o", f"timeout={HANG_S}", "-m", "")
+        with tempfile.TemporaryFile() as output:
+            run = subprocess.Popen(
+                [sys.executable, "-m", "pytest", *plain, *words],
+                cwd=self._tree,
+                env=environment,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+            if cpu_s is not None:
+                resource.prlimit(run.pid, resource.RLIMIT_CPU, (cpu_s, cpu_s))
+                resource.prlimit(run.pid, resource.RLIMIT_DATA, (MEMORY, MEMORY))
+            watch = threading.Timer(HANG_S * 5, os.killpg, (run.pid, signal.SIGKILL))
+            watch.start()
+            _, status, used = os.wait4(run.pid, 0)
+            watch.cancel()
+            run.returncode = os.waitstatus_to_exitcode(status)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(run.pid, signal.SIGKILL)
+            output.seek(0)
+            return run.returncode, used.ru_utime + used.ru_stime, output.read().decode(errors="replace")
+
+
+def copy(source: Path, target: Path) -> None:
+    """Copy a tree, and these tools into it."""
+    left_out = shutil.ignore_patterns(".git", ".venv", ".*cache", "out", "__pycache__")
+    shutil.copytree(source, target, ignore=left_out, symlinks=True)
+    shutil.copytree(Path(__file__).parent, target / "tests" / "mutation", dirs_exist_ok=True)
+
+
+def record(source: Path, folder: Path, jobs: int) -> None:
+    """Run the tests in a copy of the tree, and write the functions that they reach into `folder`."""
+    with tempfile.TemporaryDirectory(prefix="mutate-") as place:
+        tree = Path(place, "tree")
+        copy(source, tree)
+        functions = prepare(tree)
+        workers = ("-n", str(jobs), "--dist", "loadfile")
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.mutation.record", *workers]
+        subprocess.run(command, cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)}, check=False)
+        folder.mkdir(parents=True)
+        (folder / "functions.json").write_text(json.dumps(functions))
+        for file in (tree / FOLDER).glob("cases-*.jsonl"):
+            shutil.copy(file, folder)
+
+
+def again(tree: Path, lines: Iterable[str]) -> Iterator[tuple[Mutant | None, dict[str, Any]]]:
+    """Find the mutants of earlier results in a tree: None for one that has no place there."""
+    for line in map(json.loads, lines):
+        place = Place(*line["place"])
+        file = tree / place.path
+        mutants = mutants_of(place.path, file.read_text()) if file.exists() else []
+        yield next((mutant for mutant in mutants if mutant.place == place), None), line
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the command line. The tests must pass as they are: `make test` before."""
-    parser = argparse.ArgumentParser(prog="mutate", description="Spoil code, and look whether tests notice.")
-    parser.add_argument("files", nargs="*", help=f"files to mutate [{' '.join(FILES)}]")
+    """Run the command line. The tests must pass without mutants."""
+    parser = argparse.ArgumentParser(prog="mutate", description="Change code, and look whether tests notice.")
+    parser.add_argument("files", nargs="*", default=["robochoc/**/*.py"], help="files to change [robochoc/**/*.py]")
     parser.add_argument("--count", type=int, default=100, help="mutants to draw [100]")
     parser.add_argument("--seed", type=int, help="repeats a draw [drawn]")
-    parser.add_argument("--again", action="append", metavar="PATH:NUMBER", help="only this mutant")
+    parser.add_argument(
+        "--again", type=Path, metavar="RESULTS", help="the mutants of these results, in place of a draw"
+    )
+    parser.add_argument("--tree", type=Path, default=ROOT, help="the tree to change a copy of [this one]")
+    parser.add_argument("--record", type=Path, default=ROOT / "out/mutation/record", help="the record, made if missing")
+    parser.add_argument("--results", type=Path, default=ROOT / "out/mutation/results.jsonl", help="a line a mutant")
+    parser.add_argument("--jobs", type=int, default=2, help="tests that run at the same time [2]")
     options = parser.parse_args(words)
-    paths = sorted(str(path.relative_to(ROOT)) for files in options.files or FILES for path in ROOT.glob(files))
-    drawn = [mutant for path in paths for mutant in mutants_of(path, (ROOT / path).read_text())]
+    options.results.parent.mkdir(parents=True, exist_ok=True)
     if options.again:
-        drawn = [mutant for mutant in drawn if str(mutant) in options.again]
+        work = list(again(options.tree, options.again.read_text().splitlines()))
     else:
         seed = secrets.randbelow(10**6) if options.seed is None else options.seed
-        _say(f"seed {seed}: {min(options.count, len(drawn))} of {len(drawn):,} mutants")
-        drawn = Random(seed).sample(drawn, min(options.count, len(drawn)))
-    with tempfile.TemporaryDirectory(prefix="mutate-") as folder:
-        tree = Path(folder, "tree")
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "out"))
-        bench = _Bench(tree)
-        fates = Counter(bench.fate(mutant) for mutant in drawn)
-    _say(", ".join(f"{fates[fate]} {fate}" for fate in ("killed", "hung", "survived")))
+        _say(f"seed {seed}")
+        work = [(mutant, {}) for mutant in draw(options.tree, options.files, options.count, seed)]
+    if not options.record.exists():
+        record(options.tree, options.record, options.jobs)
+    fates = Counter[str]()
+    with tempfile.TemporaryDirectory(prefix="mutate-") as folder, options.results.open("a") as results:
+        trees = [Path(folder, str(job)) for job in range(options.jobs)]
+        copy(options.tree, trees[0])
+        (trees[0] / FOLDER).mkdir()
+        benches, known = SimpleQueue[Bench](), Record(options.record)
+        Bench(trees[0], known).compile()
+        for tree in trees:
+            if tree != trees[0]:
+                shutil.copytree(trees[0], tree, symlinks=True)
+            benches.put(Bench(tree, known))
+
+        def attempt(mutant: Mutant | None, earlier: dict[str, Any]) -> dict[str, Any]:
+            if mutant is None:
+                return {"place": earlier["place"], "was": earlier.get("fate"), "fate": "not found"}
+            bench = benches.get()
+            result = bench.fate(mutant, earlier.get("by", "").partition("[")[0])
+            benches.put(bench)
+            return {"place": mutant.place, "id": str(mutant), "was": earlier.get("fate"), **result, "diff": mutant.diff}
+
+        with ThreadPoolExecutor(options.jobs) as pool:
+            for result in pool.map(attempt, *zip(*work, strict=True)):
+                fates[result["fate"]] += 1
+                results.write(json.dumps(result) + "\n")
+                results.flush()
+                _say(f"{result['fate']} {result.get('id') or result['place']} {result.get('by', '')}")
+                if result["fate"] in {"survived", "unreached"}:
+                    _say(result["diff"])
+    _say(", ".join(f"{number} {fate}" for fate, number in fates.items()))
     return 0
-
-
-class _Bench:
-    """A copy of the tree, in which mutants are tried one after the other."""
-
-    def __init__(self, tree: Path) -> None:
-        self._tree = tree
-
-    def fate(self, mutant: Mutant) -> str:
-        """Return whether `mutant` was killed, hung, or survived, and say so."""
-        file = self._tree / mutant.path
-        as_it_was = file.stat()
-        file.write_text(mutant.text)
-        codes = (self._run(tests, cpu_s) for tests, cpu_s in commands_for(mutant.path))
-        code = next((code for code in codes if code not in UNNOTICED), 0)
-        file.write_text(mutant.source)
-        os.utime(file, ns=(as_it_was.st_atime_ns, as_it_was.st_mtime_ns))
-        fate = "hung" if code < 0 else "killed" if code else "survived"
-        _say(f"{fate} {mutant}" + (f"\n{mutant.diff}" if fate == "survived" else ""))
-        return fate
-
-    def _run(self, tests: Sequence[str], cpu_s: int) -> int:
-        """Run tests until the first one fails; return the exit code, negative when they were stopped."""
-
-        def limit() -> None:
-            resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
-            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
-
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
-        run = subprocess.Popen(
-            command,
-            cwd=self._tree,
-            env={**os.environ, "PYTHONPATH": str(self._tree), "PYTHONDONTWRITEBYTECODE": "1"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-            preexec_fn=limit,  # noqa: PLW1509 - nothing here has threads
-        )
-        try:
-            return run.wait(HANG_S)
-        except subprocess.TimeoutExpired:
-            return -signal.SIGKILL
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(run.pid, signal.SIGKILL)
-            run.wait()
-
-
-def commands_for(path: str) -> Iterator[tuple[tuple[str, ...], int]]:
-    """Yield what pytest runs for a mutant of this file: its own tests, then those that run more of the program.
-
-    With each, the CPU time that it may take.
-    """
-    stem = Path(path).stem
-    own = sorted(ROOT.glob(f"tests/*/**/test_{stem}.py")) + sorted(ROOT.glob(f"tests/*/**/test_{stem}_*.py"))
-    if own:
-        yield tuple(str(file.relative_to(ROOT)) for file in own), OWN_CPU_S
-    room = Path(path).parent.name
-    if room in SHARED:
-        yield SHARED[room], CPU_S
-        yield ("tests/conformance", "-k", "abt or syncbb"), CPU_S
-        return
-    users = _users(_module(Path(path)))
-    others = [file for file in sorted(ROOT.glob("tests/protocols/test_*.py")) if users & _imported(file)]
-    yield (SENTENCES, *(str(file.relative_to(ROOT)) for file in others if file not in own)), CPU_S
-    points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["robochoc.protocols"]
-    names = [name for name, place in points.items() if place.partition(":")[0] in users]
-    yield ("tests/conformance", "-k", " or ".join(names)), CPU_S
-
-
-def _users(module: str) -> set[str]:
-    """Return the modules of protocols that import `module`, and it, and those that import them."""
-    files = ROOT.glob("robochoc/protocols/**/*.py")
-    imports = {_module(file.relative_to(ROOT)): _imported(file) for file in files}
-    users = {module}
-    while more := {user for user, imported in imports.items() if imported & users} - users:
-        users |= more
-    return users
-
-
-def _imported(file: Path) -> set[str]:
-    return set(re.findall(r"^\s*from (robochoc\.protocols\.[\w.]+) import", file.read_text(), re.MULTILINE))
-
-
-def _module(path: Path) -> str:
-    return ".".join(path.with_suffix("").parts)
 
 
 def _say(text: str) -> None:
