@@ -148,10 +148,6 @@ class Bench:
         self._tree = tree
         self._record = record
 
-    def compile(self) -> None:
-        """Let Python store compiled files of everything, since a run with a mutant stores none."""
-        self._pytest("--collect-only", "tests", compiled=True)
-
     def fate(self, mutant: Mutant, first: str = "") -> dict[str, Any]:
         """Try a mutant, with the cases of the test `first` before others."""
         file = self._tree / mutant.path
@@ -187,11 +183,10 @@ class Bench:
         hung = code < 0 or "Timeout (" in error
         return {"fate": "hung" if hung else "killed", "by": by, "error": error, "code": code}, used
 
-    def _pytest(self, *words: str, cpu_s: int | None = None, compiled: bool = False) -> tuple[int, float, str]:
+    def _pytest(self, *words: str, cpu_s: int) -> tuple[int, float, str]:
         """Run pytest; return the exit code, negative when it was stopped, the CPU time, and the output."""
-        environment = {**os.environ, "PYTHONPATH": str(self._tree), FILE: str(self._tree / FOLDER / "chosen")}
-        if not compiled:
-            environment["PYTHONDONTWRITEBYTECODE"] = "1"
+        chosen = {FILE: str(self._tree / FOLDER / "chosen"), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {**os.environ, "PYTHONPATH": str(self._tree), **chosen}
         plain = ("-q", "--no-header", "-p", "no:cacheprovider", "-o", f"timeout={HANG_S}", "-m", "")
         with tempfile.TemporaryFile() as output:
             run = subprocess.Popen(
@@ -202,9 +197,8 @@ class Bench:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
-            if cpu_s is not None:
-                resource.prlimit(run.pid, resource.RLIMIT_CPU, (cpu_s, cpu_s))
-                resource.prlimit(run.pid, resource.RLIMIT_DATA, (MEMORY, MEMORY))
+            resource.prlimit(run.pid, resource.RLIMIT_CPU, (cpu_s, cpu_s))
+            resource.prlimit(run.pid, resource.RLIMIT_DATA, (MEMORY, MEMORY))
             watch = threading.Timer(HANG_S * 5, os.killpg, (run.pid, signal.SIGKILL))
             watch.start()
             _, status, used = os.wait4(run.pid, 0)
@@ -221,6 +215,13 @@ def copy(source: Path, target: Path) -> None:
     left_out = shutil.ignore_patterns(".git", ".venv", ".*cache", "out", "__pycache__")
     shutil.copytree(source, target, ignore=left_out, symlinks=True)
     shutil.copytree(Path(__file__).parent, target / "tests" / "mutation", dirs_exist_ok=True)
+
+
+def compile_all(tree: Path) -> None:
+    """Let Python store compiled files of everything, since a run with a mutant stores none."""
+    command = [sys.executable, "-m", "pytest", "-q", "--collect-only", "tests"]
+    environment = {**os.environ, "PYTHONPATH": str(tree)}
+    subprocess.run(command, cwd=tree, env=environment, stdout=subprocess.DEVNULL, check=False)
 
 
 def record(source: Path, folder: Path, jobs: int) -> None:
@@ -275,8 +276,8 @@ def main(words: Sequence[str] | None = None) -> int:
         trees = [Path(folder, str(job)) for job in range(options.jobs)]
         copy(options.tree, trees[0])
         (trees[0] / FOLDER).mkdir()
+        compile_all(trees[0])
         benches, known = SimpleQueue[Bench](), Record(options.record)
-        Bench(trees[0], known).compile()
         for tree in trees:
             if tree != trees[0]:
                 shutil.copytree(trees[0], tree, symlinks=True)
