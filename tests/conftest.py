@@ -141,6 +141,15 @@ def cache_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Non
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def one_compiler_in_java(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Java's second compiler takes more time than it saves, but for the long searches of slow tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        if "not slow" in request.config.option.markexpr:
+            patch.setenv("JAVA_TOOL_OPTIONS", "-XX:TieredStopAtLevel=1")
+        yield
+
+
 @pytest.fixture
 def clock() -> Clock:
     from tests.support.authorities import Clock
