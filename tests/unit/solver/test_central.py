@@ -33,6 +33,8 @@ from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.solver_networks import brute_force, misheard
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 
+pytestmark = pytest.mark.usefixtures("shared_solvers")
+
 
 @pytest.fixture(params=[False, True], ids=["enumerated", "by ACE"])
 def solver(request: pytest.FixtureRequest, warm_ace: None) -> Iterator[AceProcess]:

@@ -46,6 +46,8 @@ from tests.support.program import robochoc_within
 from tests.support.real_costs import best_cost, random_costs_team
 from tests.support.solver_networks import misheard
 
+pytestmark = pytest.mark.usefixtures("shared_solvers")
+
 CENTRAL = Options(protocol="central")
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.MINIMUM)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]

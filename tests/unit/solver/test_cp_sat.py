@@ -52,6 +52,7 @@ def same(one: CentralAnswer, other: CentralAnswer) -> bool:
     return (one.verdict, one.cost, one.bound) == (other.verdict, other.cost, other.bound)
 
 
+@pytest.mark.usefixtures("shared_solvers")
 @needs_ortools
 @pytest.mark.parametrize("batch", BATCHES)
 def test_both_solvers_find_the_same(batch: int, cp: CpSatSolver) -> None:
@@ -70,6 +71,7 @@ def test_both_solvers_find_the_same(batch: int, cp: CpSatSolver) -> None:
                 assert same(found, expected), seed
 
 
+@pytest.mark.usefixtures("shared_solvers")
 @needs_ortools
 def test_whole_runs_of_it_are_checked_as_those_of_ace_are() -> None:
     team = queens3d(4)
@@ -80,6 +82,7 @@ def test_whole_runs_of_it_are_checked_as_those_of_ace_are() -> None:
     assert len(outcome.withdrawn) == len(by_ace.withdrawn)
 
 
+@pytest.mark.usefixtures("shared_solvers")
 @needs_ortools
 def test_decimals_that_are_maximised() -> None:
     domain = Domain("D", (range(4),))
@@ -131,6 +134,7 @@ def test_without_the_extra_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch
     assert outcome.confirmed_by == (CENTRAL_SOLVER,)
 
 
+@pytest.mark.usefixtures("shared_solvers")
 @needs_ortools
 def test_verify_asks_both() -> None:
     outcome = solve(with_costs(queens3d(3)), SIMULATED)
@@ -155,6 +159,7 @@ def test_costs_beyond_its_integers_are_refused() -> None:
         CpSatSolver().solve(team)
 
 
+@pytest.mark.usefixtures("shared_solvers")
 @needs_ortools
 def test_the_command_line_and_json(tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("team") / "q4"

@@ -19,7 +19,9 @@ from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import random_team, team_of
 from tests.support.program import robochoc_within
-from tests.support.warm_ace import ace_said
+from tests.support.xcsp3_ace import ace_said
+
+pytestmark = pytest.mark.usefixtures("shared_solvers")
 
 TWO = {"A": (1, 2), "B": (1, 2)}
 NOTHING_FITS = Relation("none", 1, Semantics.SUPPORTS, ((9,),))

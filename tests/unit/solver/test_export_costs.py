@@ -24,6 +24,8 @@ from tests.support.problems import team_of
 from tests.support.program import robochoc, robochoc_within
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 
+pytestmark = pytest.mark.usefixtures("shared_solvers")
+
 
 def least_exported(document: bytes) -> float:
     """The least cost of an exported instance of tables and allDifferent, by hand."""

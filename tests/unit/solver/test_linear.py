@@ -22,6 +22,8 @@ from tests.support.brute_force import least_cost
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 
+pytestmark = pytest.mark.usefixtures("shared_solvers")
+
 NAMES = ("X", "Y", "Z")
 
 
