@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
@@ -23,7 +24,10 @@ from robochoc.model.problem import Team
 from tests.support.flights_in_space import FlownInSpace, flown_in_space, gaps_in_space
 from tests.support.octomaps import FREE, Voxel, write_octomap
 
-NO_ROOM = ("that keeps its radius of", "are to be kept", "no order of flying was found")
+NO_ROOM = re.compile(
+    r"that keeps its radius of|are to be kept"
+    r"|no order of flying was found in which (\w+ gets past the others|\w+, .+ get past each other) between the walls"
+)
 """Words of the refusals of a flight: a way is too narrow, places are too near, or drones block each other."""
 FLOORS = {
     (x, y, z): FREE for x, y, z in product(range(8), range(4), range(5)) if z != 2 or (x in {6, 7} and y in {2, 3})
@@ -73,7 +77,7 @@ def test_drones_fly_around_voxels_on_hundreds_of_maps(block: int, tmp_path: Path
     flown = {seed: one for seed, one in made.items() if isinstance(one, FlownInSpace)}
     assert {seed: one.faults() for seed, one in flown.items() if one.faults()} == {}
     refused = [one for one in made.values() if isinstance(one, str) and not one.startswith("no team")]
-    assert [one for one in refused if not any(words in one for words in NO_ROOM)] == []
+    assert [one for one in refused if not NO_ROOM.search(one)] == []
     assert len(flown) >= 5, "most teams that could be made fly"
 
 

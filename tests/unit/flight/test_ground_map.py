@@ -137,3 +137,5 @@ def test_a_map_is_read_and_a_wrong_one_told() -> None:
     for broken in (b" " * (MAX_BYTES + 1), b"", b"[" * 100_000, b"{}", b"\xff", b'{"\xff": 1}'):
         with pytest.raises(ValueError):  # noqa: PT011 - the JSON reader's words
             read_ground_map(broken)
+    with pytest.raises(ValueError, match="not UTF-8"):
+        read_ground_map(b'{"\xff": 1}')
