@@ -94,15 +94,6 @@ def test_where_a_crazyflie_was_switched_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.more
-def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_path: Path) -> None:
-    with crazyflie_field(tmp_path, fence="[[-1, -1, 0], [6.5, 5, 1.5]]", takeoff=0.5) as (vehicles, fleet):
-        done = solve(tmp_path, fleet, "--arm")
-        assert "is outside of the fence; the fence is from -1, -1, 0 to 6.5, 5, 1.5" in done.stderr
-        assert done.returncode == 1
-        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
-
-
-@pytest.mark.more
 def test_a_crazyflie_that_is_not_there_ends_with_one_message(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,26 +22,10 @@ from robochoc.ros.sink import SinkError
 from robochoc.ros.waypoint import Waypoint
 from tests.support.cases import looped
 from tests.support.limits import HANG_S
+from tests.support.mavlink_field import ON_EARTH, STANDS, mavlink_field, solve
 from tests.support.mavlink_teams import NAMES, fleet_file, four_drones, team_folder, udp_ports
-from tests.support.mavlink_vehicles import HOME, Vehicle, Vehicles
+from tests.support.mavlink_vehicles import Vehicle
 from tests.support.program import robochoc_within
-from tests.support.wgs84 import geodetic_of
-
-STANDS = tuple((2.0 * n, 0.0, 0.0) for n in range(len(NAMES)))
-
-
-@contextmanager
-def field(folder: Path, **settings: object) -> Iterator[tuple[Vehicles, Path]]:
-    """Four vehicles below their places, which share one frame, and their fleet file."""
-    ports = udp_ports(len(NAMES))
-    with Vehicles([Vehicle(port, at=at) for port, at in zip(ports, STANDS, strict=True)]) as vehicles:
-        yield vehicles, fleet_file(folder, dict(zip(NAMES, ports, strict=True)), **settings)
-
-
-def solve(folder: Path, fleet: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    done = robochoc_within("solve", team_folder(folder), "--runtime", "simulator", "--ros", f"mavlink:{fleet}", *words)
-    assert "Traceback" not in done.stderr
-    return done
 
 
 def reached(vehicle: Vehicle) -> list[str]:
@@ -50,7 +34,7 @@ def reached(vehicle: Vehicle) -> list[str]:
 
 @pytest.mark.more
 def test_without_permission_vehicles_are_seen_and_none_is_commanded(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         done = solve(tmp_path, fleet)
         assert f"{fleet}: 4 waypoints, 0 landings; 4 vehicles seen, none armed (--arm lets them fly)" in done.stderr
         assert done.returncode == 0
@@ -58,7 +42,7 @@ def test_without_permission_vehicles_are_seen_and_none_is_commanded(tmp_path: Pa
 
 
 def test_vehicles_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         done = solve(tmp_path, fleet, "--arm")
         assert f"{fleet}: 4 waypoints, 0 landings; 4 flown, 4 landed" in done.stderr
         assert done.returncode == 0
@@ -74,7 +58,7 @@ def test_vehicles_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
 
 @pytest.mark.more
 def test_at_the_end_vehicles_may_hold(tmp_path: Path) -> None:
-    with field(tmp_path, end="hold") as (vehicles, fleet):
+    with mavlink_field(tmp_path, end="hold") as (vehicles, fleet):
         done = solve(tmp_path, fleet, "--arm")
         assert "4 flown, 4 hold" in done.stderr
         assert all(vehicle.mode == "hold" and vehicle.armed and vehicle.flies for vehicle in vehicles)
@@ -82,10 +66,7 @@ def test_at_the_end_vehicles_may_hold(tmp_path: Path) -> None:
 
 @pytest.mark.more
 def test_places_on_the_earth(tmp_path: Path) -> None:
-    origin = f"[{HOME.lat}, {HOME.lon}, {HOME.alt}]"
-    with field(tmp_path, origin=origin) as (vehicles, fleet):
-        for vehicle, at in zip(vehicles, STANDS, strict=True):
-            vehicle.home, vehicle.at = geodetic_of(at, HOME), (0.0, 0.0, 0.0)
+    with mavlink_field(tmp_path, origin=ON_EARTH) as (vehicles, fleet):
         assert solve(tmp_path, fleet, "--arm").returncode == 0
         for vehicle in vehicles:
             east, north, up = map(float, reached(vehicle)[-1].split(","))
@@ -97,30 +78,8 @@ def test_places_on_the_earth(tmp_path: Path) -> None:
 
 
 @pytest.mark.more
-def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_path: Path) -> None:
-    with field(tmp_path, fence="[[-1, -1, 0], [5, 5, 6]]", end="land") as (vehicles, fleet):
-        vehicles[3].at = (4.0, 1.0, 0.0)
-        done = solve(tmp_path, fleet, "--arm")
-        assert "the waypoint of RD, 6, 0, " in done.stderr
-        assert (
-            "is outside of the fence; the fence is from -1, -1, 0 to 5, 5, 6; the decision is not flown" in done.stderr
-        )
-        assert done.returncode == 1
-        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
-
-
-@pytest.mark.more
-def test_a_vehicle_that_stands_outside_of_the_fence_is_refused(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
-        vehicles[1].at = (0.0, 700.0, 0.0)
-        done = solve(tmp_path, fleet, "--arm")
-        assert "RB stands at 0, 700, 0, outside of the fence" in done.stderr
-        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
-
-
-@pytest.mark.more
 def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
         assert "RC cannot be flown: it is not heard on udpin://127.0.0.1:" in done.stderr
@@ -130,35 +89,12 @@ def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
-@pytest.mark.slow
-def test_all_vehicles_that_are_not_heard_are_told_at_once(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
-        for number in (1, 2, 3):
-            vehicles[number].silent = True
-        done = solve(tmp_path, fleet, "--arm")
-        assert "RB cannot be flown: it is not heard on udpin://127.0.0.1:" in done.stderr
-        assert "within 5 s; nor can RC, RD; nothing was armed" in done.stderr
-
-
 @pytest.mark.more
 def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
-    with field(tmp_path) as (_, fleet):
+    with mavlink_field(tmp_path) as (_, fleet):
         fleet.write_text(fleet.read_text().replace("udpin://127.0.0.1", "udpin://no.such.host.invalid"))
         done = solve(tmp_path, fleet)
         assert "RA cannot be flown: udpin://no.such.host.invalid" in done.stderr
-
-
-@looped(
-    ("names", "told"),
-    [
-        (["RA", "RB", "RC"], "there is no vehicle for RD; each drone with a topic needs one"),
-        (["RA", "RB", "RC", "RX"], "there is no vehicle for RD; no drone is called RX"),
-        ([*NAMES, "RX"], "no drone is called RX; the team's drones are RA, RB, RC, RD"),
-    ],
-)
-def test_drones_and_vehicles_match(tmp_path: Path, names: list[str], told: str) -> None:
-    fleet = fleet_file(tmp_path, dict(zip(names, udp_ports(len(names)), strict=True)))
-    assert told in solve(tmp_path, fleet).stderr
 
 
 @looped(
@@ -191,7 +127,7 @@ def test_options_that_do_not_fit(tmp_path: Path, words: list[str], told: str) ->
     ],
 )
 def test_who_refuses_ends_the_flight_of_all(tmp_path: Path, refused: str, why: str) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         vehicles[1].refuses = {refused}
         done = solve(tmp_path, fleet, "--arm")
         assert f"RB is out of order: {why}; the others are brought down" in done.stderr
@@ -202,7 +138,7 @@ def test_who_refuses_ends_the_flight_of_all(tmp_path: Path, refused: str, why: s
 @pytest.mark.slow
 @pytest.mark.parametrize("has_camera", [False, True])
 def test_who_loses_its_link_ends_the_flight_and_lands_by_itself(tmp_path: Path, *, has_camera: bool) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         vehicles[1].silent_from, vehicles[1].has_camera = "offboard", has_camera
         done = solve(tmp_path, fleet, "--arm")
         assert "RB is out of order: its link has been silent for 5 s; the others are brought down" in done.stderr
@@ -211,11 +147,9 @@ def test_who_loses_its_link_ends_the_flight_and_lands_by_itself(tmp_path: Path, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("origin", [{}, {"origin": f"[{HOME.lat}, {HOME.lon}, {HOME.alt}]"}])
-def test_who_no_longer_knows_its_place_ends_the_flight_and_lands(tmp_path: Path, origin: dict[str, object]) -> None:
-    with field(tmp_path, patience=3, **origin) as (vehicles, fleet):
-        for vehicle, at in zip(vehicles, STANDS, strict=True) if origin else ():
-            vehicle.home, vehicle.at = geodetic_of(at, HOME), (0.0, 0.0, 0.0)
+@pytest.mark.parametrize("origin", [{}, {"origin": ON_EARTH}])
+def test_who_no_longer_knows_its_place_ends_the_flight_and_lands(tmp_path: Path, origin: dict[str, Any]) -> None:
+    with mavlink_field(tmp_path, patience=3, **origin) as (vehicles, fleet):
         vehicles[1].lost_from = "offboard"
         done = solve(tmp_path, fleet, "--arm")
         assert "RB is out of order: it has not told its place for 3 s; the others are brought down" in done.stderr
@@ -265,18 +199,8 @@ def test_a_guard_may_say_nothing_for_longer_at_first(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.more
-def test_the_guard_flies_nobody_without_a_permit(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet), guarded(fleet) as guard:
-        assert guard.wait_for(all_in(guard, Phase.READY), HANG_S)
-        guard.fly(drones_targets())
-        with pytest.raises(GuardError, match="nothing may be armed: an order to fly came without a permit"):
-            guard.wait_for(lambda: False, HANG_S)
-        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
-
-
-@pytest.mark.more
 def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         with guarded(fleet) as guard:
             guard.permit()
             assert guard.wait_for(all_in(guard, Phase.READY), HANG_S)
@@ -289,7 +213,7 @@ def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
 def test_an_order_to_an_ended_guard_reports_what_vehicles_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also before the reader of its messages has seen the end."""
     monkeypatch.setattr(GuardProcess, "_read", lambda _: None)
-    with field(tmp_path) as (_, fleet), guarded(fleet) as guard:
+    with mavlink_field(tmp_path) as (_, fleet), guarded(fleet) as guard:
         guard._process.kill()  # noqa: SLF001 - as the system might
         guard._process.wait()  # noqa: SLF001
         with pytest.raises(GuardError, match="has ended; vehicles do what their own failsafe says"):
@@ -298,7 +222,7 @@ def test_an_order_to_an_ended_guard_reports_what_vehicles_do(tmp_path: Path, mon
 
 @pytest.mark.more
 def test_a_sink_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
-    with field(tmp_path) as (_, fleet):
+    with mavlink_field(tmp_path) as (_, fleet):
         sink = MavlinkSink(str(fleet))
         try:
             sink.assign(drones_of(four_drones()))

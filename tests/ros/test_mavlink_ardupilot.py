@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -14,32 +11,17 @@ pytest.importorskip("mavsdk")
 
 from tests.support.faults import running
 from tests.support.limits import wait_until
-from tests.support.mavlink_teams import NAMES, fleet_file, team_folder, udp_ports
-from tests.support.mavlink_vehicles import HOME, Vehicle, Vehicles
-from tests.support.program import PROGRAM, robochoc_within
-from tests.support.wgs84 import geodetic_of
+from tests.support.mavlink_field import ON_EARTH, mavlink_field, solve
+from tests.support.mavlink_teams import team_folder
+from tests.support.program import PROGRAM
 
-
-@contextmanager
-def field(folder: Path, **settings: object) -> Iterator[tuple[Vehicles, Path]]:
-    """Four copters below their places, in the mode in which they were switched on."""
-    ports = udp_ports(len(NAMES))
-    copters = [Vehicle(port, at=(2.0 * n, 0.0, 0.0), mode="stabilize") for n, port in enumerate(ports)]
-    for copter in copters:
-        copter.is_ardupilot = True
-    with Vehicles(copters) as vehicles:
-        yield vehicles, fleet_file(folder, dict(zip(NAMES, ports, strict=True)), **settings)
-
-
-def solve(folder: Path, fleet: Path) -> subprocess.CompletedProcess[str]:
-    words = ["--runtime", "simulator", "--ros", f"mavlink:{fleet}", "--arm"]
-    return robochoc_within("solve", team_folder(folder), *words)
+SLOW_MS = 0.8
 
 
 @pytest.mark.more
 def test_copters_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
-        done = solve(tmp_path, fleet)
+    with mavlink_field(tmp_path, is_ardupilot=True) as (vehicles, fleet):
+        done = solve(tmp_path, fleet, "--arm")
         assert f"{fleet}: 4 waypoints, 0 landings; 4 flown, 4 landed" in done.stderr, vehicles.state()
         for n, vehicle in enumerate(vehicles):
             assert vehicle.takeoff_m == pytest.approx(1.4)
@@ -53,17 +35,13 @@ def test_copters_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_copters_fly_to_places_on_the_earth(tmp_path: Path) -> None:
-    with field(tmp_path, origin=f"[{HOME.lat}, {HOME.lon}, {HOME.alt}]") as (vehicles, fleet):
-        for n, vehicle in enumerate(vehicles):
-            vehicle.home, vehicle.at = geodetic_of((2.0 * n, 0, 0), HOME), (0.0, 0.0, 0.0)
-        assert "4 flown, 4 landed" in solve(tmp_path, fleet).stderr, vehicles.state()
+    with mavlink_field(tmp_path, is_ardupilot=True, origin=ON_EARTH) as (vehicles, fleet):
+        assert "4 flown, 4 landed" in solve(tmp_path, fleet, "--arm").stderr, vehicles.state()
 
 
 @pytest.mark.slow
 def test_copters_that_are_left_to_themselves_are_landed_by_another_guard(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
-        for vehicle in vehicles:
-            vehicle.speed = 0.8
+    with mavlink_field(tmp_path, SLOW_MS, is_ardupilot=True) as (vehicles, fleet):
         command = [PROGRAM, "solve", str(team_folder(tmp_path)), "--ros", f"mavlink:{fleet}", "--arm"]
         with running(command, tmp_path / "run") as run:
             wait_until(lambda: any(one.flies and one.mode == "offboard" for one in vehicles) or run.is_over, run.errors)
@@ -78,9 +56,7 @@ def test_copters_that_are_left_to_themselves_are_landed_by_another_guard(tmp_pat
 @pytest.mark.slow
 @pytest.mark.parametrize(("mode", "told"), [("posctl", "posctl"), ("rtl", "return to launch")])
 def test_a_copter_that_a_person_takes_over_is_left_alone(tmp_path: Path, mode: str, told: str) -> None:
-    with field(tmp_path) as (vehicles, fleet):
-        for vehicle in vehicles:
-            vehicle.speed = 0.8
+    with mavlink_field(tmp_path, SLOW_MS, is_ardupilot=True) as (vehicles, fleet):
         command = [PROGRAM, "solve", str(team_folder(tmp_path)), "--ros", f"mavlink:{fleet}", "--arm"]
         with running(command, tmp_path / "run") as run:
             wait_until(lambda: (vehicles[1].flies and vehicles[1].mode == "offboard") or run.is_over, vehicles.state)

@@ -16,9 +16,8 @@ from robochoc.ros.autopilots.fleet import read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, GuardProcess
 from robochoc.ros.autopilots.messages import Phase, Target
 from tests.support.limits import HANG_S, wait_until
-from tests.support.mavlink_teams import NAMES, fleet_file, team_folder, udp_ports
+from tests.support.mavlink_teams import NAMES, fleet_file, udp_ports
 from tests.support.mavlink_vehicles import GUST_S, Vehicle, Vehicles
-from tests.support.program import robochoc_within
 
 DISTANCE_M, NEAR_M = 1.0, 0.2
 LEAST_M = DISTANCE_M - 2 * NEAR_M
@@ -141,19 +140,6 @@ def test_places_that_are_too_near_are_not_flown_to(tmp_path: Path) -> None:
         with pytest.raises(GuardError, match=told):
             guard.wait_for(lambda: False, HANG_S)
         assert [vehicle.log for vehicle in vehicles] == [[], []]
-
-
-@pytest.mark.slow
-def test_a_decision_whose_places_are_too_near_is_told_before_anything_is_armed(tmp_path: Path) -> None:
-    ports = udp_ports(len(NAMES))
-    with Vehicles([Vehicle(port, at=(2.0 * n, 0.0, 0.0)) for n, port in enumerate(ports)]) as vehicles:
-        fleet = fleet_file(tmp_path, dict(zip(NAMES, ports, strict=True)), distance=2.5)
-        done = robochoc_within("solve", team_folder(tmp_path), "--runtime", "simulator", "--ros", f"mavlink:{fleet}")
-        assert (
-            "the waypoints of RA and RB are 2.24 m apart; 'distance' is 2.5 m; the decision is not flown" in done.stderr
-        )
-        assert done.returncode == 1
-        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
 @pytest.mark.slow

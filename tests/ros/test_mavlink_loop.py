@@ -14,27 +14,19 @@ import pytest
 
 pytest.importorskip("mavsdk")
 
-from robochoc.ros.autopilots.guard_process import shared
 from robochoc.ros.autopilots.mavlink import MavlinkSource
 from robochoc.ros.closed_loop import drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.faults import Run, running
 from tests.support.limits import HANG_S, wait_until
-from tests.support.mavlink_teams import NAMES, fleet_file, four_drones, team_folder, udp_ports
-from tests.support.mavlink_vehicles import Vehicle, Vehicles
+from tests.support.mavlink_field import mavlink_field
+from tests.support.mavlink_teams import four_drones, team_folder
 from tests.support.program import PROGRAM, robochoc_within
 
 WAIT_S = "1"
 """The run is over when nothing has changed for so long after all are there."""
 WITHOUT_RB = ["the start", "-RB"]
-
-
-@contextmanager
-def field(folder: Path, speed: float = 20.0, **settings: object) -> Iterator[tuple[Vehicles, Path]]:
-    ports = udp_ports(len(NAMES))
-    with Vehicles([Vehicle(port, at=(2.0 * n, 0, 0), speed=speed) for n, port in enumerate(ports)]) as vehicles:
-        yield vehicles, fleet_file(folder, dict(zip(NAMES, ports, strict=True)), **settings)
 
 
 def words(folder: Path, fleet: Path, *more: str) -> list[str]:
@@ -43,8 +35,8 @@ def words(folder: Path, fleet: Path, *more: str) -> list[str]:
     return ["solve", str(team_folder(folder)), *common, "--arm", *more]
 
 
-def solve(folder: Path, fleet: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    return robochoc_within(*words(folder, fleet, "--runtime", "simulator", *more))
+def solve(folder: Path, fleet: Path) -> subprocess.CompletedProcess[str]:
+    return robochoc_within(*words(folder, fleet, "--runtime", "simulator"))
 
 
 def openings(done: subprocess.CompletedProcess[str]) -> list[str]:
@@ -57,7 +49,7 @@ def openings(done: subprocess.CompletedProcess[str]) -> list[str]:
 
 @pytest.mark.more
 def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         vehicles[1].drain = 3.0
         done = solve(tmp_path, fleet)
         assert openings(done) == WITHOUT_RB
@@ -78,7 +70,7 @@ def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) 
     ],
 )
 def test_who_falls_out_leaves_and_the_others_decide_anew(tmp_path: Path, trouble: dict[str, object], why: str) -> None:
-    with field(tmp_path) as (vehicles, fleet):
+    with mavlink_field(tmp_path) as (vehicles, fleet):
         for name, value in trouble.items():
             setattr(vehicles[1], name, value)
         done = solve(tmp_path, fleet)
@@ -89,7 +81,7 @@ def test_who_falls_out_leaves_and_the_others_decide_anew(tmp_path: Path, trouble
 
 @pytest.mark.slow
 def test_a_slow_flight_is_waited_for(tmp_path: Path) -> None:
-    with field(tmp_path, speed=0.7) as (vehicles, fleet):
+    with mavlink_field(tmp_path, speed=0.7) as (vehicles, fleet):
         vehicles[1].drain = 0.3
         done = solve(tmp_path, fleet)
         assert openings(done) == WITHOUT_RB
@@ -99,7 +91,7 @@ def test_a_slow_flight_is_waited_for(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("who", ["program", "guard", "robot"])
 def test_whoever_is_killed_in_a_closed_loop_all_land_or_hold(tmp_path: Path, who: str) -> None:
-    with field(tmp_path, speed=1.0) as (vehicles, fleet):
+    with mavlink_field(tmp_path, speed=1.0) as (vehicles, fleet):
         command = [PROGRAM, *words(tmp_path, fleet, "--runtime", "processes")]
         with running(command, tmp_path / "run") as run:
             wait_until(lambda: any(one.mode == "offboard" for one in vehicles) or run.is_over, vehicles.state)
@@ -139,7 +131,7 @@ def heard(source: MavlinkSource, topic: str) -> ReceivedMessage:
 
 @pytest.mark.more
 def test_places_and_batteries_are_reported(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet), listening(fleet) as source:
+    with mavlink_field(tmp_path) as (vehicles, fleet), listening(fleet) as source:
         place = heard(source, "/RC/pose").fields["pose"]["position"]
         assert place == pytest.approx({"x": 4, "y": 0, "z": 0}, abs=0.01)
         assert heard(source, "/RC/battery").fields["percentage"] == 1
@@ -150,14 +142,14 @@ def test_places_and_batteries_are_reported(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_who_is_not_heard_is_out_of_order(tmp_path: Path) -> None:
-    with field(tmp_path) as (vehicles, fleet), listening(fleet) as source:
+    with mavlink_field(tmp_path) as (vehicles, fleet), listening(fleet) as source:
         vehicles[3].silent = True
         assert "it is not heard on udpin" in heard(source, "/RD/out_of_order").fields["data"]
 
 
 @pytest.mark.more
 def test_a_source_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
-    with field(tmp_path) as (_, fleet), listening(fleet) as source:
+    with mavlink_field(tmp_path) as (_, fleet), listening(fleet) as source:
         os.kill(source._guard.pid, signal.SIGKILL)  # noqa: SLF001 - as the system might
 
         def read_on() -> None:
@@ -166,13 +158,3 @@ def test_a_source_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
 
         with pytest.raises(SourceError, match="the guard process has ended"):
             read_on()
-
-
-@pytest.mark.more
-def test_vehicles_have_the_names_of_drones(tmp_path: Path) -> None:
-    fleet = fleet_file(tmp_path, {"RX": udp_ports(1)[0]})
-    with MavlinkSource(str(fleet)) as source, pytest.raises(SourceError, match="no drone is called RX"):
-        source.assign({"RA": "/RA"})
-    with pytest.raises(SourceError, match="No such file or directory"):
-        MavlinkSource(str(tmp_path / "nowhere.yaml"))
-    assert not shared._open  # noqa: SLF001 - no guard is left

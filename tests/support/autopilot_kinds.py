@@ -10,7 +10,7 @@ from typing import Any
 
 from tests.support.faults import Run, running
 from tests.support.limits import wait_until
-from tests.support.mavlink_teams import NAMES, fleet_file, team_folder, udp_ports
+from tests.support.mavlink_teams import team_folder
 from tests.support.played_fleet import PlayedFleet
 from tests.support.program import PROGRAM
 
@@ -62,14 +62,10 @@ class Px4(AutopilotKind):
     }
     without_a_guard = "the guard process has ended"
 
-    @contextmanager
-    def field(self, folder: Path, **settings: object) -> Iterator[tuple[PlayedFleet[Any], Path]]:
-        from tests.support.mavlink_vehicles import Vehicle, Vehicles  # noqa: PLC0415 - they need pymavlink
+    def field(self, folder: Path, **settings: object) -> AbstractContextManager[tuple[PlayedFleet[Any], Path]]:
+        from tests.support.mavlink_field import mavlink_field  # noqa: PLC0415 - it needs pymavlink
 
-        ports = udp_ports(len(NAMES))
-        fleet = fleet_file(folder, dict(zip(NAMES, ports, strict=True)), **settings)
-        with Vehicles([Vehicle(port, at=(2.0 * n, 0.0, 0.0), speed=0.8) for n, port in enumerate(ports)]) as vehicles:
-            yield vehicles, fleet
+        return mavlink_field(folder, 0.8, **settings)  # type: ignore[arg-type]
 
     def needed_nobody(self, vehicle: Any) -> bool:  # noqa: ANN401 - a `Vehicle`
         return "offboard lost" not in vehicle.log

@@ -34,7 +34,7 @@ def simulator(flights: Any, name: str) -> Any:  # noqa: ANN401
     return other
 
 
-@looped("name", SIMULATORS)
+@pytest.mark.parametrize("name", SIMULATORS)
 @looped(("number", "rms_mm", "most_mm"), [(0, 0.01, 0.01), (1, 20, 50), (2, 2, 4)])
 def test_others_fly_as_we_do(flights: Any, name: str, number: int, rms_mm: float, most_mm: float) -> None:  # noqa: ANN401
     found = flights.closed_loop(flights.cases()[number], simulator(flights, name))
