@@ -21,16 +21,12 @@ def relation(text: str) -> tuple[str, str, str]:
 
 
 COSTS = [
-    weighted(
-        "a cost that forbids the wrong way",
-        [relation('<relation name="r1" semantics="soft">-infinity:1 1</relation>')],
-        (R2, "<relation ", ("-infinity, where costs are minimised", "write infinity")),
-    ),
-    weighted(
-        "a cost of ten decimal places",
-        [relation('<relation name="r1" semantics="soft">0.1234567891:1 1</relation>')],
-        (R2, "<relation ", ("is no cost", "9 places")),
-    ),
+    weighted("a cost that forbids the wrong way",
+             [relation('<relation name="r1" semantics="soft">-infinity:1 1</relation>')],
+             (R2, "<relation ", ("-infinity, where costs are minimised", "write infinity"))),
+    weighted("a cost of ten decimal places",
+             [relation('<relation name="r1" semantics="soft">0.1234567891:1 1</relation>')],
+             (R2, "<relation ", ("is no cost", "9 places"))),
     weighted(
         "a cost finer than the scale",
         [
@@ -47,41 +43,20 @@ COSTS = [
         ],
         (R2, "<relation ", "an integer of"),
     ),
-    weighted(
-        "a scale that is no power of ten",
-        [(R2, 'type="DisWCSP"', 'type="DisWCSP" scale="0.25"')],
-        (R2, "<presentation", ("the scale '0.25'", "a power of ten")),
-    ),
-    weighted(
-        "an infinite constant",
-        [(R2, 'type="DisWCSP"', 'type="DisWCSP" constant="infinity"')],
-        (R2, "<presentation", "'infinity' is no cost"),
-    ),
-    case(
-        "maximize in a DisCSP",
-        [(R2, 'type="DisCSP"', 'type="DisCSP" objective="maximize"')],
-        (R2, "<presentation", ("maximize in a DisCSP", "DisWCSP")),
-    ),
-    case(
-        "a constant in a DisCSP",
-        [(R2, 'type="DisCSP"', 'type="DisCSP" constant="1"')],
-        (R2, "<presentation", "a constant cost in a DisCSP"),
-    ),
-    case(
-        "a scale in a DisCSP",
-        [(R2, 'type="DisCSP"', 'type="DisCSP" scale="0.1"')],
-        (R2, "<presentation", "a scale of costs in a DisCSP"),
-    ),
-    case(
-        "a function in a DisCSP",
-        [(R2, "</predicates>", "</predicates>" + FUNCTION)],
-        (R2, "<function ", ("a function, whose value is a cost, in a DisCSP", "DisWCSP")),
-    ),
-    weighted(
-        "a function that is a Boolean",
-        [(R2, "</predicates>", "</predicates>" + FUNCTION.replace("add", "ne"))],
-        (R2, "<functional>ne(X,1)", ("function f1", "should be integer")),
-    ),
+    weighted("a scale that is no power of ten", [(R2, 'type="DisWCSP"', 'type="DisWCSP" scale="0.25"')],
+             (R2, "<presentation", ("the scale '0.25'", "a power of ten"))),
+    weighted("an infinite constant", [(R2, 'type="DisWCSP"', 'type="DisWCSP" constant="infinity"')],
+             (R2, "<presentation", "'infinity' is no cost")),
+    case("maximize in a DisCSP", [(R2, 'type="DisCSP"', 'type="DisCSP" objective="maximize"')],
+         (R2, "<presentation", ("maximize in a DisCSP", "DisWCSP"))),
+    case("a constant in a DisCSP", [(R2, 'type="DisCSP"', 'type="DisCSP" constant="1"')],
+         (R2, "<presentation", "a constant cost in a DisCSP")),
+    case("a scale in a DisCSP", [(R2, 'type="DisCSP"', 'type="DisCSP" scale="0.1"')],
+         (R2, "<presentation", "a scale of costs in a DisCSP")),
+    case("a function in a DisCSP", [(R2, "</predicates>", "</predicates>" + FUNCTION)],
+         (R2, "<function ", ("a function, whose value is a cost, in a DisCSP", "DisWCSP"))),
+    weighted("a function that is a Boolean", [(R2, "</predicates>", "</predicates>" + FUNCTION.replace("add", "ne"))],
+             (R2, "<functional>ne(X,1)", ("function f1", "should be integer"))),
     weighted(
         "a cost on a function",
         [
@@ -98,17 +73,9 @@ COSTS = [
         ],
         (R2, 'name="C1"', ("p1 is worth something, and with 'div' it may be undefined", "write a function")),
     ),
-    weighted(
-        "one that maximizes",
-        [(R2, 'type="DisWCSP"', 'type="DisWCSP" objective="maximize"')],
-        (R2, "<presentation", ("the robot maximizes costs, but 'Robot1' minimizes them", "Robot1.xml:3")),
-    ),
-    weighted(
-        "too many digits in the unit of another",
-        [
-            (R1, 'name="C0"', f'name="C0" cost="{"9" * 17}"'),
-            (R3, 'name="C4"', 'name="C4" cost="0.001"'),
-        ],
-        (R1, "<presentation", ("an integer of 20 digits", "3 decimal places")),
-    ),
-]
+    weighted("one that maximizes", [(R2, 'type="DisWCSP"', 'type="DisWCSP" objective="maximize"')],
+             (R2, "<presentation", ("the robot maximizes costs, but 'Robot1' minimizes them", "Robot1.xml:3"))),
+    weighted("too many digits in the unit of another",
+             [(R1, 'name="C0"', f'name="C0" cost="{"9" * 17}"'), (R3, 'name="C4"', 'name="C4" cost="0.001"')],
+             (R1, "<presentation", ("an integer of 20 digits", "3 decimal places"))),
+]  # fmt: skip

@@ -123,34 +123,23 @@ def wrong(breakage: Breakage, *expected: tuple[str, str]) -> Wrong:
 
 OF_OBJECTS: dict[str, Wrong] = {
     "no robots": wrong(lambda team: replace(team, robots=()), ("team", "no robot here")),
-    "robots in a list": wrong(
-        lambda team: replace(team, robots=cast("Any", list(team.robots))), ("team", "robots: a list where a tuple")
-    ),
-    "a robot that is none": wrong(
-        lambda team: replace(team, robots=(*team.robots, cast("Any", "Robot4"))),
-        ("robot ?", "'Robot4' where a Robot should stand"),
-    ),
-    "a name of the team without UTF-8": wrong(
-        lambda team: replace(team, name="\udcff"), ("team", "its name has no UTF-8")
-    ),
-    "two robots of one name": wrong(
-        lambda team: replace(team, robots=(*team.robots, team["Robot3"])), ("robot Robot3", "a second robot 'Robot3'")
-    ),
-    "a missing robot": wrong(
-        lambda team: replace(team, robots=team.robots[:2]),
+    "robots in a list": wrong(lambda team: replace(team, robots=cast("Any", list(team.robots))),
+        ("team", "robots: a list where a tuple")),
+    "a robot that is none": wrong(lambda team: replace(team, robots=(*team.robots, cast("Any", "Robot4"))),
+        ("robot ?", "'Robot4' where a Robot should stand")),
+    "a name of the team without UTF-8": wrong(lambda team: replace(team, name="\udcff"),
+        ("team", "its name has no UTF-8")),
+    "two robots of one name": wrong(lambda team: replace(team, robots=(*team.robots, team["Robot3"])),
+        ("robot Robot3", "a second robot 'Robot3'")),
+    "a missing robot": wrong(lambda team: replace(team, robots=team.robots[:2]),
         ("robot Robot1, child Robot3", "the child 'Robot3' is not in the team"),
-        ("robot Robot2, child Robot3", "the child 'Robot3' is not in the team"),
-    ),
-    "parents that are left out": wrong(
-        parents("Robot3"),
+        ("robot Robot2, child Robot3", "the child 'Robot3' is not in the team")),
+    "parents that are left out": wrong(parents("Robot3"),
         ("robot Robot1, child Robot3", "'Robot3' does not list 'Robot1' as its parent"),
-        ("robot Robot2, child Robot3", "'Robot3' does not list 'Robot2' as its parent"),
-    ),
-    "a child before its parent": wrong(
-        lambda team: replace(team, robots=team.robots[::-1]),
+        ("robot Robot2, child Robot3", "'Robot3' does not list 'Robot2' as its parent")),
+    "a child before its parent": wrong(lambda team: replace(team, robots=team.robots[::-1]),
         ("robot Robot2", "before its parent 'Robot1' in the team"),
-        ("robot Robot3", "before its parent 'Robot1' in the team"),
-    ),
+        ("robot Robot3", "before its parent 'Robot1' in the team")),
     "a robot's name with a blank": wrong(
         lambda team: replace(team, robots=(*team.robots, replace(NEWCOMER, name="The last"))),
         ("robot The last", "'The last' cannot be a robot's name"),
@@ -172,45 +161,33 @@ OF_OBJECTS: dict[str, Wrong] = {
         ("robot Robot2, domain of values", "the name 'of values' is not allowed"),
     ),
     "a constraint without a name": wrong(constraint("C4", name=""), ("constraint", "the name '' is not allowed")),
-    "a topic's name that no XML holds": wrong(
-        robot("Robot3", topics=(Topic("/a\0b"),)), ("robot Robot3, topic", "is not allowed")
-    ),
-    "two topics of one name": wrong(
-        robot("Robot3", topics=(Topic("/a"), Topic("/a"))), ("robot Robot3, topic /a", "a second topic '/a'")
-    ),
-    "a term that is no name": wrong(
-        over("C4", "V1,V3"), ("robot Robot3, constraint C4 (V1,V3)", "'V1,V3' is neither a variable's name")
-    ),
-    "a constant of 19 digits": wrong(
-        over("C1", "V1", "V2", 1, 10**18), ("robot Robot2, constraint C1", "an integer of 19 digits")
-    ),
+    "a topic's name that no XML holds": wrong(robot("Robot3", topics=(Topic("/a\0b"),)),
+        ("robot Robot3, topic", "is not allowed")),
+    "two topics of one name": wrong(robot("Robot3", topics=(Topic("/a"), Topic("/a"))),
+        ("robot Robot3, topic /a", "a second topic '/a'")),
+    "a term that is no name": wrong(over("C4", "V1,V3"),
+        ("robot Robot3, constraint C4 (V1,V3)", "'V1,V3' is neither a variable's name")),
+    "a constant of 19 digits": wrong(over("C1", "V1", "V2", 1, 10**18),
+        ("robot Robot2, constraint C1", "an integer of 19 digits")),
     "a constant of 5000 digits": wrong(
         constraint("C5", definition=PREDEFINED["ne"], scope=("V3", "V2", 10**5000), parameters=("V3", "V2")),
         ("robot Robot3, constraint C5", "an integer of 5001 digits"),
     ),
     "a weight of 0": wrong(robot("Robot1", weight=0), ("robot Robot1", 'weight="0" in <presentation> is not allowed')),
     "a weight of 5000 digits": wrong(robot("Robot1", weight=10**5000), ("robot Robot1", "(5001 digits)")),
-    "a value of 19 digits": wrong(
-        domain(range(10**18, 10**18 + 1)), ("robot Robot2, domain D1", "an integer of 19 digits")
-    ),
+    "a value of 19 digits": wrong(domain(range(10**18, 10**18 + 1)),
+        ("robot Robot2, domain D1", "an integer of 19 digits")),
     "every second value": wrong(domain(range(1, 9, 2)), ("robot Robot2, domain D1", "range(1, 9, 2) has a step")),
-    "ranges that descend": wrong(
-        domain(range(5, 9), range(1, 3)), ("robot Robot2, domain D1", "ranges of domain D1 are not in order")
-    ),
-    "a tuple's value of 19 digits": wrong(
-        relation((1, -(10**18))), ("robot Robot2, relation r1", "an integer of 19 digits")
-    ),
-    "more tuples than costs": wrong(
-        weighted(relation((1, 1), (2, 2), semantics=Semantics.SOFT, costs=(5,))),
-        ("robot Robot2, relation r1", "2 tuples, but 1 costs"),
-    ),
-    "costs without soft": wrong(
-        relation((1, 1), costs=(5,)), ("robot Robot2, relation r1", "costs in a conflicts relation")
-    ),
-    "a cost of half": wrong(
-        weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(0.5,))),
-        ("robot Robot2, relation r1", "the cost 0.5 is no integer"),
-    ),
+    "ranges that descend": wrong(domain(range(5, 9), range(1, 3)),
+        ("robot Robot2, domain D1", "ranges of domain D1 are not in order")),
+    "a tuple's value of 19 digits": wrong(relation((1, -(10**18))),
+        ("robot Robot2, relation r1", "an integer of 19 digits")),
+    "more tuples than costs": wrong(weighted(relation((1, 1), (2, 2), semantics=Semantics.SOFT, costs=(5,))),
+        ("robot Robot2, relation r1", "2 tuples, but 1 costs")),
+    "costs without soft": wrong(relation((1, 1), costs=(5,)),
+        ("robot Robot2, relation r1", "costs in a conflicts relation")),
+    "a cost of half": wrong(weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(0.5,))),
+        ("robot Robot2, relation r1", "the cost 0.5 is no integer")),
     "a default cost that is no number": wrong(
         weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("nan"))),
         ("robot Robot2, relation r1", "the cost nan is no integer"),
@@ -219,78 +196,53 @@ OF_OBJECTS: dict[str, Wrong] = {
         weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("-inf"))),
         ("robot Robot2, relation r1", "the cost -inf is no integer"),
     ),
-    "a cost of 19 digits": wrong(
-        weighted(constraint("C4", cost=-(10**18))),
-        ("robot Robot3, constraint C4 (V1 V3)", "an integer of 19 digits"),
-    ),
-    "a shared constraint without model": wrong(
-        constraint("C4", model=None), ("robot Robot3, constraint C4 (V1 V3)", "lacks its model")
-    ),
-    "a relation of no arity": wrong(
-        constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
-        ("robot Robot2, relation r1", "a relation of arity 0"),
-    ),
-    "an expression of exponential size": wrong(
-        predicate(doubled(60)), ("robot Robot2, predicate p1", "the expression is too long")
-    ),
-    "an alias for an operator": wrong(
-        predicate(Apply("neq", (Name("X"), Name("Y")))), ("robot Robot2, predicate p1", "says something else")
-    ),
-    "a name that is a call": wrong(
-        predicate(Apply("ne", (Name("abs(X)"), Name("Y")))), ("robot Robot2, predicate p1", "says something else")
-    ),
-    "a Boolean constant": wrong(
-        predicate(Apply("ne", (Constant(True), Name("Y")))),
-        ("robot Robot2, predicate p1", "a Constant where a term should stand"),
-    ),
-    "an operator of too few": wrong(
-        predicate(Apply("ne", (Name("X"),))), ("robot Robot2, predicate p1", "'ne' takes 2 arguments, not 1")
-    ),
-    "a totally known constraint twice": wrong(
-        constraint("C3", "Robot1", model=ConstraintModel.TKC),
-        ("robot Robot1, constraint C3 (V1 V2)", "totally known constraint (TKC) with the child 'Robot2'"),
-    ),
+    "a cost of 19 digits": wrong(weighted(constraint("C4", cost=-(10**18))),
+        ("robot Robot3, constraint C4 (V1 V3)", "an integer of 19 digits")),
+    "a shared constraint without model": wrong(constraint("C4", model=None),
+        ("robot Robot3, constraint C4 (V1 V3)", "lacks its model")),
+    "a relation of no arity": wrong(constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
+        ("robot Robot2, relation r1", "a relation of arity 0")),
+    "an expression of exponential size": wrong(predicate(doubled(60)),
+        ("robot Robot2, predicate p1", "the expression is too long")),
+    "an alias for an operator": wrong(predicate(Apply("neq", (Name("X"), Name("Y")))),
+        ("robot Robot2, predicate p1", "says something else")),
+    "a name that is a call": wrong(predicate(Apply("ne", (Name("abs(X)"), Name("Y")))),
+        ("robot Robot2, predicate p1", "says something else")),
+    "a Boolean constant": wrong(predicate(Apply("ne", (Constant(True), Name("Y")))),
+        ("robot Robot2, predicate p1", "a Constant where a term should stand")),
+    "an operator of too few": wrong(predicate(Apply("ne", (Name("X"),))),
+        ("robot Robot2, predicate p1", "'ne' takes 2 arguments, not 1")),
+    "a totally known constraint twice": wrong(constraint("C3", "Robot1", model=ConstraintModel.TKC),
+        ("robot Robot1, constraint C3 (V1 V2)", "totally known constraint (TKC) with the child 'Robot2'")),
     "another's variable shown": wrong(robot("Robot2", shown=("V1",)), ("robot Robot2", "is to show 'V1'")),
     "a list of variables": wrong(
         lambda team: with_robot(team, replace(team["Robot2"], variables=cast("Any", [*team["Robot2"].variables]))),
         ("robot Robot2", "variables: a list where a tuple should stand"),
     ),
-    "a kind that is a word": wrong(
-        robot("Robot2", kind="DisCSP"), ("robot Robot2", "kind: 'DisCSP' where one of ProblemKind should stand")
-    ),
-    "a value that is True": wrong(
-        relation((1, cast("Any", True))),
-        ("robot Robot2", "definition.tuples[0][1]: a bool where an integer should stand"),
-    ),
-    "a scope that is a word": wrong(
-        constraint("C4", scope="V1 V3"), ("robot Robot3", "constraints[0].scope: 'V1 V3' where a tuple should stand")
-    ),
-    "a definition that is a function": wrong(
-        constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate or Function should stand")
-    ),
-    "a copy of what the robot is not in": wrong(
-        child("Robot3", "Robot1", copies=(bound("V2", "V3"),)),
-        ("robot Robot1, constraint C (V2 V3)", "the scope 'V2 V3' has no variable of this robot"),
-    ),
-    "a copy that its definition does not fit": wrong(
-        child("Robot3", "Robot1", copies=(bound("V1", "V3", 3),)),
-        ("robot Robot1, constraint C (V1 V3 3)", "ne takes 2 terms"),
-    ),
+    "a kind that is a word": wrong(robot("Robot2", kind="DisCSP"),
+        ("robot Robot2", "kind: 'DisCSP' where one of ProblemKind should stand")),
+    "a value that is True": wrong(relation((1, cast("Any", True))),
+        ("robot Robot2", "definition.tuples[0][1]: a bool where an integer should stand")),
+    "a scope that is a word": wrong(constraint("C4", scope="V1 V3"),
+        ("robot Robot3", "constraints[0].scope: 'V1 V3' where a tuple should stand")),
+    "a definition that is a function": wrong(constraint("C4", definition=print),
+        ("robot Robot3", "where Relation or Predicate or Function should stand")),
+    "a copy of what the robot is not in": wrong(child("Robot3", "Robot1", copies=(bound("V2", "V3"),)),
+        ("robot Robot1, constraint C (V2 V3)", "the scope 'V2 V3' has no variable of this robot")),
+    "a copy that its definition does not fit": wrong(child("Robot3", "Robot1", copies=(bound("V1", "V3", 3),)),
+        ("robot Robot1, constraint C (V1 V3 3)", "ne takes 2 terms")),
     "a copy of another's part": wrong(
         child("Robot3", "Robot1", copies=(bound("V1", "V3", model=ConstraintModel.PKC),)),
         ("robot Robot1, constraint C (V1 V3)", "a copy of a partially known constraint (PKC)"),
     ),
     "a scenario's unknown robot": wrong(scenario(RemoveAgent("Robot9")), ("event 1", "there is no robot 'Robot9'")),
     "a scenario's value of 19 digits": wrong(scenario(AddValue("V1", 10**18)), ("event 1", "an integer of 19 digits")),
-    "a scenario's time before the beginning": wrong(
-        scenario(RemoveValue("V1", 1), after=-1), ("event 1", "after less than no message")
-    ),
-    "a scenario after which nobody is left": wrong(
-        scenario(*(RemoveAgent(f"Robot{number}") for number in (1, 2, 3))), ("event 1", "all robots have left")
-    ),
-    "a scenario's robot without variables": wrong(
-        scenario(AddAgent(replace(NEWCOMER, variables=()))), ("robot Late", "the robot has no variable")
-    ),
+    "a scenario's time before the beginning": wrong(scenario(RemoveValue("V1", 1), after=-1),
+        ("event 1", "after less than no message")),
+    "a scenario after which nobody is left": wrong(scenario(*(RemoveAgent(f"Robot{number}") for number in (1, 2, 3))),
+        ("event 1", "all robots have left")),
+    "a scenario's robot without variables": wrong(scenario(AddAgent(replace(NEWCOMER, variables=()))),
+        ("robot Late", "the robot has no variable")),
     "a scenario's partially known constraint": wrong(
         scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", model=ConstraintModel.PKC))),
         ("event 1", "a partially known constraint (PKC) in a scenario"),
@@ -306,11 +258,9 @@ OF_OBJECTS: dict[str, Wrong] = {
         ),
         ("event 1", "(PKC) of a robot that a scenario adds"),
     ),
-    "a scenario's constraint of too many": wrong(
-        scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", 3))),
-        ("robot Robot2, constraint C (V1 V2 3)", "ne takes 2 terms"),
-    ),
-}
+    "a scenario's constraint of too many": wrong(scenario(AddConstraint("Robot2", "Robot1", bound("V1", "V2", 3))),
+        ("robot Robot2, constraint C (V1 V2 3)", "ne takes 2 terms")),
+}  # fmt: skip
 """What files cannot say, or say in other words."""
 
 

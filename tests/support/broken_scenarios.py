@@ -62,49 +62,26 @@ GONE = '<remove_agent name="Robot3"/>'
 ROBOTS = [
     change("a robot leaves that never was", '<remove_agent name="Robot_3"/>', "there is no robot 'Robot_3'"),
     change("a robot leaves twice", '<remove_agent  name="Robot3"/>', "no robot 'Robot3'", "at that time", before=GONE),
-    change(
-        "nobody is left",
-        '<remove_agent name="Robot1"/> <remove_agent name="Robot2"/>',
-        "all robots have left",
-        before=GONE,
-        on="<event",
-    ),
+    change("nobody is left", '<remove_agent name="Robot1"/> <remove_agent name="Robot2"/>', "all robots have left",
+           before=GONE, on="<event"),
     change("a robot with a long name leaves", f'<remove_agent name="{"R" * 5000}"/>', "no robot 'RRR", "...'"),
     change("a robot comes that is there", '<add_agent file="Robot2.xml"/>', "'Robot2' is there already"),
     change("a robot comes twice", '<add_agent  file="late/Robot9.xml"/>', "'Robot9' is there already", before=ADD_9),
     newcomer("a newcomer with a taken variable", ("V9", "V2"), ADD_9, "the variable 'V2' belongs to 'Robot2'"),
     newcomer("a newcomer of another kind", ("DisCSP", "DisWCSP"), ADD_9, "is a DisWCSP in a team of DisCSP"),
-    newcomer(
-        "a newcomer with a child",
-        ("<agents_children/>", '<agents_children><agent name="Robot2" variable="V9"/></agents_children>'),
-        '<agent name="Robot2"',
-        "has the child 'Robot2'",
-        "names parents only",
-    ),
-    newcomer(
-        "a newcomer's parent is not there",
-        ('<agent name="Robot1"/>', '<agent name="Robot7"/>'),
-        '<agent name="Robot7"',
-        "there is no robot 'Robot7'",
-    ),
+    newcomer("a newcomer with a child",
+             ("<agents_children/>", '<agents_children><agent name="Robot2" variable="V9"/></agents_children>'),
+             '<agent name="Robot2"', "has the child 'Robot2'", "names parents only"),
+    newcomer("a newcomer's parent is not there", ('<agent name="Robot1"/>', '<agent name="Robot7"/>'),
+             '<agent name="Robot7"', "there is no robot 'Robot7'"),
     newcomer("a newcomer's unknown variable", ("V3 V9", "V7 V9"), 'name="N1"', "no robot has the variable 'V7'"),
-    newcomer(
-        "a newcomer's constraint with a stranger",
-        ("V3 V9", "V2 V9"),
-        'name="N1"',
-        "'V2' belongs to 'Robot2', which is no parent of 'Robot9'",
-    ),
-    newcomer(
-        "a newcomer's constraint under the wrong parent",
-        ("V3 V9", "V1 V9"),
-        'name="N1"',
-        "the scope of 'N1' is not of 'Robot9' and 'Robot3'",
-    ),
-    files(
-        "a newcomer with a PKC",
-        {SCENARIO: scenario(ADD_9), LATE: ROBOT_9.replace('"TKC" name="N2"', '"PKC" name="N2"')},
-        (LATE, 'name="N2"', ("partially known", 'write model="TKC"')),
-    ),
+    newcomer("a newcomer's constraint with a stranger", ("V3 V9", "V2 V9"), 'name="N1"',
+             "'V2' belongs to 'Robot2', which is no parent of 'Robot9'"),
+    newcomer("a newcomer's constraint under the wrong parent", ("V3 V9", "V1 V9"), 'name="N1"',
+             "the scope of 'N1' is not of 'Robot9' and 'Robot3'"),
+    files("a newcomer with a PKC",
+          {SCENARIO: scenario(ADD_9), LATE: ROBOT_9.replace('"TKC" name="N2"', '"PKC" name="N2"')},
+          (LATE, 'name="N2"', ("partially known", 'write model="TKC"'))),
     files(
         "two mistakes of a newcomer, and what follows is not told",
         {
@@ -148,7 +125,7 @@ ROBOTS = [
         (LATE, "<relation ", "the tuple '3 1' has 2 values"),
         (SCENARIO, 'name="N"', "unknown reference 'nee'"),
     ),
-]
+]  # fmt: skip
 
 SILENCE = [
     files(
@@ -220,62 +197,32 @@ SILENCE = [
 ]
 
 VALUES = [
-    change(
-        "a value goes that is not there",
-        '<remove_value variable="V2" value="5"/>',
-        "'V2' has no value 5",
-        "its domain is 1..4 7 9",
-    ),
-    change(
-        "a value goes twice",
-        '<remove_value variable="V3"  value="4"/>',
-        "'V3' has no value 4",
-        "1..3",
-        before='<remove_value variable="V3" value="4"/>',
-    ),
+    change("a value goes that is not there", '<remove_value variable="V2" value="5"/>', "'V2' has no value 5",
+           "its domain is 1..4 7 9"),
+    change("a value goes twice", '<remove_value variable="V3"  value="4"/>', "'V3' has no value 4", "1..3",
+           before='<remove_value variable="V3" value="4"/>'),
     change("a value comes that is there", '<add_value variable="V2" value="7"/>', "'V2' has the value 7 already"),
     change("a value of nobody's variable", '<add_value variable="V9" value="7"/>', "no robot has the variable 'V9'"),
     change("a value of one who has left", '<add_value variable="V3" value="7"/>', "the variable 'V3'", before=GONE),
     change("a value that is none", '<add_value variable="V3" value="x"/>', "'x' is no integer", "at most 18 digits"),
-]
+]  # fmt: skip
 
 CONSTRAINTS = [
-    change(
-        "a constraint goes that is not there",
-        '<remove_constraint agent="Robot2" parent="Robot1" name="C9"/>',
-        "'Robot2' shares no constraint 'C9' with a parent 'Robot1'",
-        "there are C1 C2 C3",
-    ),
-    change(
-        "a constraint goes twice",
-        '<remove_constraint agent="Robot2" parent="Robot1"  name="C3"/>',
-        "shares no constraint 'C3'",
-        "there are C1 C2)",
-        before='<remove_constraint agent="Robot2" parent="Robot1" name="C3"/>',
-    ),
-    change(
-        "a constraint goes, upside down",
-        '<remove_constraint agent="Robot1" parent="Robot2" name="C1"/>',
-        "'Robot1' shares no constraint 'C1' with a parent 'Robot2'",
-        "the parent is the higher",
-    ),
+    change("a constraint goes that is not there", '<remove_constraint agent="Robot2" parent="Robot1" name="C9"/>',
+           "'Robot2' shares no constraint 'C9' with a parent 'Robot1'", "there are C1 C2 C3"),
+    change("a constraint goes twice", '<remove_constraint agent="Robot2" parent="Robot1"  name="C3"/>',
+           "shares no constraint 'C3'", "there are C1 C2)",
+           before='<remove_constraint agent="Robot2" parent="Robot1" name="C3"/>'),
+    change("a constraint goes, upside down", '<remove_constraint agent="Robot1" parent="Robot2" name="C1"/>',
+           "'Robot1' shares no constraint 'C1' with a parent 'Robot2'", "the parent is the higher"),
     change("a constraint of nobody", add("Robot9", "Robot3", constraint("V3 V9")), "no robot 'Robot9'", on="<add_con"),
-    change(
-        "a constraint with nobody", add("Robot3", "Robot9", constraint("V2 V3")), "no robot 'Robot9'", on='name="N"'
-    ),
-    change(
-        "a constraint with oneself",
-        add("Robot3", "Robot3", constraint("V2 V3")),
-        "'Robot3' is no parent of its own",
-        on='name="N"',
-    ),
-    change(
-        "a constraint that is held above",
-        add("Robot1", "Robot2", constraint("V1 V2")),
-        "'N' does not stand with 'Robot1' under 'Robot2'",
-        "the lowest robot of its scope holds it, 'Robot2'",
-        on='name="N"',
-    ),
+    change("a constraint with nobody", add("Robot3", "Robot9", constraint("V2 V3")), "no robot 'Robot9'",
+           on='name="N"'),
+    change("a constraint with oneself", add("Robot3", "Robot3", constraint("V2 V3")),
+           "'Robot3' is no parent of its own", on='name="N"'),
+    change("a constraint that is held above", add("Robot1", "Robot2", constraint("V1 V2")),
+           "'N' does not stand with 'Robot1' under 'Robot2'", "the lowest robot of its scope holds it, 'Robot2'",
+           on='name="N"'),
     files(
         "wrong constraints, each on its line, and what follows is not told",
         {
@@ -306,19 +253,10 @@ CONSTRAINTS = [
         (SCENARIO, '"N7"', "ne takes 2 terms"),
         (SCENARIO, '"N9"', "shares no constraint 'N9'"),
     ),
-    change(
-        "a definition of another robot's file",
-        add("Robot3", "Robot2", constraint("V2 V3", reference="r1")),
-        "unknown reference 'r1'",
-        on='name="N"',
-    ),
-    change(
-        "a definition that left with its robot",
-        add("Robot2", "Robot1", constraint("V1 V2", reference="far")),
-        "unknown reference 'far'",
-        on='name="N"',
-        before=f'{ADD_9}\n<remove_agent name="Robot9"/>',
-    ),
-]
+    change("a definition of another robot's file", add("Robot3", "Robot2", constraint("V2 V3", reference="r1")),
+           "unknown reference 'r1'", on='name="N"'),
+    change("a definition that left with its robot", add("Robot2", "Robot1", constraint("V1 V2", reference="far")),
+           "unknown reference 'far'", on='name="N"', before=f'{ADD_9}\n<remove_agent name="Robot9"/>'),
+]  # fmt: skip
 
 CHANGES = [*ROBOTS, *SILENCE, *VALUES, *CONSTRAINTS]

@@ -44,83 +44,41 @@ def added(change: str) -> str:
 
 
 NEIGHBOURS = [
-    files(
-        "a neighbour without a file",
-        {R3: None},
-        (R1, TOLD, ("Robot3.xml", "has no file")),
-        (R2, '<agent name="Robot3"', "the child 'Robot3' has no file"),
-    ),
-    case(
-        "a misspelt neighbour",
-        [(R3, 'name="Robot2"', 'name="Robot_2"')],
-        (R3, '"Robot_2"', ("'Robot_2' has no file", "did you mean 'Robot2'")),
-        (R2, '<agent name="Robot3"', "does not list 'Robot2' as its parent"),
-    ),
-    case(
-        "a child that is not listed back",
-        [(R2, '<agent name="Robot3" variable="V2"/>', "")],
-        (R3, '<agent name="Robot2"', ("does not list 'Robot3' as its child", "Robot2.xml:3")),
-    ),
-    case(
-        "each the other's parent",
-        [(R1, TOLD, ""), (R1, "<agents_parent/>", '<agents_parent><agent name="Robot3"/></agents_parent>')],
-        (R1, '"Robot3"', ("'Robot3' is listed as parent", "Robot3.xml:23")),
-    ),
-    case(
-        "itself as neighbour",
-        [(R3, "<agents_children/>", '<agents_children>\n<agent name="Robot3"/></agents_children>')],
-        (R3, '<agent name="Robot3"', "is the robot itself"),
-    ),
-    case(
-        "a neighbour twice",
-        [(R3, "<agents_children/>", '<agents_children>\n<agent name="Robot1"/></agents_children>')],
-        (R3, '<agent name="Robot1"/>', "listed as parent already"),
-    ),
-    files(
-        "a cycle of parents",
-        {"A.xml": ring("A", "C", "B"), "B.xml": ring("B", "A", "C"), "C.xml": ring("C", "B", "A")},
-        ("C.xml", '<agent name="B"', ("cycle: B -> C -> A -> B", "A.xml:6", "B.xml:6")),
-    ),
-    case(
-        "a DisWCSP among DisCSPs",
-        [(R2, '"DisCSP"', '"DisWCSP"')],
-        (R2, "<presentation", ("the robot is a DisWCSP", "Robot1.xml:3")),
-    ),
-    case(
-        "two owners of one variable",
-        [(R3, "V3", "V2"), (R3, "W1 V2 V2", "W1 V1 V2")],
-        (R3, "<variable ", ("'V2' is also one of 'Robot2'", "Robot2.xml:8")),
-    ),
-    case(
-        "a variable that its owner does not have",
-        [(R3, 'scope="V1 V3"', 'scope="V9 V3"')],
-        (R3, 'name="C4"', ("no robot has the variable 'V9'", "Robot1.xml:3")),
-    ),
-    case(
-        "a constraint under the wrong parent",
-        [(R3, C4, ""), (R3, C5, C4 + C5), (R3, 'nbConstraints="1"', "")],
-        (R3, 'name="C4"', ("no variable of the parent 'Robot2'", "move it to 'Robot1'")),
-    ),
-    case(
-        "n-ary under the higher parent",
-        [(R3, C5, ""), (R3, C4, C4 + "\n" + C5), (R3, ' nbConstraints="1"', "")],
-        (R3, 'name="C5"', ("the lowest parent of its scope is 'Robot2'", "Robot2.xml:3")),
-    ),
-    case(
-        "n-ary in a higher file",
-        [(R2, '"le" scope="V1 V2"', '"le" scope="V3 V2"')],
-        (R2, 'name="C3"', ("'V3' belongs to 'Robot3', which is no parent", "Robot3.xml:8")),
-    ),
-    case(
-        "a PKC of three robots",
-        [(R3, 'model="TKC" name="C5"', 'model="PKC" name="C5"')],
-        (R3, 'name="C5"', ("PKC constraint over more than two", "Robot2.xml:3")),
-    ),
-    case(
-        "a part over a third robot",
-        [(R1, '"ne" scope="V1 V2"', '"ne" scope="V1 V3"')],
-        (R1, 'name="C3"', ("'V3' is no variable of 'Robot1' or 'Robot2'", "Robot2.xml:3")),
-    ),
+    files("a neighbour without a file", {R3: None}, (R1, TOLD, ("Robot3.xml", "has no file")),
+          (R2, '<agent name="Robot3"', "the child 'Robot3' has no file")),
+    case("a misspelt neighbour", [(R3, 'name="Robot2"', 'name="Robot_2"')],
+         (R3, '"Robot_2"', ("'Robot_2' has no file", "did you mean 'Robot2'")),
+         (R2, '<agent name="Robot3"', "does not list 'Robot2' as its parent")),
+    case("a child that is not listed back", [(R2, '<agent name="Robot3" variable="V2"/>', "")],
+         (R3, '<agent name="Robot2"', ("does not list 'Robot3' as its child", "Robot2.xml:3"))),
+    case("each the other's parent",
+         [(R1, TOLD, ""), (R1, "<agents_parent/>", '<agents_parent><agent name="Robot3"/></agents_parent>')],
+         (R1, '"Robot3"', ("'Robot3' is listed as parent", "Robot3.xml:23"))),
+    case("itself as neighbour",
+         [(R3, "<agents_children/>", '<agents_children>\n<agent name="Robot3"/></agents_children>')],
+         (R3, '<agent name="Robot3"', "is the robot itself")),
+    case("a neighbour twice",
+         [(R3, "<agents_children/>", '<agents_children>\n<agent name="Robot1"/></agents_children>')],
+         (R3, '<agent name="Robot1"/>', "listed as parent already")),
+    files("a cycle of parents",
+          {"A.xml": ring("A", "C", "B"), "B.xml": ring("B", "A", "C"), "C.xml": ring("C", "B", "A")},
+          ("C.xml", '<agent name="B"', ("cycle: B -> C -> A -> B", "A.xml:6", "B.xml:6"))),
+    case("a DisWCSP among DisCSPs", [(R2, '"DisCSP"', '"DisWCSP"')],
+         (R2, "<presentation", ("the robot is a DisWCSP", "Robot1.xml:3"))),
+    case("two owners of one variable", [(R3, "V3", "V2"), (R3, "W1 V2 V2", "W1 V1 V2")],
+         (R3, "<variable ", ("'V2' is also one of 'Robot2'", "Robot2.xml:8"))),
+    case("a variable that its owner does not have", [(R3, 'scope="V1 V3"', 'scope="V9 V3"')],
+         (R3, 'name="C4"', ("no robot has the variable 'V9'", "Robot1.xml:3"))),
+    case("a constraint under the wrong parent", [(R3, C4, ""), (R3, C5, C4 + C5), (R3, 'nbConstraints="1"', "")],
+         (R3, 'name="C4"', ("no variable of the parent 'Robot2'", "move it to 'Robot1'"))),
+    case("n-ary under the higher parent", [(R3, C5, ""), (R3, C4, C4 + "\n" + C5), (R3, ' nbConstraints="1"', "")],
+         (R3, 'name="C5"', ("the lowest parent of its scope is 'Robot2'", "Robot2.xml:3"))),
+    case("n-ary in a higher file", [(R2, '"le" scope="V1 V2"', '"le" scope="V3 V2"')],
+         (R2, 'name="C3"', ("'V3' belongs to 'Robot3', which is no parent", "Robot3.xml:8"))),
+    case("a PKC of three robots", [(R3, 'model="TKC" name="C5"', 'model="PKC" name="C5"')],
+         (R3, 'name="C5"', ("PKC constraint over more than two", "Robot2.xml:3"))),
+    case("a part over a third robot", [(R1, '"ne" scope="V1 V2"', '"ne" scope="V1 V3"')],
+         (R1, 'name="C3"', ("'V3' is no variable of 'Robot1' or 'Robot2'", "Robot2.xml:3"))),
     case(
         "a part over what its owner shows to nobody",
         [
@@ -130,29 +88,16 @@ NEIGHBOURS = [
         ],
         (R1, 'name="C3"', ("looks at 'W2', which 'Robot2' shows to nobody", "hold its part", "Robot2.xml:8")),
     ),
-    case(
-        "a child told what is not one's own",
-        [(R2, 'variable="V2"', 'variable="V1"')],
-        (R2, 'variable="V1"', ("must know 'V1'", "known own variables: V2")),
-    ),
-    case(
-        "a child told twice", [(R2, 'variable="V2"', 'variable="V2 V2"')], (R2, 'variable="V2 V2"', "list 'V2' twice")
-    ),
-    case(
-        "a child told too little",
-        [(R1, 'variable="V1 W1"', 'variable="V1"')],
-        (R1, 'name="Robot3"', ("must also know W1", "Robot3.xml:30")),
-    ),
-    case(
-        "a copy that the child does not have",
-        [told(C4, C5.replace("sum", "lt").replace("W1 V2 V3", "W1 V3"))],
-        (R1, 'name="C5"', ("the copy of 'C5'", "'Robot3' has no such constraint")),
-    ),
-    case(
-        "a copy that says something else",
-        [told(C4.replace("ne", "lt"))],
-        (R1, 'name="C4"', ("the tuple '2 1' forbidden, and the child has it allowed", "Robot3.xml:25")),
-    ),
+    case("a child told what is not one's own", [(R2, 'variable="V2"', 'variable="V1"')],
+         (R2, 'variable="V1"', ("must know 'V1'", "known own variables: V2"))),
+    case("a child told twice", [(R2, 'variable="V2"', 'variable="V2 V2"')],
+         (R2, 'variable="V2 V2"', "list 'V2' twice")),
+    case("a child told too little", [(R1, 'variable="V1 W1"', 'variable="V1"')],
+         (R1, 'name="Robot3"', ("must also know W1", "Robot3.xml:30"))),
+    case("a copy that the child does not have", [told(C4, C5.replace("sum", "lt").replace("W1 V2 V3", "W1 V3"))],
+         (R1, 'name="C5"', ("the copy of 'C5'", "'Robot3' has no such constraint"))),
+    case("a copy that says something else", [told(C4.replace("ne", "lt"))],
+         (R1, 'name="C4"', ("the tuple '2 1' forbidden, and the child has it allowed", "Robot3.xml:25"))),
     case(
         "a copy too large to compare",
         [
@@ -162,50 +107,28 @@ NEIGHBOURS = [
         ],
         (R1, 'name="C4"', ("more than 1000000 tuples", "leave the copy out")),
     ),
-]
+]  # fmt: skip
 
 SCENARIOS = [
     files("a scenario that is a robot", {SCENARIO: ROBOT_1}, (SCENARIO, "<instance>", "expected <scenario>")),
     files("a truncated scenario", {SCENARIO: "<scenario>\n"}, (SCENARIO, "", ":2: is not well-formed XML")),
-    files(
-        "an event without a time",
-        {SCENARIO: "<scenario><event/></scenario>"},
-        (SCENARIO, "<event", "lacks its attribute 'after'"),
-    ),
-    files(
-        "an event at no time",
-        {SCENARIO: '<scenario><event after="noon"/></scenario>'},
-        (SCENARIO, "<event", ('after="noon"', "200 messages")),
-    ),
-    files(
-        "an unknown change",
-        {SCENARIO: '<scenario><event after="solved">\n<explode/></event></scenario>'},
-        (SCENARIO, "<explode/>", "<explode> does not belong in <event>"),
-    ),
-    files(
-        "a value of 5000 digits",
-        {SCENARIO: added(f'<add_value variable="V1" value="{"9" * 5000}"/>')},
-        (SCENARIO, "<add_value", "at most 18 digits"),
-    ),
-    files(
-        "a robot from outside",
-        {SCENARIO: added('<add_agent file="../../x.xml"/>')},
-        (SCENARIO, "<add_agent", "outside the team's folder"),
-    ),
-    files(
-        "a robot from anywhere",
-        {SCENARIO: added('<add_agent file="/etc/passwd"/>')},
-        (SCENARIO, "<add_agent", "outside the team's folder"),
-    ),
-    files(
-        "a robot from nowhere",
-        {SCENARIO: added('<add_agent file="late/X.xml"/>')},
-        (SCENARIO, "<add_agent", "there is no file 'late/X.xml'"),
-    ),
-    other(
-        "a scenario that is a folder", lambda folder: (folder / SCENARIO).mkdir(), (SCENARIO, "", "not a regular file")
-    ),
-]
+    files("an event without a time", {SCENARIO: "<scenario><event/></scenario>"},
+          (SCENARIO, "<event", "lacks its attribute 'after'")),
+    files("an event at no time", {SCENARIO: '<scenario><event after="noon"/></scenario>'},
+          (SCENARIO, "<event", ('after="noon"', "200 messages"))),
+    files("an unknown change", {SCENARIO: '<scenario><event after="solved">\n<explode/></event></scenario>'},
+          (SCENARIO, "<explode/>", "<explode> does not belong in <event>")),
+    files("a value of 5000 digits", {SCENARIO: added(f'<add_value variable="V1" value="{"9" * 5000}"/>')},
+          (SCENARIO, "<add_value", "at most 18 digits")),
+    files("a robot from outside", {SCENARIO: added('<add_agent file="../../x.xml"/>')},
+          (SCENARIO, "<add_agent", "outside the team's folder")),
+    files("a robot from anywhere", {SCENARIO: added('<add_agent file="/etc/passwd"/>')},
+          (SCENARIO, "<add_agent", "outside the team's folder")),
+    files("a robot from nowhere", {SCENARIO: added('<add_agent file="late/X.xml"/>')},
+          (SCENARIO, "<add_agent", "there is no file 'late/X.xml'")),
+    other("a scenario that is a folder", lambda folder: (folder / SCENARIO).mkdir(),
+          (SCENARIO, "", "not a regular file")),
+]  # fmt: skip
 
 MANY = [
     case(
@@ -231,11 +154,7 @@ MANY = [
         (R2, '<agent name="Robot3"', "must know 'V9'"),
         (R3, "</topic>", "not well-formed XML"),
     ),
-    case(
-        "two broken files, and two that disagree",
-        [(R2, "</instance>", ""), (R3, 'scope="V1 V3"', 'scope="V1,V3"'), (R1, 'scope="V1 W1"', 'scope="V1"')],
-        (R1, 'name="C0"', "lt takes 2 terms"),
-        (R2, "", ":38: is not well-formed XML"),
-        (R3, 'name="C4"', "'V1,V3'"),
-    ),
-]
+    case("two broken files, and two that disagree",
+         [(R2, "</instance>", ""), (R3, 'scope="V1 V3"', 'scope="V1,V3"'), (R1, 'scope="V1 W1"', 'scope="V1"')],
+         (R1, 'name="C0"', "lt takes 2 terms"), (R2, "", ":38: is not well-formed XML"), (R3, 'name="C4"', "'V1,V3'")),
+]  # fmt: skip

@@ -167,29 +167,10 @@ ATTRIBUTES = [
         if content[position : position + 2] == b'="'
     ]
 ]
+WORDS = ["0", "-1", "V1", "V2", "V3", "W1", "TKC", "PKC", "soft", "DisWCSP", "r1", "Robot2", "x()", "eq"]
 VALUES = st.one_of(
     st.text(max_size=12).map(lambda text: text.replace("<", "").replace("&", "").replace('"', "")),
-    st.sampled_from(
-        [
-            "",
-            "0",
-            "-1",
-            "9" * 400,
-            "V1",
-            "V2",
-            "V3",
-            "W1",
-            "V1 V2 V3",
-            "TKC",
-            "PKC",
-            "soft",
-            "DisWCSP",
-            "r1",
-            "Robot2",
-            "x()",
-            "eq",
-        ]
-    ),
+    st.sampled_from(["", "9" * 400, "V1 V2 V3", *WORDS]),
 )
 
 

@@ -185,19 +185,15 @@ def test_what_changes_leave_can_be_solved(team: Team) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            AddConstraint("RB", "RA", Constraint("C", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)),
-            "a cost in a Dis",
-        ),
-        (
-            AddConstraint("RC", "RA", Constraint("C", PREDEFINED["ne"], ("A", "C"), ("A",))),
-            "takes 2 terms, but 'A' has 1",
-        ),
+        (AddConstraint("RB", "RA", Constraint("C", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)),
+         "a cost in a Dis"),
+        (AddConstraint("RC", "RA", Constraint("C", PREDEFINED["ne"], ("A", "C"), ("A",))),
+         "takes 2 terms, but 'A' has 1"),
         (AddAgent(Robot("RC", (Variable("C", Domain("D", ())),))), "domain D has no value"),
         (AddValue("A", 10**18), "19 digits"),
         ("nonsense", "'nonsense' where RemoveAgent or AddAgent"),
     ],
-)
+)  # fmt: skip
 def test_what_a_field_says_is_held_against_the_rules(change: Change, message: str) -> None:
     team = team_of({"A": range(1, 3), "B": range(1, 3)}, [])
     newcomer = AddAgent(Robot("RC", (Variable("C", Domain("D", (range(2),))),)))

@@ -51,18 +51,13 @@ def test_aliases_and_merged_mappings_are_read_in_place() -> None:
         ("speed: 2", "speed: [2]", 6, "robots.dan.speed: a list does not belong here", "delete it"),
         ("speed: 2", "speed: {}", 6, "robots.dan.speed: a mapping does not belong here", "delete it"),
         ("[0, 1]", "[0, {x: 1}]", 3, "robots.ann.at[1]: a mapping does not belong here", "delete it"),
-        (
-            "&bob {at: [2, 3]}\n  cid: *bob\n  dan: {<<: *bob, ",
-            "3\n  dan: {",
-            4,
-            "robots.bob: a value does not belong here",
-            "delete it",
-        ),
+        ("&bob {at: [2, 3]}\n  cid: *bob\n  dan: {<<: *bob, ", "3\n  dan: {", 4,
+         "robots.bob: a value does not belong here", "delete it"),
         ("robots:", "robot:", 2, "unknown key 'robot' in the file", "did you mean 'robots'?"),
         ("robots:", "people:", 1, "the file has no robots", "write robots:"),
         ("name: n", "name: n\nname: m", 2, "duplicate key 'name'", "delete or rename one"),
     ],
-)
+)  # fmt: skip
 def test_parts_that_no_reader_uses_are_refused(now: str, then: str, line: int, message: str, hint: str) -> None:
     assert now in TEXT
     with pytest.raises(MistakeError) as caught:

@@ -110,28 +110,16 @@ def test_a_robot_can_come_again() -> None:
         (replace(newcomer(), kind=ProblemKind.DISWCSP), "'RE' is a DisWCSP in a team of DisCSP", 0),
         (replace(newcomer(), children=(Child("RA", line=7),)), "'RE' has the child 'RA'", 7),
         (newcomer(Parent("RX", line=8)), "there is no robot 'RX'", 8),
-        (
-            newcomer(Parent("RA", (replace(named_constraint("N", "B", "E"), line=9),))),
-            "'B' belongs to 'RB', which is no parent",
-            9,
-        ),
-        (
-            newcomer(Parent("RA", (replace(named_constraint("N", "X", "E"), line=9),))),
-            "no robot has the variable 'X'",
-            9,
-        ),
-        (
-            newcomer(Parent("RA"), Parent("RB", (replace(named_constraint("N", "A", "E"), line=9),))),
-            "the scope of 'N' is not of 'RE' and 'RB'",
-            9,
-        ),
-        (
-            newcomer(Parent("RA", (replace(named_constraint("N", "A", "B", "E"), line=9),)), Parent("RB")),
-            "'N' does not stand with 'RE' under 'RA'",
-            9,
-        ),
+        (newcomer(Parent("RA", (replace(named_constraint("N", "B", "E"), line=9),))),
+         "'B' belongs to 'RB', which is no parent", 9),
+        (newcomer(Parent("RA", (replace(named_constraint("N", "X", "E"), line=9),))), "no robot has the variable 'X'",
+         9),
+        (newcomer(Parent("RA"), Parent("RB", (replace(named_constraint("N", "A", "E"), line=9),))),
+         "the scope of 'N' is not of 'RE' and 'RB'", 9),
+        (newcomer(Parent("RA", (replace(named_constraint("N", "A", "B", "E"), line=9),)), Parent("RB")),
+         "'N' does not stand with 'RE' under 'RA'", 9),
     ],
-)
+)  # fmt: skip
 def test_a_robot_that_cannot_come(robot: Robot, message: str, line: int) -> None:
     bad = refused(triangle(), AddAgent(robot))
     assert bad.message.startswith(message)

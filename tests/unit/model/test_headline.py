@@ -21,14 +21,10 @@ EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcom
         ({}, "solution for all 16 robots"),
         ({"verdict": Verdict.OPTIMAL, "cost": 1200}, "optimal solution for all 16 robots, cost 1,200"),
         ({"verdict": Verdict.OPTIMAL, "cost": Decimal("0.0")}, "optimal solution for all 16 robots, cost 0.0"),
-        (
-            {"verdict": Verdict.OPTIMAL, "cost": Decimal("1.5E-8")},
-            "optimal solution for all 16 robots, cost 0.000000015",
-        ),
-        (
-            {"verdict": Verdict.OPTIMAL, "cost": Decimal("-1234567.50")},
-            "optimal solution for all 16 robots, cost -1,234,567.50",
-        ),
+        ({"verdict": Verdict.OPTIMAL, "cost": Decimal("1.5E-8")},
+         "optimal solution for all 16 robots, cost 0.000000015"),
+        ({"verdict": Verdict.OPTIMAL, "cost": Decimal("-1234567.50")},
+         "optimal solution for all 16 robots, cost -1,234,567.50"),
         ({"cost": 0}, "solution for all 16 robots"),
         ({"verdict": Verdict.OPTIMAL, "withdrawn": SIX}, "10 of 16 fly (proven maximum)"),
         ({"withdrawn": SIX}, "10 of 16 fly (not proven to be the maximum)"),
@@ -38,13 +34,11 @@ EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcom
         ({"verdict": Verdict.NO_SOLUTION, "epochs": EPOCHS}, "no solution in the end"),
         ({"verdict": Verdict.NO_SOLUTION, "lost": SIX[:1]}, "no solution for the robots that are left"),
         ({"verdict": Verdict.UNKNOWN}, "no verdict, a limit was reached"),
-        (
-            {"verdict": Verdict.UNKNOWN, "withdrawn": SIX},
-            "no verdict, a limit was reached; 10 of 16 fly in the best answer so far",
-        ),
+        ({"verdict": Verdict.UNKNOWN, "withdrawn": SIX},
+         "no verdict, a limit was reached; 10 of 16 fly in the best answer so far"),
         ({"epochs": EPOCHS}, "solution for all 3 robots"),
     ],
-)
+)  # fmt: skip
 def test_the_headline_says_what_happened(changed: dict[str, Any], headline: str) -> None:
     assert describe_outcome(replace(SOLVED, **changed), 16, weighted=False) == headline
 

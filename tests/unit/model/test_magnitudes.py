@@ -115,19 +115,15 @@ def team(body: str, *, values: tuple[range, ...] = (range(1, 10**5),), cost: boo
 @pytest.mark.parametrize(
     ("made", "says"),
     [
-        (
-            lambda: team("eq(mul(X,Y,X,Y),1)"),
-            "'mul(V1,V2,V1,V2)' may reach 99996000059999600001, beyond the limit of 2^63",
-        ),
+        (lambda: team("eq(mul(X,Y,X,Y),1)"),
+         "'mul(V1,V2,V1,V2)' may reach 99996000059999600001, beyond the limit of 2^63"),
         (lambda: team("eq(pow(X,Y),1)"), "'pow(V1,V2)' may reach 10^1000 and more"),
         (lambda: team("ge(sub(0,mul(X,Y,10)),neg(mul(X,X,X,Y)))"), "'mul(V1,V1,V1,V2)' may reach"),
-        (
-            lambda: team("mul(X,Y,900000000)", cost=True),
-            "the cost 'mul(V1,V2,900000000)' may reach 8999820000900000000",
-        ),
+        (lambda: team("mul(X,Y,900000000)", cost=True),
+         "the cost 'mul(V1,V2,900000000)' may reach 8999820000900000000"),
         (lambda: team("mul(X,Y)", cost=True, places=9), "costs have at most 18 digits in units of 10^-9"),
     ],
-)
+)  # fmt: skip
 def test_the_expression_and_its_bound_are_named(made: Callable[[], Team], says: str) -> None:
     with pytest.raises(InvalidInputError) as refused:
         check_team(made())

@@ -81,16 +81,10 @@ def test_a_team_that_shares_exclusions_alone_has_no_fault() -> None:
 @pytest.mark.parametrize(
     ("domains", "constraints", "fault"),
     [
-        (
-            {"A": (0, 1), "B": (0, 1), "C": (0, 1)},
-            [conflicts("A", "B", "C", rows=[(1, 1, 1)])],
-            "RC shares 'r', which is not over one variable of two robots",
-        ),
-        (
-            {"A": (0, 1), "B": (0, 1)},
-            [soft("A", "B", rows={(1, 1): 4})],
-            "'s' costs 4 for A = 1 and B = 1: it is more than an exclusion",
-        ),
+        ({"A": (0, 1), "B": (0, 1), "C": (0, 1)}, [conflicts("A", "B", "C", rows=[(1, 1, 1)])],
+         "RC shares 'r', which is not over one variable of two robots"),
+        ({"A": (0, 1), "B": (0, 1)}, [soft("A", "B", rows={(1, 1): 4})],
+         "'s' costs 4 for A = 1 and B = 1: it is more than an exclusion"),
         (
             {"A": (1, 2), "B": (0, 1, 2)},
             [not_the_same("A", "B")],
@@ -99,14 +93,11 @@ def test_a_team_that_shares_exclusions_alone_has_no_fault() -> None:
                 " for several robots"
             ),
         ),
-        (
-            {"A": (0, 1), "B": (0, 1), "C": (0, 1)},
-            [not_the_same("A", "B"), not_the_same("B", "C")],
-            "A = 1 and C = 1 do not exclude each other, though both exclude what others do",
-        ),
+        ({"A": (0, 1), "B": (0, 1), "C": (0, 1)}, [not_the_same("A", "B"), not_the_same("B", "C")],
+         "A = 1 and C = 1 do not exclude each other, though both exclude what others do"),
     ],
     ids=["n-ary", "soft", "no idle value", "no clique"],
-)
+)  # fmt: skip
 def test_what_is_no_task_allocation_is_told(
     domains: dict[str, tuple[int, ...]], constraints: list[Constraint], fault: str
 ) -> None:

@@ -36,26 +36,20 @@ HOSTILE = {
     "deep": (f"<instance>{FRODO}{'<domains>' * 9999}</instance>", "is not well-formed XML"),
     "huge range": (f"<instance>{FRODO}{DOMAIN.format('0..999999999999999999')}</instance>", "more than 100000 values"),
     "many digits": (f"<instance>{FRODO}{DOMAIN.format('9' * 100_000)}</instance>", "is no integer"),
-    "huge counts": (
-        f"<instance>{FRODO}{DOMAIN.format('1')}<variables nbVariables='999999999999'/></instance>",
-        "has no variable",
-    ),
-    "huge cost": (
-        f"<instance>{FRODO}{DOMAIN.format('1')}{VARIABLE}{RELATION.format('1e99:1')}</instance>",
-        "the cost 1e99 is too large",
-    ),
+    "huge counts": (f"<instance>{FRODO}{DOMAIN.format('1')}<variables nbVariables='999999999999'/></instance>",
+        "has no variable"),
+    "huge cost": (f"<instance>{FRODO}{DOMAIN.format('1')}{VARIABLE}{RELATION.format('1e99:1')}</instance>",
+        "the cost 1e99 is too large"),
     "huge arity": (
         f"<instance>{FRODO}{DOMAIN.format('1')}{VARIABLE}{RELATION.format('').replace('1', '9' * 12)}{CONSTRAINT}",
         "tuples of 999999999999 values",
     ),
-    "deep expression": (
-        f"<instance>{FRODO}{PREDICATE.format('not(' * 900 + 'eq(X,1)' + ')' * 900)}</instance>",
-        "nested too deep",
-    ),
+    "deep expression": (f"<instance>{FRODO}{PREDICATE.format('not(' * 900 + 'eq(X,1)' + ')' * 900)}</instance>",
+        "nested too deep"),
     "not UTF-8": (f"<instance>{FRODO}\udcff</instance>", "is not UTF-8"),
     "control characters": (f"<instance>{FRODO}\x1b</instance>", "is not well-formed XML"),
     "another root": (f"<problem>{FRODO}</problem>", "the root element is <problem>"),
-}
+}  # fmt: skip
 
 
 @looped("what", HOSTILE)

@@ -126,16 +126,11 @@ def doubling(result: str) -> str:
         ("'a' * 10 ** 9 + x", "is no number"),
         (doubling("1 if a == b else x"), "more than 100000 members"),
         (doubling("{a: 1}[b]"), "more than 100000 members"),
-        (
-            "|\n      a = 0\n      for i in range(99999):\n        a = [a]\n      return len({a: x})",
-            "nested more than 50",
-        ),
+        ("|\n      a = 0\n      for i in range(99999):\n        a = [a]\n      return len({a: x})",
+         "nested more than 50"),
         (f"{LOOP}a = len([1 for j in range(999) if x not in range(999)])\n      return x", "too many steps"),
         ("sum([1 / (3 ** 400 + i) for i in range(10000)]) + x", "a number is too large"),
-        (
-            f"len({{{', '.join(f'x+{i * (2**61 - 1)}' for i in range(2000))}}})",
-            "too many members of a set or keys",
-        ),
+        (f"len({{{', '.join(f'x+{i * (2**61 - 1)}' for i in range(2000))}}})", "too many members of a set or keys"),
         (LOOP + 999 * "a = a + x\n        " + "a = 0\n      return x", "too many steps"),
         ("len(range(-10 ** 30, 10 ** 30)) + x", "a range is too long"),
         (f"{'(' * 500}x{')' * 500}", "function"),
@@ -144,7 +139,7 @@ def doubling(result: str) -> str:
         ("0 if {x, y} == {0, 1} else 1", "not allowed"),
         ("len({x, {y: 1}})", "a member of a set is a dictionary"),
     ],
-)
+)  # fmt: skip
 def test_functions_that_are_refused(
     function: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
