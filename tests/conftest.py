@@ -15,7 +15,7 @@ import pytest
 
 from tests.support import leftovers
 from tests.support.counted_clock import time_passes_at_each_look
-from tests.support.examples import register_profiles
+from tests.support.examples import register_profiles, use_seed
 from tests.support.large_pages import use_large_pages
 from tests.support.leftovers import LeftoversOfFile
 
@@ -35,6 +35,18 @@ register_profiles()
 # starts would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Random problems follow Hypothesis's seed."""
+    use_seed(config.getoption("--hypothesis-seed"))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int, config: pytest.Config) -> None:
+    """After a failure the seed stands at the end of the report."""
+    seed = config.getoption("--hypothesis-seed")
+    if exitstatus and seed:
+        terminalreporter.write_line(f"random problems were drawn from seed {seed}: SEED={seed} repeats them")
 
 
 def pytest_collection_finish() -> None:

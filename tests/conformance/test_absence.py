@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from random import Random
 
 import pytest
 
@@ -11,16 +10,18 @@ import robochoc
 from robochoc.communication.kill_schedule import Kill
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.absence_models import AbsenceModel
+from tests.support.examples import are_the_same, count, drawn
 
+pytestmark = pytest.mark.fresh
 MINIMIZING = ("sfb", "dpop", "afb", "adopt", "bnb-adopt", "syncbb", "ncbb", "pt-fb", "hs-cai", "o-dpop", "mb-dpop")
 SATISFYING = ("abt", "afc", "awc", "sfb", "dynabt")
 
 
-@pytest.mark.parametrize("models", [16, pytest.param(1000, marks=pytest.mark.slow)])
+@count("models", 16, 1000)
 def test_as_few_as_possible_withdraw(models: int) -> None:
     aside = impossible = 0
     for seed in range(models):
-        chance = Random(seed)
+        chance = drawn(f"absence {seed}")
         case = AbsenceModel(chance)
         weight, cost = case.minimum()
         protocol = chance.choice(MINIMIZING if case.has_costs else (*MINIMIZING, "abt", "afc", "central"))
@@ -36,15 +37,14 @@ def test_as_few_as_possible_withdraw(models: int) -> None:
         assert case.price(case.values_by_robot(outcome.values)) == cost, seed
         assert not case.has_costs or outcome.cost == cost, seed
         assert not outcome.dropped_constraints or outcome.withdrawn, seed
-    assert aside > models // 8
-    assert impossible
+    assert (aside > models // 8 and impossible) or not are_the_same()
 
 
-@pytest.mark.parametrize("models", [15, pytest.param(700, marks=pytest.mark.slow)])
+@count("models", 15, 700)
 def test_robots_withdraw_one_after_the_other_where_constraints_are_dropped(models: int) -> None:
     ran, refused = 0, list[str]()
     for seed in range(models * 3):
-        case = AbsenceModel(Random(seed))
+        case = AbsenceModel(drawn(f"absence {seed}"))
         if case.has_costs:
             continue
         try:
@@ -59,28 +59,27 @@ def test_robots_withdraw_one_after_the_other_where_constraints_are_dropped(model
         for name in outcome.withdrawn:
             assert min(case.price({**values, name: value}) for value in case.domains[name]) == math.inf, seed
         assert {*present} == {*values}, seed
-    assert ran
-    assert refused
+    assert (ran and refused) or not are_the_same()
     assert all("restated when a robot is absent" in why for why in refused)
 
 
-@pytest.mark.parametrize("models", [20, pytest.param(800, marks=pytest.mark.slow)])
+@count("models", 20, 800)
 def test_robots_leave_by_events(models: int) -> None:
     unsolved = 0
     for seed in range(models):
-        chance = Random(seed)
+        chance = drawn(f"absence {seed}")
         case = AbsenceModel(chance)
         gone = chance.sample(case.names, chance.randint(1, 2))
         protocol = chance.choice(("sfb", "dpop", "afb") if case.has_costs else SATISFYING)
         check(case, case.without(gone).solve(protocol, runtime="simulator"), gone, seed)
         unsolved += case.best([name for name in case.names if name not in gone]) == math.inf
-    assert 0 < unsolved < models
+    assert 0 < unsolved < models or not are_the_same()
 
 
-@pytest.mark.parametrize("models", [3, pytest.param(300, marks=pytest.mark.slow)])
+@count("models", 3, 300)
 def test_robots_are_lost(models: int) -> None:
     for seed in range(models):
-        chance = Random(seed)
+        chance = drawn(f"absence {seed}")
         case = AbsenceModel(chance)
         lost = chance.choice(case.names)
         protocol = chance.choice(("sfb", "dpop") if case.has_costs else SATISFYING)
@@ -91,7 +90,7 @@ def test_robots_are_lost(models: int) -> None:
 @pytest.mark.slow
 def test_robots_that_come_back_have_their_constraints_again(tmp_path_factory: pytest.TempPathFactory) -> None:
     for seed in range(100):
-        chance = Random(seed)
+        chance = drawn(f"absence {seed}")
         case = AbsenceModel(chance)
         folder = tmp_path_factory.mktemp("team") / "absence"
         case.model.save(folder)
@@ -104,7 +103,7 @@ def test_robots_that_come_back_have_their_constraints_again(tmp_path_factory: py
 @pytest.mark.slow
 def test_as_few_as_possible_withdraw_on_other_runtimes() -> None:
     for seed in range(150):
-        case = AbsenceModel(Random(seed))
+        case = AbsenceModel(drawn(f"absence {seed}"))
         weight, cost = case.minimum()
         for runtime in ("processes", "network") if seed < 30 else ("processes",):
             outcome = case.model.solve("sfb", runtime=runtime, withdraw="minimum")

@@ -27,10 +27,13 @@ from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.verification.checker import robots_without_values, violations
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
+from tests.support.examples import are_the_same, count, drawn
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened
 from tests.support.random_options import random_schedule
 from tests.support.solver_networks import brute_force, compiled_by_brute_force
+
+pytestmark = pytest.mark.fresh
 
 
 def local_solutions(robot: Robot) -> Iterator[dict[str, int]]:
@@ -65,68 +68,69 @@ def solved_by_brute_force(team: Team, chance: Random) -> Verdict:
     return result.verdict
 
 
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 8))])
-def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
+@count("teams", 60, 1000)
+def test_domains_and_abt_agree_with_brute_force(teams: int) -> None:
     """Without Java: local problems are solved by hand."""
-    chance = Random(f"complex {batch}")
     seen = Counter[Verdict]()
-    for _ in range(150 if batch else 60):
+    for number in range(teams):
+        chance = drawn(f"complex {number}")
         team = random_complex_team(chance)
         for robot in team.robots:
             check_domain(robot, compile_domain(robot, brute_force))
         team = loosened(team, chance)
         verdict = solved_by_brute_force(with_order(team, any_order(team, chance)), chance)
-        assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), team
+        assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), number
         seen[verdict] += 1
-    assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > (20 if batch else 8), seen
+    assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > teams // 8 or not are_the_same(), seen
 
 
 @pytest.mark.usefixtures("warm_ace")
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 20))])
-def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
-    chance = Random(f"judged {batch}")
+@count("teams", 25, 1900)
+def test_ace_abt_the_judge_and_brute_force_agree(teams: int) -> None:
     seen = Counter[Verdict]()
     with AceProcess(always=True) as solver, Compiler(solver=solver) as compiler:
-        for _ in range(100 if batch else 25):
+        for number in range(teams):
+            chance = drawn(f"judged {number}")
             team = loosened(random_complex_team(chance), chance)
             for robot in team.robots:
                 check_domain(robot, compiler.compile(robot).domain)
             count = sum(1 for _ in solutions(team))
             expected = Verdict.SOLUTION if count else Verdict.NO_SOLUTION
-            assert CentralSolver(solver=solver).solve(team, count=True).count == count
-            assert solve(team, Options(protocol="central", cache=False), solver=solver).verdict is expected
+            assert CentralSolver(solver=solver).solve(team, count=True).count == count, number
+            assert solve(team, Options(protocol="central", cache=False), solver=solver).verdict is expected, number
             options = replace(random_schedule(chance), cache=False, order=any_order(team, chance))
-            assert solve(team, options, solver=solver).verdict is expected
+            assert solve(team, options, solver=solver).verdict is expected, number
             seen[expected] += 1
-    assert min(seen.values()) > (15 if batch else 3), seen
+    assert min(seen.values()) > teams // 8 or not are_the_same(), seen
 
 
 @pytest.mark.usefixtures("warm_ace")
-@pytest.mark.parametrize("teams", [5, pytest.param(25, marks=pytest.mark.slow)])
+@pytest.mark.more
+@count("teams", 10, 25)
 def test_processes_agree_with_brute_force(teams: int) -> None:
-    chance = Random("complex processes")
     with AceProcess() as solver:
-        for _ in range(teams):
+        for number in range(teams):
+            chance = drawn(f"complex processes {number}")
             team = loosened(random_complex_team(chance), chance)
             outcome = solve(team, Options(timeout=HANG_S, cache=False, order=any_order(team, chance)), solver=solver)
-            assert outcome.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
+            assert outcome.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), number
 
 
 @pytest.mark.usefixtures("warm_ace")
 def test_withdrawing_leaves_a_placement_that_no_robot_could_join() -> None:
-    chance = Random("complex withdraw")
-    wanted = 15
+    number, wanted = 0, 15
     with AceProcess() as solver:
         while wanted:
-            team = random_complex_team(chance)
+            number += 1
+            team = random_complex_team(drawn(f"complex withdraw {number}"))
             if any(solutions(team)) or is_restated(team):
                 continue
             wanted -= 1
             options = Options(runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL, cache=False)
             outcome = solve(team, options, solver=solver)  # its checker tries to let others join
-            assert outcome.withdrawn
+            assert outcome.withdrawn, number
             for name in outcome.withdrawn:
-                assert not any(fits(team, {**outcome.assignment, **own}) for own in local_solutions(team[name]))
+                assert not any(fits(team, {**outcome.assignment, **own}) for own in local_solutions(team[name])), number
 
 
 def fits(team: Team, assignment: dict[str, int]) -> bool:
@@ -138,11 +142,11 @@ def is_restated(team: Team) -> bool:
     return any(may_count_when_absent(constraint) for constraint in team.constraints())
 
 
-@pytest.mark.parametrize("teams", [60, pytest.param(300, marks=pytest.mark.slow)])
+@count("teams", 60, 300)
 def test_many_values_are_looked_up_as_few_are(teams: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Conflicts of large domains come from numpy tables; the walk over constraints finds and counts the same."""
-    chance = Random("tables")
-    for _ in range(teams):
+    for number in range(teams):
+        chance = drawn(f"tables {number}")
         team = random_complex_team(chance)
         by_itself = compiled_by_brute_force(team)
         seed = chance.getrandbits(32)
@@ -151,4 +155,4 @@ def test_many_values_are_looked_up_as_few_are(teams: int, monkeypatch: pytest.Mo
             monkeypatch.setattr(local_constraints, "MIN_TABLE_VALUES", large)
             results.append(Simulation(by_itself, protocol_named("abt"), Concurrent(seed, 20)).run(60))
         walked, tables = (replace(result, metrics=replace(result.metrics, wall_s=0)) for result in results)
-        assert walked == tables
+        assert walked == tables, number

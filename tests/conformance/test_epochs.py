@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import pytest
@@ -31,6 +32,8 @@ from robochoc.model.problem import (
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.brute_force import solutions
+from tests.support.cases import cases, looped
+from tests.support.examples import count, drawn
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
@@ -38,7 +41,12 @@ from tests.support.random_changes import random_changing_team, stages
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import differ, pair
 
-pytestmark = pytest.mark.usefixtures("quick_encryption")
+pytestmark = [pytest.mark.fresh, pytest.mark.usefixtures("quick_encryption")]
+COMPLETE = [
+    name
+    for name in protocol_names()
+    if (traits := protocol_named(name).traits).n_ary and traits.complete and name != "dynabt"
+]
 
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
 
@@ -62,40 +70,42 @@ def agrees(team: Team, options: Options) -> int:
     return ended
 
 
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))])
-def test_dynabt_agrees_with_brute_force_after_each_change(batch: int) -> None:
-    chance = Random(f"dynabt {batch}")
-    steps = sum(agrees(random_changing_team(chance), random_dynabt(chance)) for _ in range(100 if batch else 30))
-    assert steps > (900 if batch else 270)
-
-
 def random_dynabt(chance: Random) -> Options:
     return replace(random_schedule(chance), protocol="dynabt")
 
 
-@pytest.mark.parametrize("protocol", protocol_names())
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
-def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -> None:
-    traits = protocol_named(protocol).traits
-    chance = Random(f"anew {protocol} {batch}")
-    for _ in range(8 if batch else 4):
+@count("problems", 30, 900)
+def test_dynabt_agrees_with_brute_force_after_each_change(problems: int) -> None:
+    ended = 0
+    with cases() as each:
+        for number in range(problems):
+            with each(number):
+                chance = drawn(f"dynabt {number}")
+                ended += agrees(random_changing_team(chance), random_dynabt(chance))
+    assert ended > 7 * problems
+
+
+@count("problems", 3, 16)
+@looped("protocol", COMPLETE)
+def test_any_protocol_begins_anew_after_each_change(protocol: str, problems: int) -> None:
+    for number in range(1 if protocol == "p32-dpop" and problems == 3 else problems):
+        chance = drawn(f"anew {protocol} {number}")
         team = random_changing_team(chance, 6)
-        if traits.n_ary and traits.complete:
-            agrees(team, replace(random_schedule(chance), protocol=protocol))
+        agrees(team, replace(random_schedule(chance), protocol=protocol))
 
 
-@pytest.mark.parametrize("batch", [0, pytest.param(1, marks=pytest.mark.slow)])
+@count("problems", 1, 12)
 @pytest.mark.parametrize("protocol", ["dynabt", "abt"])
-def test_processes_go_through_epochs_as_well(protocol: str, batch: int) -> None:
-    chance = Random(f"processes {protocol} {batch}")
-    for _ in range(12 if batch else 1):
-        agrees(random_changing_team(chance, 6), Options(protocol=protocol, timeout=HANG_S))
+def test_processes_go_through_epochs_as_well(protocol: str, problems: int) -> None:
+    for number in range(problems):
+        team = random_changing_team(drawn(f"processes {protocol} {number}"), 6)
+        agrees(team, Options(protocol=protocol, timeout=HANG_S))
 
 
 def test_epochs_follow_an_order_that_is_asked_for() -> None:
-    chance = Random("order")
-    for _ in range(25):
-        team = random_changing_team(chance, 5, lambda team: loosened(team, chance))
+    for number in range(20):
+        chance = drawn(f"order {number}")
+        team = random_changing_team(chance, 5, partial(loosened, chance=chance))
         order = chance.choice([*Order, tuple(chance.sample(team.order, len(team.order)))])
         agrees(team, replace(random_dynabt(chance), order=order))
 
@@ -176,8 +186,8 @@ def test_an_event_in_mid_run_comes_at_the_end_if_there_are_not_so_many_messages(
 
 
 def test_the_outcome_sums_up_its_epochs() -> None:
-    chance = Random("sum")
-    for _ in range(10):
+    for number in range(10):
+        chance = drawn(f"sum {number}")
         outcome = solve(random_changing_team(chance), replace(SIMULATED, seed=chance.getrandbits(30)))
         last = outcome.epochs[-1]
         assert (outcome.verdict, outcome.assignment) == (last.verdict, last.assignment)

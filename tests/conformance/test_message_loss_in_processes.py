@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from random import Random
-
 import pytest
 
 from robochoc.model.orders import Order
@@ -15,16 +13,16 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
-from tests.support.examples import count
+from tests.support.examples import count, drawn
 from tests.support.problems import random_team
 
-pytestmark = pytest.mark.usefixtures("quick_encryption")
+pytestmark = [pytest.mark.fresh, pytest.mark.more, pytest.mark.usefixtures("quick_encryption")]
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 
 
-def drawn(number: int) -> tuple[Team, Options]:
+def problem(number: int) -> tuple[Team, Options]:
     """A random protocol, a team of the kind that it takes, and options that go together more often than not."""
-    chance = Random(number + 9000)
+    chance = drawn(f"loss in processes {number}")
     name = OURS[number % len(OURS)]
     traits = protocol_named(name).traits
     team = (random_cost_team if traits.costs else random_team)(chance, n_ary=traits.n_ary)
@@ -59,11 +57,11 @@ def is_true(team: Team, options: Options, outcome: Outcome) -> bool:
             return outcome.reason is not None
 
 
-@count("runs", 3, 300)
+@count("runs", 60, 300)
 def test_with_any_protocol_and_options_no_verdict_is_wrong(runs: int) -> None:
     lost, wrong = 0, []
     for number in range(runs):
-        team, options = drawn(number)
+        team, options = problem(number)
         try:
             outcome = solve(team, options)
         except UnsupportedError:
@@ -72,4 +70,4 @@ def test_with_any_protocol_and_options_no_verdict_is_wrong(runs: int) -> None:
         if not is_true(team, options, outcome):
             wrong.append((number, options.protocol, outcome.verdict, outcome.reason))
     assert wrong == []
-    assert lost > 0 or runs < len(OURS)
+    assert lost > 0

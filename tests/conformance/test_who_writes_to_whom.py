@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
-from random import Random
 
 import pytest
 
@@ -22,28 +21,24 @@ from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.allocation_problems import simple_allocation_team
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.examples import count, drawn
 from tests.support.problems import random_team
 from tests.support.sparse_teams import profiles_of, sparse_team
 
-OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
-WITHIN: list[type[Protocol]] = [
-    FirstFit,
-    *(protocol_named(name) for name in OURS if not protocol_named(name).traits.writes_to_non_neighbours),
-]
-BEYOND = [protocol_named(name) for name in OURS if protocol_named(name).traits.writes_to_non_neighbours]
-MESSAGES = 400
-
-
-def name_of(protocol: type[Protocol]) -> str:
-    return protocol.__name__
+pytestmark = [pytest.mark.fresh, pytest.mark.usefixtures("quick_encryption")]
+OURS = [protocol for name in protocol_names() if (protocol := protocol_named(name)).__module__.startswith("robochoc.")]
+WITHIN: list[type[Protocol]] = [FirstFit, *(one for one in OURS if not one.traits.writes_to_non_neighbours)]
+BEYOND = [one for one in OURS if one.traits.writes_to_non_neighbours]
+MESSAGES = 250
 
 
 def strangers(
     team: Team, protocol: type[Protocol], seed: int, parameters: RunParameters = DEFAULT_PARAMETERS
 ) -> set[tuple[str, str]]:
-    """Who has written to whom without sharing a constraint."""
+    """Return pairs of sender and receiver that share no constraint."""
     known = possible_neighbours(profiles_of(team))
     found = set()
 
@@ -57,13 +52,16 @@ def strangers(
     return found
 
 
-def random_teams(seed: int, *, costs: bool) -> Iterator[Team]:
-    """Binary, n-ary, unconnected, complex (without what needs a solver); with costs too if `costs`."""
-    chance = Random(seed)
+def random_teams(protocol: type[Protocol], seed: int) -> Iterator[Team]:
+    """Yield unconnected, binary, n-ary and complex teams, in which no robot needs a solver."""
+    chance = drawn(f"who writes {seed}")
+    if protocol.traits.allocates:
+        yield simple_allocation_team(chance)
+        return
+    yield sparse_team(chance.getrandbits(32))
     yield random_team(chance)
     yield open_hearted(random_complex_team(chance))
-    yield sparse_team(seed)
-    if costs:
+    if protocol.traits.costs:
         yield random_cost_team(chance)
         yield open_hearted(random_complex_cost_team(chance))
 
@@ -73,26 +71,24 @@ def open_hearted(team: Team) -> Team:
     return replace(team, robots=tuple(replace(robot, private=()) for robot in team.robots))
 
 
-@pytest.mark.usefixtures("quick_encryption")
-@pytest.mark.parametrize("protocol", WITHIN, ids=name_of)
-def test_who_stays_within_never_writes_to_a_stranger(protocol: type[Protocol]) -> None:
-    for seed in range(4):
-        allocations = [simple_allocation_team(Random(seed))] if protocol.traits.allocates else None
-        for team in allocations or random_teams(seed, costs=protocol.traits.costs):
+@count("seeds", 1, 8)
+@looped("protocol", WITHIN)
+def test_who_stays_within_never_writes_to_a_stranger(protocol: type[Protocol], seeds: int) -> None:
+    for seed in range(seeds):
+        for team in random_teams(protocol, seed):
             if any(unmet_requirement(robot, protocol.traits, team.owner) for robot in team.robots):
                 continue
-            assert strangers(team, protocol, seed) == set()
-            if protocol.traits.costs and not allocations:  # the last value is to withdraw
-                assert (
-                    strangers(team, protocol, seed, RunParameters(seed, withdrawal_cost=withdrawal_cost(team))) == set()
-                )
+            assert strangers(team, protocol, seed) == set(), seed
+            if protocol.traits.costs and not protocol.traits.allocates:  # the last value is to withdraw
+                withdrawing = RunParameters(seed, withdrawal_cost=withdrawal_cost(team))
+                assert strangers(team, protocol, seed, withdrawing) == set(), seed
 
 
-@pytest.mark.parametrize("protocol", BEYOND, ids=name_of)
+@looped("protocol", BEYOND)
 def test_who_goes_beyond_does_so_somewhere(protocol: type[Protocol]) -> None:
     assert any(strangers(sparse_team(seed), protocol, seed) for seed in range(20))
 
 
 def test_both_kinds_are_there() -> None:
-    assert set(map(name_of, WITHIN)) >= {"ADOPT", "BnBADOPT", "DPOP", "DSA", "FirstFit", "MGM", "MGM2", "MaxSum"}
-    assert set(map(name_of, BEYOND)) >= {"ABT", "AFC", "AWC", "DisFC", "SBT", "SFB", "SyncBB"}
+    assert {one.__name__ for one in WITHIN} >= {"ADOPT", "BnBADOPT", "DPOP", "DSA", "FirstFit", "MGM", "MGM2", "MaxSum"}
+    assert {one.__name__ for one in BEYOND} >= {"ABT", "AFC", "AWC", "DisFC", "SBT", "SFB", "SyncBB"}

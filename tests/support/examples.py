@@ -2,9 +2,14 @@
 
 `make test` draws the same ones each time (profile `same`), `make test-more` as many new ones (`fresh`), and
 `make test-slow` ten times as many new ones (`new`). The last two print the seed that repeats them.
+
+Tests that draw with `random.Random` use `drawn`: their problems follow the same seed. Those marked `fresh` are run in
+`make test`, and again in `make test-more`.
 """
 
 from __future__ import annotations
+
+from random import Random
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -32,3 +37,22 @@ def examples(fast: int, slow: int = 0, also_suppress: tuple[HealthCheck, ...] = 
 def count(name: str, fast: int, slow: int) -> pytest.MarkDecorator:
     """Return a decorator: the parameter `name` is `fast` in `make test`, and `slow` in `make test-slow`."""
     return pytest.mark.parametrize(name, [fast, pytest.param(slow, marks=pytest.mark.slow)])
+
+
+_seed = ""
+
+
+def use_seed(seed: str | None) -> None:
+    """Let `drawn` draw other problems for each seed; None: the same ones each time."""
+    global _seed  # noqa: PLW0603 - one seed for all tests of a process
+    _seed = seed or ""
+
+
+def drawn(name: str) -> Random:
+    """Return a generator for the random problem of this name: it depends on the name and on the seed of all tests."""
+    return Random(f"{name} {_seed}" if _seed else name)
+
+
+def are_the_same() -> bool:
+    """Return whether all problems are the same each time: their proportions can be asserted then, without any luck."""
+    return not _seed
