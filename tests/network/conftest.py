@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import pytest
 
@@ -15,14 +16,22 @@ from tests.support.one_traitor import CHAIN
 from tests.support.traitors import Lie
 
 
+@pytest.fixture(autouse=True)
+def measured_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots in this process do not measure its memory: the system takes long to add up that of many tests."""
+    monkeypatch.setattr("robochoc.communication.network.searcher.own_memory", lambda: 1_000_000)
+
+
 @pytest.fixture
-def lied(monkeypatch: pytest.MonkeyPatch) -> Callable[..., InMemoryNetwork]:
-    """A team in which RB lies, after a search."""
+def lied() -> Iterator[Callable[..., InMemoryNetwork]]:
+    """A team in which RB lies, after a search. Each call ends the lie of the call before."""
+    with ExitStack() as patches:
 
-    def searched(lie: Lie, protocol: type[Protocol] = ABT, team: Team = CHAIN) -> InMemoryNetwork:
-        traitors.install(lie, "RB", monkeypatch.setattr)
-        office = InMemoryNetwork(team, protocol, traitor="RB")
-        office.search()
-        return office
+        def searched(lie: Lie, protocol: type[Protocol] = ABT, team: Team = CHAIN) -> InMemoryNetwork:
+            patches.close()
+            traitors.install(lie, "RB", patches.enter_context(pytest.MonkeyPatch.context()).setattr)
+            office = InMemoryNetwork(team, protocol, traitor="RB")
+            office.search()
+            return office
 
-    return searched
+        yield searched

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from random import Random
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,6 +15,7 @@ from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import possible_neighbours
 from robochoc.model.problem import Team
+from tests.support.cases import looped
 from tests.support.problems import random_team
 from tests.support.sparse_teams import profiles_of, sparse_team
 
@@ -80,7 +80,7 @@ def ways(control: Mapping[str, Any], names: Sequence[str]) -> dict[str, set[str]
     }
 
 
-@pytest.mark.parametrize(
+@looped(
     ("wide", "narrow", "expected"),
     [
         ("a/*/c", "a/b/c", True),
@@ -112,7 +112,7 @@ def test_nobody_writes_in_anothers_name_or_reads_anothers_frames() -> None:
                     assert not any(allows(control, who, "egress", message, key) for message in WRITES)
 
 
-@pytest.mark.parametrize("key", ["**", "*/**", "rc/**", "rc/msg/**", "rc/msg/*/*", "rc/live/**", "other"])
+@looped("key", ["**", "*/**", "rc/**", "rc/msg/**", "rc/msg/*/*", "rc/live/**", "other"])
 def test_nobody_listens_to_everything(key: str) -> None:
     control = access_control(dict.fromkeys(NAMES, (ALL,)))
     for who in EVERYBODY:
@@ -174,7 +174,7 @@ def test_names_in_keys() -> None:
     assert name_in(journal_key("R2.1")) == "R2.1"
 
 
-@pytest.mark.parametrize("sniffers", [None, (), ("R1",), ("R1", "r2")])
+@looped("sniffers", [None, (), ("R1",), ("R1", "r2")])
 def test_who_may_sniff_asks_in_its_own_name_and_the_master_alone_answers(sniffers: tuple[str, ...] | None) -> None:
     control = access_control(dict.fromkeys(NAMES, (ALL,)), sniffers)
     for who, other in itertools.product(EVERYBODY, repeat=2):

@@ -48,6 +48,7 @@ from robochoc.journal.events import Received
 from robochoc.model.outcome import Metrics, PseudoTreeNode
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.findings import Findings, Incumbent, Trail
+from tests.support.cases import looped
 from tests.support.examples import examples
 
 PROFILE = Profile("R1", ProblemKind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
@@ -126,7 +127,7 @@ def _travels(word: ControlMessage) -> bool:
         return False
 
 
-@pytest.mark.parametrize("kind", [kind for direction in WORDS for kind in direction], ids=lambda one: one.__name__)
+@looped("kind", [kind for direction in WORDS for kind in direction])
 def test_every_word_comes_as_it_was_sent(kind: type[ControlMessage]) -> None:
     sender, receiver = ("R1", MASTER) if kind in WORDS[0] else (MASTER, "R1") if kind in WORDS[1] else ("R1", "R2")
 
@@ -185,7 +186,7 @@ def test_senders_do_not_use_up_each_others_numbers() -> None:
         reader.read("R2", msgspec.msgpack.encode(Frame("run", 3, said(3))))
 
 
-@pytest.mark.parametrize("number", [0, -1, -(2**63)])
+@looped("number", [0, -1, -(2**63)])
 def test_numbers_begin_at_1(number: int) -> None:
     with pytest.raises(FrameRefusedError, match="replay"):
         pair()[1].read("R1", msgspec.msgpack.encode(Frame("run", number, said(1))))
@@ -325,7 +326,7 @@ def test_damaged_frames_are_refused_or_read_never_worse(frame: tuple[str, str, b
         assert opened.number in {0, 1}  # a bit of the content can be another
 
 
-@pytest.mark.parametrize("nested", [b"\x91" * 5000, b"\x81" * 5000, b"\x93\xa3run\x01" + b"\x92" * 100_000])
+@looped("nested", [b"\x91" * 5000, b"\x81" * 5000, b"\x93\xa3run\x01" + b"\x92" * 100_000])
 def test_deep_nesting_is_refused(nested: bytes) -> None:
     for sender in (MASTER, "R1"):
         with pytest.raises(FrameRefusedError, match="malformed"):

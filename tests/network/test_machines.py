@@ -78,6 +78,7 @@ def test_a_journal_by_the_robots_own_words(site: Deployment) -> None:
     assert page.stat().st_size > 0
 
 
+@pytest.mark.more
 def test_what_robots_keep_to_themselves(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
@@ -94,6 +95,7 @@ def test_what_robots_keep_to_themselves(site: Deployment) -> None:
     assert written_down == {"Journal", "Granted", "Registered", "Began", "Ended"}
 
 
+@pytest.mark.more
 def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
@@ -106,6 +108,7 @@ def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
     ended(robots)
 
 
+@pytest.mark.more
 def test_a_robot_that_drops_out_is_told_and_waited_for_again(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
@@ -124,6 +127,7 @@ def test_a_robot_that_drops_out_is_told_and_waited_for_again(site: Deployment) -
     assert found == [("DroppedOut", "RA")]
 
 
+@pytest.mark.more
 def test_who_has_dropped_out_is_named_when_the_time_is_over(site: Deployment) -> None:
     files = written(PAIR, site)
     robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
@@ -135,6 +139,7 @@ def test_who_has_dropped_out_is_named_when_the_time_is_over(site: Deployment) ->
     assert "awaited: RA (it was there, and has dropped out), RB" in master.errors
 
 
+@pytest.mark.more
 def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
     files = written(PAIR, site)
     robots = site.robots(files, site.enrol("--team", files))
@@ -149,6 +154,7 @@ def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
 # The directory
 
 
+@pytest.mark.more
 def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> None:
     files = written(TRIANGLE, site)
     tokens = site.enrol("--team", files)
@@ -187,6 +193,7 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> No
     ended({**robots, "RC": last})
 
 
+@pytest.mark.more
 def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Deployment) -> None:
     files = site.folder / "unsaid"
     files.mkdir()

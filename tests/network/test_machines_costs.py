@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+import pytest
+
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import (
@@ -18,6 +20,8 @@ from robochoc.model.problem import (
     Variable,
 )
 from tests.support.deployments import Deployment, ended, one_line, written
+
+pytestmark = pytest.mark.more
 
 VALUES = Domain("D", (range(3),))
 

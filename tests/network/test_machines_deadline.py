@@ -65,6 +65,7 @@ def test_what_is_better_is_published_until_the_search_is_ended(protocol: str, si
     assert costs[-1] == told["cost"]
 
 
+@pytest.mark.more
 def test_a_signal_ends_it_with_the_best_so_far(site: Deployment) -> None:
     master, robots = started(COSTLY, site, *ENDLESS, "--deadline", 0.1, "--improve", 3600, "--json")
     robots["Robot1"].wait_to_say(SO_FAR)

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from robochoc.cli.group import cli
 from robochoc.journal.journal import read_journal
+from tests.support.cases import looped
 from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
 from tests.support.journal_entries import entries_of
 from tests.support.limits import HANG_S, wait_until
@@ -37,6 +38,7 @@ def heard(site: Deployment, name: str) -> set[str]:
     return {type(event).__name__ for event in read_journal(file.read_bytes()).events} if file.exists() else set()
 
 
+@pytest.mark.more
 def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
@@ -160,7 +162,7 @@ def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deploym
     assert (ear.status(), "Traceback" in ear.errors) == (130, False)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("words", "told"),
     [
         ([], "give a JOURNAL"),

@@ -53,6 +53,7 @@ def robots(site: Deployment, files: Path, tokens: dict[str, str], where: str, *w
     return [site.robot(files / f"{n}.xml", "--token", t, *words, inside=where) for n, t in tokens.items()]
 
 
+@pytest.mark.more
 def test_three_machines_that_only_cables_join(tmp_path: Path, warm: WarmPrograms) -> None:
     with namespaces(3) as (hill, east, west), Deployment(tmp_path, HILL, PORT, warm) as site:
         veth((hill, f"{HILL}/24"), (east, f"{FIELD}/24"))
@@ -72,6 +73,7 @@ def test_three_machines_that_only_cables_join(tmp_path: Path, warm: WarmPrograms
         ended(crew)
 
 
+@pytest.mark.more
 def test_a_master_with_an_address_for_each_cable(tmp_path: Path, warm: WarmPrograms) -> None:
     pair = team_of(dict.fromkeys("AB", range(1, 3)), [Constraint("C", PREDICATES[0], ("A", "B"), ("A", "B"))])
     write_team(pair, tmp_path / "pair")

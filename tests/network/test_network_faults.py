@@ -48,6 +48,7 @@ FOR_EVER_S = 3600.0
 # Processes that die or stop
 
 
+@pytest.mark.more
 def test_a_robot_killed_before_the_search(tmp_path: Path) -> None:
     """It is not waited for: nobody will start it again."""
     with held_team(tmp_path) as team:
@@ -83,6 +84,7 @@ def test_a_robot_killed_after_the_search(tmp_path: Path) -> None:
         team.strike("RX2", signal.SIGKILL)
 
 
+@pytest.mark.more
 def test_a_robot_that_is_stopped_for_too_long(tmp_path: Path) -> None:
     with held_team(tmp_path, NetworkSettings(lease_ms=500, patience_s=FOR_EVER_S)) as team:
         team.wait_for_progress()
@@ -92,6 +94,7 @@ def test_a_robot_that_is_stopped_for_too_long(tmp_path: Path) -> None:
             team.end()
 
 
+@pytest.mark.more
 @pytest.mark.parametrize("lease_ms", [500, pytest.param(LEASE_MS, marks=pytest.mark.slow)])
 def test_a_robot_that_is_stopped_for_a_while(tmp_path: Path, lease_ms: int) -> None:
     """Within the lease nobody notices; after it the router hangs up, and the robot comes back."""
@@ -167,6 +170,7 @@ def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
         assert run.endings["RX3"].why == "the master is gone: no link to it for 3 s"
 
 
+@pytest.mark.more
 def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
     """Somebody else is enrolled in mid-run: that needs other rules, and so another router."""
     with NetworkRun(tmp_path) as run:
@@ -193,6 +197,7 @@ def test_a_router_that_dies_or_is_stopped(number: int, why: str, tmp_path: Path)
             run.wait_for_result()
 
 
+@pytest.mark.more
 def test_a_robot_that_joins_late(tmp_path: Path) -> None:
     with NetworkRun(tmp_path, absent=["RX0"]) as run:
         run.wait_until(lambda: len(run.master.members.robots) == 3, "the others do not come")
@@ -270,6 +275,7 @@ def searching(master: subprocess.Popen[bytes]) -> bool:
     return master.stdout.readline() == b"searching\n"
 
 
+@pytest.mark.more
 def test_a_master_that_is_killed_and_started_anew(tmp_path: Path) -> None:
     """Its router ends with it. Robots end by themselves after their patience, or when there is another master."""
     robots = Elsewhere(tmp_path)
@@ -297,6 +303,7 @@ def short_path() -> Iterator[Path]:
         yield Path(folder)
 
 
+@pytest.mark.more
 @pytest.mark.parametrize(
     "signum",
     [signal.SIGKILL, *(pytest.param(other, marks=pytest.mark.slow) for other in (signal.SIGINT, signal.SIGTERM))],
@@ -330,6 +337,7 @@ def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
         assert not run.ports()
 
 
+@pytest.mark.more
 def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> None:
     """Before it is opened, and after it is closed, the fork server is all there is."""
     program = (
@@ -342,6 +350,7 @@ def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> N
         left_nothing(run)
 
 
+@pytest.mark.more
 @pytest.mark.parametrize(
     "request_",
     [
@@ -372,6 +381,7 @@ def left_nothing(run: Run) -> None:
 # What a machine lacks
 
 
+@pytest.mark.more
 def test_too_few_open_files_are_one_line() -> None:
     """Zenoh aborted the process."""
     command = ["robochoc", "solve", str(ROOT / "instances" / "queens3d-4"), "--runtime", "network"]

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import cast
 
 import msgspec
-import pytest
 
 from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
 from robochoc.communication.network.control_messages import (
@@ -38,6 +37,7 @@ from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
+from tests.support.cases import looped
 from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task
 
@@ -141,10 +141,9 @@ def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
     assert account.assignment == ending.assignment == {"B": 1}
 
 
-@pytest.mark.parametrize(
+@looped(
     "word",
     [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {}), Recall(1, 1), Adopt(1, 1)],
-    ids=lambda word: type(word).__name__,
 )
 def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
     def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
@@ -163,10 +162,9 @@ def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
     ]
 
 
-@pytest.mark.parametrize(
+@looped(
     "word",
     [StartSearch(2), CheckRequest(2, {}), CheckRequest(1, {}, 7), Recall(2, 1), Adopt(2, 0), Adopt(1, 7, "solution")],
-    ids=repr,
 )
 def test_orders_of_another_search_are_objected_to(word: ControlMessage) -> None:
     def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
@@ -183,7 +181,7 @@ def test_orders_of_another_search_are_objected_to(word: ControlMessage) -> None:
     assert len(played(script)[1].heard_of(Objection)) == 1
 
 
-@pytest.mark.parametrize(
+@looped(
     ("content", "why"),
     [
         (b"", "malformed"),

@@ -37,6 +37,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.awc import AWC
 from robochoc.solver.compiled_team import CompiledRobot
+from tests.support.cases import looped
 from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task
 
@@ -114,7 +115,7 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
     return FrameArrived(sender, msgspec.msgpack.encode(Frame(RUN, number, Copies(1, msgspec.msgpack.encode(records)))))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("told", "why"),
     [
         ([copies("RC", copy(body="ne(X,"))], "the definition 'p'"),

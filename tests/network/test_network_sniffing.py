@@ -34,6 +34,8 @@ from robochoc.sniffer.remote import Followed, receive
 from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun
 
+pytestmark = pytest.mark.more
+
 BLOCK = 1000
 FLOOD = 10 * ANSWERED_AT_MOST
 HUGE = 200 * 60_000

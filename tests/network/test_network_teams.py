@@ -14,6 +14,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.encrypted_problems import affordable
 from tests.support.in_memory_network import InMemoryNetwork
@@ -44,7 +45,7 @@ def test_teams_solve_their_problems(protocol: str) -> None:
     assert verdicts == {Verdict.SOLUTION, Verdict.NO_SOLUTION}
 
 
-@pytest.mark.parametrize("name", protocol_names())
+@looped("name", protocol_names())
 def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     """By whatever protocol: the office refuses nothing, all counts agree, and so do both ends of each constraint."""
     protocol = protocol_named(name)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network.control_messages import (
     Bye,
     ControlMessage,
@@ -26,14 +26,18 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
+from robochoc.protocols.satisfaction.awc import AWC
 from robochoc.protocols.satisfaction.messages.abt import Ok
+from tests.support.cases import looped
+from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun, frame
-from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT
+from tests.support.paused_abt import CHAIN, TRIANGLE
 
 # Revoked in the middle of a run
 
 
+@pytest.mark.more
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
 def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filters: tuple[str, ...]) -> None:
     with NetworkRun(tmp_path, settings=NetworkSettings(filters, survive=True, patience_s=HANG_S)) as run:
@@ -102,6 +106,7 @@ def told(transport: Transport, incarnation: str) -> bool:
     return False
 
 
+@pytest.mark.more
 def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path) -> None:
     boastful = changed(profile_of(CHAIN["RX3"]), topics=("x" * 10_000, *map(str, range(200))))
     with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
@@ -115,6 +120,7 @@ def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path
 # Whoever carries the frames
 
 
+@pytest.mark.more
 @pytest.mark.parametrize(
     "filters", [("sealed",), *(pytest.param(f, marks=pytest.mark.slow) for f in (("signed",), ("signed", "sealed")))]
 )
@@ -134,11 +140,10 @@ def test_a_router_that_changes_frames(tmp_path: Path, filters: tuple[str, ...]) 
         assert run.let_go().verdict is Verdict.NO_SOLUTION
 
 
-@pytest.mark.parametrize("filters", [(), ("sealed",)])
+@looped("filters", [(), ("sealed",)])
 def test_constraints_that_others_have_to_know_are_sealed_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, filters: tuple[str, ...]
+    filters: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(PausedABT, "traits", replace(PausedABT.traits, shared_scopes=True))
     sent: list[bytes] = []
     write = Framing.write
 
@@ -149,8 +154,10 @@ def test_constraints_that_others_have_to_know_are_sealed_too(
         return content
 
     monkeypatch.setattr(Framing, "write", recorded)
-    with NetworkRun(tmp_path, TRIANGLE, NetworkSettings(filters)) as run:
-        assert run.let_go().verdict is Verdict.NO_SOLUTION
+    household = InMemoryAuthority(TRIANGLE.order)
+    identities = {name: household.identity(name) for name in TRIANGLE.order}
+    office = InMemoryNetwork(TRIANGLE, AWC, identities, filters)
+    assert office.search().verdict is Verdict.NO_SOLUTION
     assert len(sent) == 3
     assert any(b"ne(X" in content for content in sent) is not bool(filters)
 

@@ -32,6 +32,7 @@ from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.verification.checker import RefutedError
 from tests.support import traitors
+from tests.support.cases import looped
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.one_traitor import CHAIN, DIFFERENT, VALUES, begun
 from tests.support.problems import known_to_both, team_of
@@ -54,7 +55,7 @@ def test_every_protocol_declares_what_its_robots_conclude() -> None:
     assert Verdict.OPTIMAL not in Traits().concludes
 
 
-@pytest.mark.parametrize(
+@looped(
     ("protocol", "verdict"),
     [
         (ABT, "optimal"),
@@ -159,7 +160,7 @@ def test_what_not_all_have_is_no_answer() -> None:
     assert found._check_snapshot(PHASE, now) is None  # noqa: SLF001
 
 
-@pytest.mark.parametrize(
+@looped(
     ("liar", "why"),
     [
         ({"copies": (Charge("RA", ("A", "B"), 1, 5),)}, "RB says that the constraint over A B charges 5, and RA"),
@@ -180,7 +181,7 @@ WHOLE = "no solution for the whole team (RB claims it; nobody could check)"
 SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("found", "claimed_by", "words"),
     [
         ({}, "RB", "t: no solution (RB claims it; nobody could check)"),
@@ -234,7 +235,7 @@ def test_on_this_machine_a_witness_is_no_more_than_that() -> None:
 # Its values
 
 
-@pytest.mark.parametrize(
+@looped(
     ("lie", "why"),
     [
         (traitors.LIES["a strange name"], "it has reported a variable whose name is none"),
@@ -323,7 +324,7 @@ def test_a_copy_of_what_nobody_holds(lied: Callable[..., InMemoryNetwork]) -> No
     assert doubt.why.endswith("and RC, which holds it, has no such constraint")
 
 
-@pytest.mark.parametrize(
+@looped(
     "change",
     [
         {"cost": -1},

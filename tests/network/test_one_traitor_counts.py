@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import pytest
-
 from robochoc.communication.control import Counters, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import DetailedReport, Exchanged
@@ -16,12 +14,13 @@ from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.traits import Traits
 from tests.support import traitors
+from tests.support.cases import looped
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.one_traitor import begun
 from tests.support.traitors import Lie, changed
 
 
-@pytest.mark.parametrize(
+@looped(
     ("lie", "why"),
     [
         (traitors.counting(lambda _: -1), "it has counted -1 messages sent"),
@@ -82,7 +81,7 @@ def exchanging(change: Callable[[Exchanged], Exchanged], who: str = "RA") -> Lie
     return traitors.reporting(reported)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("change", "why"),
     [
         (

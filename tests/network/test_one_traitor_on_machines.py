@@ -41,6 +41,7 @@ def betrayed(
     return master, status
 
 
+@pytest.mark.more
 def test_it_claims_that_there_is_no_solution(site: Deployment) -> None:
     master, status = betrayed(site, "no-solution", "--json")
     assert status == 0, master.errors

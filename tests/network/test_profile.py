@@ -44,6 +44,7 @@ from robochoc.solver.agent_problem import (
 )
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.examples import examples
@@ -52,8 +53,6 @@ from tests.support.problems import random_team
 from tests.support.program import ROOT
 from tests.support.sparse_teams import profiles_of, sparse_team
 
-FILES = [file for place in ("instances", "docs/examples") for file in (ROOT / place).rglob("*.xml")]
-FOLDERS = sorted({file.parent for file in FILES if file.parent.name != "late"})  # who comes late is no team
 MAKERS: list[Callable[[Random], Team]] = [
     random_team,
     random_complex_team,
@@ -116,7 +115,12 @@ def assert_same(team: Team, members: Members, robots: Sequence[Robot], parameter
         assert known.robot.interface == expected[robot.name].robot.interface == known.interfaces[robot.name]
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def folders() -> list[Path]:
+    files = [file for place in ("instances", "docs/examples") for file in (ROOT / place).rglob("*.xml")]
+    return sorted({file.parent for file in files if file.parent.name != "late"})  # who comes late is no team
+
+
+@looped("folder", folders)
 def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) -> None:
     team = read_team(folder)
     parameters = RunParameters(3, {"p": "0.5"}, 17.5)
@@ -202,7 +206,7 @@ def test_a_visible_robot_shows_what_is_in_the_profile() -> None:
     assert ([p.name for p in shape.parents], [c.name for c in shape.children]) == (["R0"], ["R2"])
 
 
-@pytest.mark.parametrize(
+@looped(
     ("profile", "why"),
     [
         (changed(name="1R"), "'1R' is no name"),
@@ -233,7 +237,6 @@ def test_a_visible_robot_shows_what_is_in_the_profile() -> None:
         (changed(weight=0), "weight"),
         (changed(weight=LARGEST_WEIGHT + 1), "weight"),
     ],
-    ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_absurd_profiles_are_refused(profile: Profile, why: str) -> None:
     with pytest.raises(ProfileError, match=why):
@@ -274,7 +277,7 @@ def test_profiles_that_agree_do_not_contradict() -> None:
     assert not list(profile_contradictions({}))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("profiles", "why"),
     [
         (two(variables={"X": ((1, 1),)}), "the variable X is A's, and B's too"),
@@ -282,7 +285,6 @@ def test_profiles_that_agree_do_not_contradict() -> None:
         (two(parents=(), children=("A",)), "B calls A its child, which does not list it as a parent"),
         (two(kind=ProblemKind.DISWCSP), "A is a DisCSP and B is a DisWCSP: a team is one or the other"),
     ],
-    ids=["variable", "no parent", "both above", "kinds"],
 )
 def test_contradictions_are_named(profiles: dict[str, Profile], why: str) -> None:
     assert why in list(profile_contradictions(profiles))
@@ -330,7 +332,7 @@ def test_a_profile_names_the_symbols_of_what_others_see() -> None:
     assert visible_robot(profile, {}).variables[0].domain.label(1) == "green"
 
 
-@pytest.mark.parametrize(
+@looped(
     ("symbols", "why"),
     [
         (("red", "red"), "one of them twice"),

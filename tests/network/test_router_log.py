@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network import router
 from robochoc.communication.network.router import Log, Refusal, Router
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.limits import wait_until
 from tests.support.ports import free_endpoint
@@ -89,7 +90,7 @@ def test_the_lines_of_two_threads_come_mixed(first: list[bool]) -> None:
     assert sorted(told) == sorted(TOLD * 2)
 
 
-@pytest.mark.parametrize("line", range(len(LINES)))
+@looped("line", range(len(LINES)))
 def test_a_line_alone_says_no_more_than_it_can(line: int) -> None:
     told = list(refusals(f"{LINES[line]}\n".encode()))
     assert told == ([ALONE[line]] if line in ALONE else [])

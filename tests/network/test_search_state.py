@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
-
 from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, ProtocolMessage
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import NOTHING, Findings
+from tests.support.cases import looped
 
 ROBOTS = ("R1", "R2", "R3")
 
@@ -55,7 +54,7 @@ def test_nothing_is_awaited_before_the_first_search() -> None:
     assert not state.assigned
 
 
-@pytest.mark.parametrize("epoch", [0, 1, 3])
+@looped("epoch", [0, 1, 3])
 def test_late_words_of_other_searches_say_nothing(epoch: int) -> None:
     state = AuditedSearchState(2, ROBOTS)
     for word in (
@@ -79,7 +78,7 @@ def test_strangers_say_nothing() -> None:
     assert not state.assigned
 
 
-@pytest.mark.parametrize("verdict", ["", "bogus", "SOLUTION", "Solution "])
+@looped("verdict", ["", "bogus", "SOLUTION", "Solution "])
 def test_a_verdict_that_is_none_is_refused(verdict: str) -> None:
     state = begun(AuditedSearchState(1, ROBOTS))
     assert state.handle("R1", Conclusion(1, verdict)).startswith("it has concluded what is no verdict")

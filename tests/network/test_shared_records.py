@@ -24,6 +24,7 @@ from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Semantics, Team
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.examples import examples
@@ -60,14 +61,14 @@ def test_constraints_come_as_they_were_sent(make: Callable[[Random], Team], seed
             assert repr(sent(known)) == repr(known)  # an integer stays one
 
 
-@pytest.mark.parametrize("model", ["planar", "full"])
+@looped("model", ["planar", "full"])
 def test_queens_come_as_they_were_sent(model: str) -> None:
     for robot in queens3d(3, model).robots:
         for known in held_above(robot):
             assert sent(known) == known
 
 
-@pytest.mark.parametrize("name", sorted(PREDEFINED))
+@looped("name", sorted(PREDEFINED))
 def test_what_is_built_in_comes_as_it_was_sent(name: str) -> None:
     definition = PREDEFINED[name]
     scope = tuple(f"V{place}" for place in range(len(definition.parameters)))
@@ -93,54 +94,58 @@ def predicate(**news: object) -> SharedRecord:
 
 NAN = float("nan")
 MANY = tuple(f"V{place}" for place in range(MOST_TERMS + 1))
-HOSTILE = {
-    "no terms": shared(scope=(), parameters=()),
-    "no variable": shared(scope=(1, 2), parameters=(1, 2)),
-    "no name": shared(scope=("A", "B C"), parameters=("A", "B C")),
-    "empty name": shared(scope=("A", ""), parameters=("A", "")),
-    "unknown argument": shared(parameters=("A", "C")),
-    "unknown constant": shared(parameters=("A", 1)),
-    "too few arguments": shared(parameters=("A",)),
-    "too many arguments": shared(parameters=("A", "B", "A")),
-    "huge scope": shared(scope=MANY),
-    "many arguments": shared(scope=("A", "B"), parameters=("A",) * (MOST_TERMS + 1)),
-    "NaN": shared(cost=NAN),
-    "negative": shared(cost=-1),
-    "minus infinite": shared(cost=-INFINITE),
-    "short tuple": table(tuples=((1, 2), (1,))),
-    "long tuple": table(tuples=((1, 2), (1, 2, 3))),
-    "lying arity": table(arity=3),
-    "negative arity": table(arity=-1, tuples=(), costs=()),
-    "too few costs": table(costs=(1,)),
-    "too many costs": table(costs=(1, 2, 3)),
-    "costs of supports": table(semantics=Semantics.SUPPORTS),
-    "a tuple twice": table(tuples=((1, 2), (1, 2))),
-    "NaN in a table": table(costs=(NAN, 1)),
-    "negative in a table": table(costs=(1, -1)),
-    "NaN by default": table(default_cost=NAN),
-    "negative by default": table(default_cost=-0.5),
-    "an integer": predicate(body="add(X, Y)"),
-    "no expression": predicate(body="ne(X,"),
-    "empty": predicate(body=""),
-    "code": predicate(body="__import__('os').system('true')"),
-    "unknown function": predicate(body="exec(X)"),
-    "unknown name": predicate(body="ne(X, Z)"),
-    "deep": predicate(body="not(" * 5000 + "ne(X, Y)" + ")" * 5000),
-    "deep parentheses": predicate(body="(" * 30_000 + "ne(X, Y)" + ")" * 30_000),
-    "long": predicate(body="and(" + "ne(X, Y), " * 100_000 + "ne(X, Y))"),
-    "large number": predicate(body=f"ne(X, {'9' * 1000})"),
-    "a parameter twice": predicate(parameters=("X", "X")),
-    "many parameters": predicate(parameters=tuple(f"X{n}" for n in range(300_000)), body="ne(X1, X2)"),
-    "long names": predicate(name="N" * 1_000_000, body=""),
-}
+
+
+def hostile() -> list[tuple[str, SharedRecord]]:
+    return [
+        ("no terms", shared(scope=(), parameters=())),
+        ("no variable", shared(scope=(1, 2), parameters=(1, 2))),
+        ("no name", shared(scope=("A", "B C"), parameters=("A", "B C"))),
+        ("empty name", shared(scope=("A", ""), parameters=("A", ""))),
+        ("unknown argument", shared(parameters=("A", "C"))),
+        ("unknown constant", shared(parameters=("A", 1))),
+        ("too few arguments", shared(parameters=("A",))),
+        ("too many arguments", shared(parameters=("A", "B", "A"))),
+        ("huge scope", shared(scope=MANY)),
+        ("many arguments", shared(scope=("A", "B"), parameters=("A",) * (MOST_TERMS + 1))),
+        ("NaN", shared(cost=NAN)),
+        ("negative", shared(cost=-1)),
+        ("minus infinite", shared(cost=-INFINITE)),
+        ("short tuple", table(tuples=((1, 2), (1,)))),
+        ("long tuple", table(tuples=((1, 2), (1, 2, 3)))),
+        ("lying arity", table(arity=3)),
+        ("negative arity", table(arity=-1, tuples=(), costs=())),
+        ("too few costs", table(costs=(1,))),
+        ("too many costs", table(costs=(1, 2, 3))),
+        ("costs of supports", table(semantics=Semantics.SUPPORTS)),
+        ("a tuple twice", table(tuples=((1, 2), (1, 2)))),
+        ("NaN in a table", table(costs=(NAN, 1))),
+        ("negative in a table", table(costs=(1, -1))),
+        ("NaN by default", table(default_cost=NAN)),
+        ("negative by default", table(default_cost=-0.5)),
+        ("an integer", predicate(body="add(X, Y)")),
+        ("no expression", predicate(body="ne(X,")),
+        ("empty", predicate(body="")),
+        ("code", predicate(body="__import__('os').system('true')")),
+        ("unknown function", predicate(body="exec(X)")),
+        ("unknown name", predicate(body="ne(X, Z)")),
+        ("deep", predicate(body="not(" * 5000 + "ne(X, Y)" + ")" * 5000)),
+        ("deep parentheses", predicate(body="(" * 30_000 + "ne(X, Y)" + ")" * 30_000)),
+        ("long", predicate(body="and(" + "ne(X, Y), " * 100_000 + "ne(X, Y))")),
+        ("large number", predicate(body=f"ne(X, {'9' * 1000})")),
+        ("a parameter twice", predicate(parameters=("X", "X"))),
+        ("many parameters", predicate(parameters=tuple(f"X{n}" for n in range(300_000)), body="ne(X1, X2)")),
+        ("long names", predicate(name="N" * 1_000_000, body="")),
+    ]
 
 
 AT_ONCE = 10_000_000
 """Operations of Python: about a second."""
 
 
-@pytest.mark.parametrize("record", HOSTILE.values(), ids=HOSTILE)
-def test_hostile_records_are_refused_at_once(record: SharedRecord) -> None:
+@looped(("name", "record"), hostile)
+def test_hostile_records_are_refused_at_once(name: str, record: SharedRecord) -> None:
+    del name
     faults: list[str] = []
 
     def refuse() -> None:

@@ -28,6 +28,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.zenoh_config import RX_BYTES, config
 from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.satisfaction.abt import ABT
+from tests.support.cases import looped
 from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
 from tests.support.ports import free_endpoint
@@ -180,6 +181,7 @@ def test_what_was_sent_in_an_outage_arrives_without_a_heartbeat(
 # What hangs
 
 
+@pytest.mark.more
 def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
     command = [sys.executable, "-m", "tests.support.zenoh_program"]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as program:
@@ -204,7 +206,7 @@ def test_a_router_that_may_not_look_for_others_does_not_wait_for_them() -> None:
 # What is more than a name
 
 
-@pytest.mark.parametrize("name", ["*", "**", "A*", "A/B", "$*", "@adv", "A#", "A?b", "", "MASTER"])
+@looped("name", ["*", "**", "A*", "A/B", "$*", "@adv", "A#", "A?b", "", "MASTER"])
 def test_what_is_no_part_of_a_key_is_no_name(name: str) -> None:
     with pytest.raises(ValueError, match="is no name of a robot on a network"):
         access_control({"A": (), name: ()})

@@ -26,6 +26,7 @@ from robochoc.authority.registry import AuthorityError
 from robochoc.authority.token import EnrolmentToken, TokenError
 from robochoc.system import files
 from tests.support.authorities import HOUR, START, Clock, Seen, identity_of
+from tests.support.cases import looped
 from tests.support.program import ROOT
 
 ENROLLER = """
@@ -112,7 +113,7 @@ def test_what_is_wrong_with_an_authority_is_said(authority: Authority, tmp_path:
         Authority.open(authority.folder, clock=clock)
 
 
-@pytest.mark.parametrize("content", [b"", b"[]", b'{"members":{},"version":2}', b'{"members":{"A":1}}', b"\xff"])
+@looped("content", [b"", b"[]", b'{"members":{},"version":2}', b'{"members":{"A":1}}', b"\xff"])
 def test_a_registry_that_is_none_is_not_overwritten(authority: Authority, content: bytes) -> None:
     (authority.folder / "registry.json").write_bytes(content)
     with pytest.raises(AuthorityError, match="registry"):

@@ -30,6 +30,7 @@ from robochoc.authority.identity import Identity, save
 from robochoc.authority.token import EnrolmentToken, TokenError
 from tests.support.authorities import HOUR
 from tests.support.authority_service import AuthorityService, answered, drip, framed, trusting
+from tests.support.cases import looped
 
 
 def test_a_robot_enrols_and_renews(desk: AuthorityService, tmp_path: Path) -> None:
@@ -236,10 +237,9 @@ def test_a_lost_authority_is_said_and_the_service_goes_on(desk: AuthorityService
     assert enrol(*desk.place, token, tmp_path / "a", "A").name == "A"
 
 
-@pytest.mark.parametrize(
+@looped(
     "answer",
     [Introduction(b""), Introduction(b"x" * 9000), Certified(b""), EnrolmentDenied("no")],
-    ids=["empty", "long", "other", "denied"],
 )
 def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None:
     desk = AuthorityService(tmp_path / "authority")
@@ -252,9 +252,9 @@ def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None
         enrol(*desk.place, EnrolmentToken.new(bytes(32)), tmp_path / "a", "A")
 
 
-@pytest.mark.parametrize("kind", ["another key", "another name", "rubbish", "introduction"])
-def test_a_certificate_that_is_not_ours_is_not_taken(desk: AuthorityService, tmp_path: Path, kind: str) -> None:
-    robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
+@looped("kind", ["another key", "another name", "rubbish", "introduction"])
+def test_a_certificate_that_is_not_ours_is_not_taken(tmp_path: Path, kind: str) -> None:
+    desk = AuthorityService(tmp_path / "authority")
 
     def lie(question: object, *_rest: object) -> Answer:
         assert isinstance(question, Renew)
@@ -270,7 +270,9 @@ def test_a_certificate_that_is_not_ours_is_not_taken(desk: AuthorityService, tmp
             case _:
                 return Introduction(b"")
 
-    desk.server._answer = lie  # type: ignore[assignment, method-assign]  # noqa: SLF001 - a service that lies
-    with pytest.raises(EnrolmentError, match=r"another|not good"):
-        renew(robot, *desk.place)
+    with desk.server:
+        robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
+        desk.server._answer = lie  # type: ignore[assignment, method-assign]  # noqa: SLF001 - a service that lies
+        with pytest.raises(EnrolmentError, match=r"another|not good"):
+            renew(robot, *desk.place)
     assert Identity.load(tmp_path / "a").certificate == robot.certificate

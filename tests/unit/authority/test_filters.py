@@ -31,6 +31,7 @@ from robochoc.communication.filters import (
 from robochoc.communication.sealed import Sealed
 from robochoc.communication.signed import Signed
 from tests.support.authorities import HOUR, START, Clock, identity_of
+from tests.support.cases import cases, looped
 from tests.support.installed_packages import install_entry_points
 from tests.support.program import ROOT
 
@@ -71,57 +72,40 @@ def resigned(card: KeyCard, identity: Identity) -> KeyCard:
     return msgspec.structs.replace(card, signature=identity.key.sign(card.signed_part(), ec.ECDSA(hashes.SHA256())))
 
 
-@pytest.mark.parametrize("stack", STACKS, ids=str)
 @given(content=st.binary(max_size=200), context=st.binary(max_size=40))
-def test_what_was_sealed_opens(
-    three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]], content: bytes, context: bytes
+def test_what_was_sealed_opens(three: dict[str, KeyRing], content: bytes, context: bytes) -> None:
+    for stack in STACKS:
+        sealed = FilterStack(three["A"], stack).seal("B", content, context)
+        assert FilterStack(three["B"], stack).open("A", sealed, context) == content, stack
+
+
+@given(content=st.binary(max_size=40), place=st.integers(0, 10**6), other=st.binary(max_size=200))
+def test_any_flipped_bit_and_what_nobody_sealed_are_refused(
+    three: dict[str, KeyRing], content: bytes, place: int, other: bytes
 ) -> None:
-    sealed = FilterStack(three["A"], stack).seal("B", content, context)
-    assert FilterStack(three["B"], stack).open("A", sealed, context) == content
+    for stack in STACKS:
+        sealed = bytearray(FilterStack(three["A"], stack).seal("B", content, CONTEXT))
+        bit = place % (8 * len(sealed))
+        sealed[bit // 8] ^= 1 << bit % 8
+        for bad in (bytes(sealed), other):
+            with pytest.raises(NotGenuineError):
+                FilterStack(three["B"], stack).open("A", bad, CONTEXT)
 
 
-@pytest.mark.parametrize("stack", STACKS, ids=str)
-@given(content=st.binary(max_size=40), place=st.integers(0, 10**6))
-def test_any_flipped_bit_is_refused(
-    three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]], content: bytes, place: int
+@looped("stack", STACKS)
+def test_every_bit_and_every_part_of_one_message(
+    three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]]
 ) -> None:
-    sealed = bytearray(FilterStack(three["A"], stack).seal("B", content, CONTEXT))
-    bit = place % (8 * len(sealed))
-    sealed[bit // 8] ^= 1 << bit % 8
-    with pytest.raises(NotGenuineError):
-        FilterStack(three["B"], stack).open("A", bytes(sealed), CONTEXT)
-
-
-@pytest.mark.parametrize("stack", STACKS, ids=str)
-def test_every_bit_of_one_message(three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]]) -> None:
     opening = FilterStack(three["B"], stack)
     sealed = FilterStack(three["A"], stack).seal("B", b"Ok(3)", CONTEXT)
-    for bit in range(8 * len(sealed)):
-        changed = bytearray(sealed)
-        changed[bit // 8] ^= 1 << bit % 8
+    flipped = ((int.from_bytes(sealed) ^ 1 << bit).to_bytes(len(sealed)) for bit in range(8 * len(sealed)))
+    parts = (sealed[:size] for size in range(len(sealed)))
+    for bad in (*flipped, *parts, sealed + b"\0", sealed[1:], sealed * 2):
         with pytest.raises(NotGenuineError):
-            opening.open("A", bytes(changed), CONTEXT)
+            opening.open("A", bad, CONTEXT)
 
 
-@pytest.mark.parametrize("stack", STACKS, ids=str)
-@given(content=st.binary(max_size=200))
-def test_what_nobody_sealed_is_refused(
-    three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]], content: bytes
-) -> None:
-    with pytest.raises(NotGenuineError):
-        FilterStack(three["B"], stack).open("A", content, CONTEXT)
-
-
-@pytest.mark.parametrize("stack", STACKS, ids=str)
-def test_a_part_of_a_message_is_refused(three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]]) -> None:
-    sealed = FilterStack(three["A"], stack).seal("B", b"Ok(3)", CONTEXT)
-    opening = FilterStack(three["B"], stack)
-    for part in (*(sealed[:size] for size in range(len(sealed))), sealed + b"\0", sealed[1:], sealed * 2):
-        with pytest.raises(NotGenuineError):
-            opening.open("A", part, CONTEXT)
-
-
-@pytest.mark.parametrize("stack", STACKS, ids=str)
+@looped("stack", STACKS)
 def test_sender_receiver_and_context_are_bound(
     identities: dict[str, Identity], three: dict[str, KeyRing], stack: Sequence[type[ChannelFilter]]
 ) -> None:
@@ -134,12 +118,10 @@ def test_sender_receiver_and_context_are_bound(
         (at_b, "A", b"run 7, A to B, 2"),  # a replay in another place
         (at_b, "A", b""),
         (at_b, "Stranger", CONTEXT),
+        (FilterStack(rings(identities, "8")["B"], stack), "A", CONTEXT),  # another run
     ):
         with pytest.raises(NotGenuineError):
             opening.open(sender, sealed, context)
-    later = rings(identities, "8")["B"]
-    with pytest.raises(NotGenuineError):
-        FilterStack(later, stack).open("A", sealed, CONTEXT)
     assert at_b.open("A", sealed, CONTEXT) == b"Ok(3)"
 
 
@@ -230,26 +212,28 @@ def test_cards_that_prove_nothing(identities: dict[str, Identity], tmp_path: Pat
     stranger = KeyRing(identity_of(other, "A", tmp_path / "a"), "7").card
     own = ring.card
 
-    def refused(bad: KeyCard, why: str, now: float = START) -> None:
-        with pytest.raises(KeyCardError, match=why):
-            ring.admit(bad, now)
-
-    refused(stranger, "has not issued")
-    refused(card, "not now", START + 25 * HOUR)
-    refused(card, "not now", START - HOUR)
-    refused(changed(card, name="C"), "not signed")
-    refused(resigned(changed(card, name="C"), a), "certificate of A")
-    refused(changed(card, certificate=own.certificate), "not signed")
-    refused(resigned(card, b), "not signed")
-    refused(changed(card, signing=own.signing), "not signed")
-    refused(changed(card, sealing=own.sealing), "not signed")
-    refused(changed(card, run="8"), "not signed")
-    refused(changed(card, signature=b""), "not signed")
-    refused(changed(card, certificate=b"rubbish"), "no certificate")
-    refused(KeyRing(a, "6").card, "another run")
-    refused(resigned(changed(card, signing=b"short"), a), "32 bytes")
-    refused(resigned(changed(card, sealing=bytes(33)), a), "32 bytes")
-    refused(resigned(changed(card, sealing=bytes(32)), a), "is no key")  # the point 0: of small order
+    bad: list[tuple[KeyCard, str, float]] = [
+        (stranger, "has not issued", START),
+        (card, "not now", START + 25 * HOUR),
+        (card, "not now", START - HOUR),
+        (changed(card, name="C"), "not signed", START),
+        (resigned(changed(card, name="C"), a), "certificate of A", START),
+        (changed(card, certificate=own.certificate), "not signed", START),
+        (resigned(card, b), "not signed", START),
+        (changed(card, signing=own.signing), "not signed", START),
+        (changed(card, sealing=own.sealing), "not signed", START),
+        (changed(card, run="8"), "not signed", START),
+        (changed(card, signature=b""), "not signed", START),
+        (changed(card, certificate=b"rubbish"), "no certificate", START),
+        (KeyRing(a, "6").card, "another run", START),
+        (resigned(changed(card, signing=b"short"), a), "32 bytes", START),
+        (resigned(changed(card, sealing=bytes(33)), a), "32 bytes", START),
+        (resigned(changed(card, sealing=bytes(32)), a), "is no key", START),  # the point 0: of small order
+    ]
+    with cases() as each:
+        for number, (one, why, now) in enumerate(bad):
+            with each(f"{number} {why}"), pytest.raises(KeyCardError, match=why):
+                ring.admit(one, now)
     with pytest.raises(UnknownPeerError):
         ring.card_of("A")
     ring.admit(card, START)

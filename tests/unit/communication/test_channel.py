@@ -26,6 +26,7 @@ from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.brute_force import solutions
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.problems import random_team, teams
 from tests.support.program import ROOT
@@ -65,7 +66,7 @@ def recorded(team: Team, options: Options) -> list[bytes]:
 # What a message needs
 
 
-@pytest.mark.parametrize("model", CHANNELS.values(), ids=str)
+@looped("model", CHANNELS.values())
 def test_what_is_shipped_has_the_median_that_it_says_and_nothing_below_the_minimum(model: ChannelModel) -> None:
     chance = Random(1)
     latencies = [model.crossing(100, chance).latency / 1e6 for _ in range(4001)]
@@ -107,7 +108,7 @@ def test_what_is_lost_is_sent_again_after_timeouts_that_grow() -> None:
     assert {(1, 0), (2, 10_000_000), (3, 30_000_000)} <= again
 
 
-@pytest.mark.parametrize("loss", [0.0, 0.1, 0.5])
+@looped("loss", [0.0, 0.1, 0.5])
 def test_as_many_transmissions_are_lost_as_it_says(loss: float) -> None:
     model = msgspec.structs.replace(LOSSY, loss=loss, bandwidth_bps=8000, payload_bytes=100)
     frames = model.crossing(100 * 4000, Random(0)).air / 100_000_000
@@ -323,14 +324,13 @@ def test_the_result_is_read_back() -> None:
         assert [e.metrics.simulated_s for e in read.epochs] == [e.metrics.simulated_s for e in outcome.epochs]
 
 
-@pytest.mark.parametrize(
+@looped(
     "options",
     [
         Options(channel=NOTHING),
         Options(channel=NOTHING, runtime=Runtime.SIMULATOR, delay=1),
         Options(channel=NOTHING, runtime=Runtime.SIMULATOR, schedule=ScheduleName.RANDOM),
     ],
-    ids=["processes", "delay", "random"],
 )
 def test_a_channel_is_not_ignored(options: Options) -> None:
     with pytest.raises(UnsupportedError, match="--channel"):

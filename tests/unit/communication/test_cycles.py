@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from random import Random
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +18,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.recording import objective_to_record
 from tests.support import golden
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import examples
 
@@ -69,7 +69,7 @@ def test_a_local_search_takes_a_cycle_for_each_round_of_messages() -> None:
         assert solve(team, options).metrics.cycles == 7 * messages, protocol
 
 
-@pytest.mark.parametrize("limit", [1, 2, 5])
+@looped("limit", [1, 2, 5])
 def test_a_limit_on_cycles_is_exact(limit: int) -> None:
     found = solve(queens3d(4), replace(IN_STEP, cycles=limit))
     assert (found.verdict, found.metrics.cycles) == (Verdict.UNKNOWN, limit)
@@ -87,7 +87,7 @@ def _plain(outcome: Outcome) -> Outcome:
     return replace(outcome, metrics=replace(outcome.metrics, wall_s=0, compile_s=0))
 
 
-@pytest.mark.parametrize("schedule", ScheduleName)
+@looped("schedule", [*ScheduleName])
 def test_a_limit_on_ncccs_ends_the_step_in_which_it_is_reached(schedule: ScheduleName) -> None:
     events: list[AnyEvent] = []
     found = solve(queens3d(4), replace(IN_STEP, schedule=schedule, ncccs=20), observer=events.append)
@@ -109,7 +109,7 @@ def test_limits_are_on_all_epochs_together() -> None:
     assert cut.reason == f"so many cycles are over (--cycles {limit})"
 
 
-@pytest.mark.parametrize("seed", range(20))
+@looped("seed", range(20))
 def test_in_step_only_whole_cycles_have_a_cost(seed: int) -> None:
     """What the team has when some have decided in a cycle, and others not yet, is no assignment that it ever had."""
     chance = Random(f"whole cycles {seed}")

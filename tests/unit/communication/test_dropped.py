@@ -31,6 +31,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import ensure_compiled
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
 
@@ -229,7 +230,7 @@ def test_who_comes_back_is_caught_up_with_although_messages_are_lost(tmp_path: P
     assert outcome.verified
 
 
-@pytest.mark.parametrize(
+@looped(
     ("team", "loss", "name"),
     [
         (random_csp(4, 3, 0.7, 0, max_cost=9), 0.1, "regret-matching"),

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.processes.forked_process import ForkedProcess, ranges_of
+from tests.support.cases import looped
 from tests.support.leftovers import nothing_left_behind
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -36,7 +37,7 @@ def fails() -> None:
     raise ValueError("no more ideas")
 
 
-@pytest.mark.parametrize(
+@looped(
     ("act", "exitcode"),
     [
         (lambda: None, 0),
@@ -122,7 +123,7 @@ def test_its_end_is_seen_and_not_before() -> None:
 
 def test_it_looks_for_no_garbage_among_what_it_inherits() -> None:
     """To look is to write, and to write is to copy: it costs less than a quarter of the memory."""
-    many = [[number] for number in range(400_000)]
+    many = [[number] for number in range(100_000)]
     pages = len(many) * sys.getsizeof(many[0]) // resource.getpagesize()
     read, write = os.pipe()
 

@@ -15,6 +15,7 @@ from robochoc.protocols.satisfaction.messages.first_fit import Placed
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
+from tests.support.cases import looped
 from tests.support.problems import team_of
 
 DIFFERENT = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
@@ -95,7 +96,7 @@ def test_messages_and_bytes_are_counted_by_type() -> None:
     assert b.metrics().bytes == len(said.content)
 
 
-@pytest.mark.parametrize("content", [b"", b"\x00", encode(Placed((1,))), encode(Ok((1,)))[:-1], b"\x92\xa2Ok\x91\xa1x"])
+@looped("content", [b"", b"\x00", encode(Placed((1,))), encode(Ok((1,)))[:-1], b"\x92\xa2Ok\x91\xa1x"])
 def test_what_is_no_message_of_the_protocol_is_refused(content: bytes) -> None:
     with pytest.raises(BadMessageError, match="RA sent RB an invalid message"):
         host("RB").handle([Envelope("RA", "RB", content, 0)])

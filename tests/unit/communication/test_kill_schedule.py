@@ -15,6 +15,7 @@ from robochoc.model.problem import Team
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import team_of
 
@@ -69,7 +70,7 @@ def test_a_refused_run_has_one_reason(caplog: pytest.LogCaptureFixture) -> None:
     assert caplog.messages == []
 
 
-@pytest.mark.parametrize(
+@looped(
     ("options", "why"),
     [
         (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator and arrays have none"),

@@ -37,6 +37,7 @@ from robochoc.run.choice import decided
 from robochoc.run.options import ScheduleName
 from robochoc.run.recording import journal_header
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.problems import random_team
 from tests.support.replays import recorded
@@ -229,7 +230,7 @@ def test_a_journal_of_lost_messages_is_not_replayed() -> None:
         replay(journal)
 
 
-@pytest.mark.parametrize(
+@looped(
     "options",
     [
         replace(lossy("dsa"), runtime=Runtime.ARRAYS),

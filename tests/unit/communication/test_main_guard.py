@@ -6,8 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
+from tests.support.cases import looped
 from tests.support.limits import HANG_S
 
 MODEL = """import robochoc
@@ -33,7 +32,7 @@ def run(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, file], capture_output=True, text=True, check=False, timeout=HANG_S)
 
 
-@pytest.mark.parametrize("text", [MODEL + NETWORK, FORK_SERVER], ids=["network", "fork server"])
+@looped("text", [MODEL + NETWORK, FORK_SERVER])
 def test_without_the_guard_the_program_hears_what_is_missing(text: str, tmp_path: Path) -> None:
     done = run(tmp_path, text)
     assert done.returncode == 1
@@ -50,7 +49,7 @@ def test_a_guard_before_it_that_guards_something_else_is_none(tmp_path: Path) ->
     assert "program.py:7: each robot's process" in done.stderr
 
 
-@pytest.mark.parametrize(
+@looped(
     "below",
     [
         'if __name__ == "__main__":\n    pool()\n',
@@ -58,7 +57,6 @@ def test_a_guard_before_it_that_guards_something_else_is_none(tmp_path: Path) ->
         'if __name__ != "__main__":\n    raise SystemExit\npool()\n',
         "import threading\nthread = threading.Thread(target=pool)\nthread.start()\nthread.join()\n",
     ],
-    ids=["guard", "exit", "raise", "thread"],
 )
 def test_with_a_guard_or_where_nobody_can_see_it_goes_on(below: str, tmp_path: Path) -> None:
     done = run(tmp_path, CHECK + below)

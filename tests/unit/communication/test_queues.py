@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 from hypothesis import given
@@ -21,15 +22,22 @@ from robochoc.communication.processes.queues import (
     unpack,
     unpack_stamped,
 )
+from tests.support.cases import looped
 
 
-@pytest.fixture
-def ends() -> Iterator[tuple[QueueReader, QueueWriter]]:
+@contextmanager
+def opened_queue() -> Iterator[tuple[QueueReader, QueueWriter]]:
     read, write = os.pipe()
     reader, writer = QueueReader(read), QueueWriter(write)
     yield reader, writer
     reader.close()
     writer.close()
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[QueueReader, QueueWriter]]:
+    with opened_queue() as ends:
+        yield ends
 
 
 @given(bodies=st.lists(st.binary(max_size=300)), cuts=st.lists(st.integers(1, 50)))
@@ -106,7 +114,7 @@ def test_writing_to_nobody_is_no_error() -> None:
     writer.close()
 
 
-@pytest.mark.parametrize("length", [-1, LARGEST_BODY + 1, 2**31 - 1])
+@looped("length", [-1, LARGEST_BODY + 1, 2**31 - 1])
 def test_an_absurd_length_is_refused_before_anything_is_allocated(length: int) -> None:
     buffer = bytearray(length.to_bytes(4, "big", signed=True) + b"x")
     with pytest.raises(CorruptQueueError):
@@ -192,18 +200,18 @@ def test_a_large_message_comes_in_parts(ends: tuple[QueueReader, QueueWriter]) -
     assert got == messages
 
 
-@pytest.mark.parametrize("length", [-1, 0, 11, LARGEST_BODY + 1, 2**31 - 1])
-def test_an_absurd_length_of_a_stamped_message_is_refused(length: int, ends: tuple[QueueReader, QueueWriter]) -> None:
-    reader, writer = ends
-    assert writer.fd is not None
+@looped("length", [-1, 0, 11, LARGEST_BODY + 1, 2**31 - 1])
+def test_an_absurd_length_of_a_stamped_message_is_refused(length: int) -> None:
     frame = length.to_bytes(4, "big", signed=True) + bytes(12)
     with pytest.raises(CorruptQueueError):
         unpack_stamped(frame)
-    os.write(writer.fd, frame[:7])
-    assert reader.get_stamped() == []
-    os.write(writer.fd, frame[7:])
-    with pytest.raises(CorruptQueueError):
-        reader.get_stamped()
+    with opened_queue() as (reader, writer):
+        assert writer.fd is not None
+        os.write(writer.fd, frame[:7])
+        assert reader.get_stamped() == []
+        os.write(writer.fd, frame[7:])
+        with pytest.raises(CorruptQueueError):
+            reader.get_stamped()
 
 
 def test_of_a_writer_that_was_killed_between_two_parts_the_whole_messages_are_there() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from robochoc.communication.control import Snapshot
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.plausibility import Declarations
@@ -11,6 +9,7 @@ from robochoc.communication.search_state import SearchState
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Domain
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
+from tests.support.cases import looped
 
 NAMES = ("A", "B")
 
@@ -48,7 +47,7 @@ def test_what_was_not_asked_for_is_a_fault_and_of_another_epoch_it_is_nothing() 
     assert state.end_snapshot() is None
 
 
-@pytest.mark.parametrize(
+@looped(
     ("said", "fault"),
     [
         (has(9), "it has reported values that it cannot have"),

@@ -23,6 +23,7 @@ from robochoc.protocols.local_search.dsa import DSA
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import installed_protocols
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import team_of
 from tests.support.program import ROOT
@@ -118,7 +119,7 @@ def run(*words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-@pytest.mark.parametrize(
+@looped(
     ("words", "said"),
     [
         ((PATROL, "--protocol", "sfb"), "sfb has no form as arrays"),
