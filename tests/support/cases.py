@@ -78,7 +78,14 @@ def looped(
 
 def row_name(number: int, values: Iterable[object]) -> str:
     """Return the number of a row and its first values."""
-    return " ".join([str(number), *(str(value) for value in values if not callable(value))])[:NAME_LENGTH]
+    return " ".join([str(number), *(_text(value) for value in values if not callable(value))])[:NAME_LENGTH]
+
+
+def _text(value: object) -> str:
+    try:
+        return str(value)
+    except ValueError:  # a number of thousands of digits
+        return type(value).__name__
 
 
 @contextmanager

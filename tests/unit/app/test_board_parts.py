@@ -16,6 +16,7 @@ from robochoc.app.sketch.edits import EditError, with_rule, without_decision
 from robochoc.app.sketch.fits import why_no_cost, why_not_private
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import MAX_VALUES, Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule, Value
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch
 
@@ -49,7 +50,7 @@ class Held:
     sketch: Sketch
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "values"),
     [
         ("1-5", (1, 2, 3, 4, 5)),
@@ -65,7 +66,7 @@ def test_numbers_are_read_as_they_are_typed(text: str, values: tuple[int, ...]) 
     assert typed_values(Kind.LEVEL, text) == values
 
 
-@pytest.mark.parametrize("text", ["a", "1-", "1.5", "1-2-3", "\u0663", "9" * 30, "0-999999999", "1000001", "<b>"])
+@looped("text", ["a", "1-", "1.5", "1-2-3", "\u0663", "9" * 30, "0-999999999", "1000001", "<b>"])
 def test_what_is_no_number_is_told(text: str) -> None:
     with pytest.raises(EditError):
         typed_values(Kind.SLOT, text)
@@ -150,7 +151,7 @@ def test_pairs_are_filled_as_a_rectangle_and_emptied_again() -> None:
     assert filled(more, (1, 2), (1,), on=False) == [[9], [1, 3], [2, 3]]
 
 
-@pytest.mark.parametrize(
+@looped(
     ("rules", "private_off", "costs_off"),
     [
         ((), False, False),

@@ -7,6 +7,7 @@ import pytest
 from robochoc.app.sketch.changes import Battery, Blocked, Change, Fails, Joins, changed, told
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from tests.support.cases import looped
 
 LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3, 4))
 PLACE = Decision("place", Kind.PLACE, (0, 1, 2))
@@ -32,7 +33,7 @@ def test_a_battery_limits_levels() -> None:
     assert "level 2, and no higher" in told(TEAM, [Battery("A", 50)])[0]
 
 
-@pytest.mark.parametrize(("percent", "words", "left"), [(100, "every level", 2), (19, "leaves", 1), (20, "leaves", 1)])
+@looped(("percent", "words", "left"), [(100, "every level", 2), (19, "leaves", 1), (20, "leaves", 1)])
 def test_a_battery_that_is_full_or_empty(percent: int, words: str, left: int) -> None:
     """With a fifth of four levels there is none left: the robot leaves as below the limit."""
     assert words in told(TEAM, [Battery("A", percent)])[0]

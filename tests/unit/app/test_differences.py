@@ -20,6 +20,7 @@ from robochoc.app.texts import say
 from robochoc.model.change import apply_changes, describe_change
 from robochoc.model.problem import Team
 from tests.support.brute_force import priced_solutions
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, without_costs
 
@@ -103,7 +104,7 @@ def _sound(sketch: Sketch) -> bool:
 
 
 @given(st.integers(0, 10**9))
-@examples(100)
+@examples(40)
 def test_the_last_epoch_is_the_second_sketch(seed: int) -> None:
     random = Random(seed)
     before = without_costs(random_sketch(random))
@@ -164,7 +165,7 @@ def _with(**changes: object) -> Sketch:
     return msgspec.structs.replace(_sketch(), **changes)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("after", "key"),
     [
         (_with(robots=(SketchRobot("Z", Cell(0, 0)),)), "nobody"),

@@ -17,6 +17,7 @@ from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.history import MAX_STEPS, History
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.texts import say
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import HOSTILE, random_sketch
 
@@ -112,7 +113,7 @@ REFUSED: dict[str, Callable[[], Sketch]] = {
 }
 
 
-@pytest.mark.parametrize("key", REFUSED)
+@looped("key", REFUSED)
 def test_what_cannot_be_is_told(key: str) -> None:
     with pytest.raises(EditError) as told:
         REFUSED[key]()
@@ -120,7 +121,7 @@ def test_what_cannot_be_is_told(key: str) -> None:
     assert "{" not in say(key, **told.value.named)
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@looped("name", HOSTILE)
 def test_a_hostile_name_is_refused_everywhere(name: str) -> None:
     changes: list[Callable[[], Sketch]] = [
         lambda: edits.renamed(TEAM, name),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from random import Random
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
@@ -16,6 +15,7 @@ from robochoc.app.sketch.examples import KEYS, example, examples, shows, title_o
 from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Sketch, SketchRobot, SketchRule
+from tests.support.cases import looped
 from tests.support.examples import examples as draws
 from tests.support.sketches import HOSTILE, random_sketch, spoiled
 
@@ -34,7 +34,7 @@ def test_those_that_fly_come_first_and_each_says_what_it_shows() -> None:
     assert len({shows(key) for key in KEYS}) == len(KEYS)
 
 
-@pytest.mark.parametrize("key", KEYS)
+@looped("key", KEYS)
 def test_an_example_is_sound_and_decided_at_once(key: str) -> None:
     sketch = example(key)
     assert troubles(sketch) == []
@@ -49,7 +49,7 @@ def test_together_they_show_most_of_the_palette() -> None:
     assert len(shown) >= 0.75 * len(PALETTE)
 
 
-@pytest.mark.parametrize("key", KEYS)
+@looped("key", KEYS)
 def test_an_example_has_a_picture_of_its_robots(key: str) -> None:
     drawn = etree.fromstring(picture(example(key)).encode())
     assert len(drawn.findall("{*}circle")) == len(example(key).robots)
@@ -74,16 +74,11 @@ def test_nothing_hostile_leaves_its_place_in_a_picture(seed: int) -> None:
     assert not {str(name) for name in names if str(name).startswith("on") or "href" in str(name)}
 
 
-@pytest.mark.parametrize(
-    "sketch",
-    [
+def test_what_is_far_too_large_has_a_picture_of_nothing() -> None:
+    for sketch in (
         Sketch(area=Area(10**9, 10**9)),
         Sketch(area=Area(0, -1)),
         Sketch(robots=(SketchRobot("A", Cell(10**5_000, 0)),)),
         Sketch(robots=(SketchRobot("A", Cell(0, 0)),) * 10_000),
-    ],
-    ids=["wide", "none", "far", "many"],
-)
-def test_what_is_far_too_large_has_a_picture_of_nothing(sketch: Sketch) -> None:
-    drawn = etree.fromstring(picture(sketch).encode())
-    assert drawn.findall("{*}circle") == []
+    ):
+        assert etree.fromstring(picture(sketch).encode()).findall("{*}circle") == []

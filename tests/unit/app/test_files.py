@@ -21,6 +21,7 @@ from robochoc.app.sketch.files import save, xml_sources, zipped
 from robochoc.app.sketch.opening import ForeignTeam, opened
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import InvalidInputError, read_team
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.program import ROOT, robochoc_within
 from tests.support.sketches import random_sketch, without_costs
@@ -81,7 +82,7 @@ def test_the_commands_take_it_and_decide_the_same(folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("key", KEYS)
+@looped("key", KEYS)
 def test_every_example_is_decided_by_the_commands_as_in_this_process(tmp_path: Path, key: str) -> None:
     sketch, folder = example(key), tmp_path / key
     save(sketch, folder)
@@ -122,7 +123,7 @@ def test_a_file_more_or_less_is_a_change(folder: Path) -> None:
         opened(folder)
 
 
-@pytest.mark.parametrize("name", ["patrol", "rescue", "hangar"])
+@looped("name", ["patrol", "rescue", "hangar"])
 def test_a_team_of_others_is_opened_as_what_it_is(tmp_path: Path, name: str) -> None:
     path = ROOT / "docs/examples" / name
     found = opened(path)
@@ -206,9 +207,7 @@ def test_an_archive_that_lists_a_million_files_is_refused_before_the_list_is_rea
         assert len(found.read("A.txt")) == 10_000
 
 
-@pytest.mark.parametrize(
-    "content", [b"PK\x03\x04 rest", zipped(TEAM)[:-40], zipped(TEAM)[:200] + b"\0" * 300 + zipped(TEAM)[500:]]
-)
+@looped("content", [b"PK\x03\x04 rest", zipped(TEAM)[:-40], zipped(TEAM)[:200] + b"\0" * 300 + zipped(TEAM)[500:]])
 def test_a_damaged_archive_is_told(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.zip").write_bytes(content)
     assert refused(tmp_path / "a.zip")
@@ -226,7 +225,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("what", HOSTILE)
+@looped("what", HOSTILE)
 def test_a_damaged_sketch_is_told(folder: Path, what: str) -> None:
     (folder / "sketch.json").write_bytes(HOSTILE[what])
     told = refused(folder)

@@ -12,6 +12,7 @@ from starlette.responses import PlainTextResponse
 
 from robochoc.app import guard
 from robochoc.app.guard import Guard, Served
+from tests.support.cases import looped
 
 SECRET = "secret"  # noqa: S105 - of a test
 HERE = b"127.0.0.1:8000"
@@ -82,24 +83,24 @@ def test_a_browser_of_this_machine_with_the_path_is_served() -> None:
     assert (first["status"], body["body"]) == (200, b"inside")
 
 
-@pytest.mark.parametrize("host", [b"evil.example:8000", b"127.0.0.1", b"127.0.0.1:8001", b"", b"secret"])
+@looped("host", [b"evil.example:8000", b"127.0.0.1", b"127.0.0.1:8001", b"", b"secret"])
 def test_another_name_of_this_machine_is_not_found(host: bytes) -> None:
     first, body = _asked("/secret/", {"host": host})
     assert first["status"] == 404
     assert b"Each start of robochoc app has an address of its own" in body["body"]
 
 
-@pytest.mark.parametrize("path", ["/", "", "/secre/", "/secrets/", "/x/secret/", "//secret/", "/SECRET/", "/sécret/"])
+@looped("path", ["/", "", "/secre/", "/secrets/", "/x/secret/", "//secret/", "/SECRET/", "/sécret/"])
 def test_without_the_secret_path_nothing_is_found(path: str) -> None:
     assert _asked(path, {"host": HERE})[0]["status"] == 404
 
 
-@pytest.mark.parametrize("origin", [b"https://evil.example", b"null", b"http://127.0.0.1:8001", b"https://" + HERE])
+@looped("origin", [b"https://evil.example", b"null", b"http://127.0.0.1:8001", b"https://" + HERE])
 def test_a_page_of_another_site_is_refused(origin: bytes) -> None:
     assert _asked("/secret/", {"host": HERE, "origin": origin})[0]["status"] == 403
 
 
-@pytest.mark.parametrize(
+@looped(
     ("path", "headers"),
     [
         ("/secret/_nicegui_ws/", {"host": HERE, "origin": b"http://evil.example"}),
@@ -122,12 +123,12 @@ def test_answers_may_not_be_kept_nor_framed_elsewhere() -> None:
     assert headers[b"referrer-policy"] == b"no-referrer"
 
 
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE", "PROPFIND", "get", ""])
+@looped("method", ["PUT", "DELETE", "OPTIONS", "TRACE", "PROPFIND", "get", ""])
 def test_other_methods_are_refused(method: str) -> None:
     assert _asked("/secret/", {"host": HERE}, method=method)[0]["status"] == 405
 
 
-@pytest.mark.parametrize("length", [b"%d" % (guard.MOST_BYTES + 1), b"9" * 5_000, b"-1", b"1e3", b"0x10"])
+@looped("length", [b"%d" % (guard.MOST_BYTES + 1), b"9" * 5_000, b"-1", b"1e3", b"0x10"])
 def test_what_is_too_long_is_refused_before_it_is_read(length: bytes) -> None:
     told = _asked("/secret/", {"host": HERE, "content-length": length}, method="POST")
     assert (told[0]["status"], len(told)) == (413, 2)

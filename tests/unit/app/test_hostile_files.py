@@ -34,6 +34,7 @@ from robochoc.app.sketch.sketch import (
     SketchRule,
 )
 from robochoc.app.store import InUseError, Store
+from tests.support.cases import looped
 from tests.support.limits import wait_until
 
 UNSOUND = {
@@ -73,7 +74,7 @@ def full(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
     return lambda now: is_full.__setitem__(0, now)
 
 
-@pytest.mark.parametrize("why", UNSOUND)
+@looped("why", UNSOUND)
 def test_a_sketch_beyond_all_bounds_is_damaged(store: Store, why: str) -> None:
     name = store.add(Sketch())
     (store.path(name) / "history.json").write_bytes(msgspec.json.encode(History(UNSOUND[why])))
@@ -89,9 +90,7 @@ def test_steps_beyond_all_bounds_cannot_be_undone(store: Store) -> None:
     assert store.load(name) == History(Sketch("now"))
 
 
-@pytest.mark.parametrize(
-    "content", [b'{"x":' + b"[" * 200_000, b'{"now":{"rules":[{"settings":' + b"[" * 200_000, b"\0"]
-)
+@looped("content", [b'{"x":' + b"[" * 200_000, b'{"now":{"rules":[{"settings":' + b"[" * 200_000, b"\0"])
 def test_a_deep_file_is_damaged(store: Store, content: bytes) -> None:
     name = store.add(Sketch())
     (store.path(name) / "history.json").write_bytes(content)

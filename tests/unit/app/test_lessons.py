@@ -12,17 +12,18 @@ from robochoc.app.lessons.picture import HEIGHT, WIDTH, picture
 from robochoc.app.lessons.progress import Progress
 from robochoc.app.lessons.record import recorded
 from robochoc.app.lessons.recording import Recording, after, before, reasons, recordings
+from tests.support.cases import looped
 from tests.support.lesson_truth import breaks, is_true
 
 NUMBERS = range(1, COUNT + 1)
-STEPS = [
-    pytest.param(number, step, id=f"{number}-{place}")
-    for number in NUMBERS
-    for place, step in enumerate(lesson(number).steps, 1)
-]
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+def steps() -> list[tuple[int, Step]]:
+    """All steps of all lessons, each with its lesson's number."""
+    return [(number, step) for number in NUMBERS for step in lesson(number).steps]
+
+
+@looped("number", NUMBERS)
 def test_a_lesson_is_of_four_to_seven_steps_with_one_answer_each(number: int) -> None:
     taught = lesson(number)
     assert 4 <= len(taught.steps) <= 7
@@ -34,7 +35,7 @@ def test_a_lesson_is_of_four_to_seven_steps_with_one_answer_each(number: int) ->
 
 
 def test_the_answer_is_not_always_at_the_same_place() -> None:
-    places = [step.choices.index(step.answer) for number in NUMBERS for step in lesson(number).steps]
+    places = [step.choices.index(step.answer) for _, step in steps()]
     assert all(places.count(place) < len(places) / 2 for place in range(4))
 
 
@@ -44,12 +45,12 @@ def test_there_are_no_lessons_but_these() -> None:
             lesson(number)
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@looped("number", NUMBERS)
 def test_the_recorded_runs_are_what_the_protocols_do_today(number: int) -> None:
     assert recordings(number) == recorded(lesson(number))
 
 
-@pytest.mark.parametrize(("number", "step"), STEPS)
+@looped(("number", "step"), steps)
 def test_the_answer_is_true_and_the_other_choices_are_not(number: int, step: Step) -> None:
     taught, runs = lesson(number), recordings(number)
     for choice in step.choices:
@@ -66,7 +67,7 @@ def test_what_protocols_no_longer_say_is_noticed() -> None:
     assert not any(is_true(taught, others, step, step.answer) for step in taught.steps[:2])
 
 
-@pytest.mark.parametrize(("number", "step"), STEPS)
+@looped(("number", "step"), steps)
 def test_pictures_are_well_formed_and_show_levels_messages_and_names(number: int, step: Step) -> None:
     team = lesson(number).team_of(step)
     for moment in (before(number, step), after(number, step)):
@@ -105,7 +106,7 @@ def test_progress_is_kept(tmp_path: Path) -> None:
     assert Progress(tmp_path).done(1) == 0
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"1":"x"}', b'{"1":-5}', b'{"99":3}'])
+@looped("content", [b"", b"{", b"[]", b'{"1":"x"}', b'{"1":-5}', b'{"99":3}'])
 def test_a_damaged_file_of_progress_is_begun_again(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "lessons.json").write_bytes(content)
     assert Progress(tmp_path).done(1) == 0

@@ -9,7 +9,6 @@ from random import Random
 from typing import Any
 
 import msgspec
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
@@ -21,6 +20,7 @@ from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.model.problem import INFINITE
 from tests.support.brute_force import solutions
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, without_costs
 
@@ -136,9 +136,9 @@ def test_every_rule_has_a_plain_meaning() -> None:
     assert {key for key, entry in PALETTE.items() if entry.graded} == {*CHARGED}
 
 
-@pytest.mark.parametrize("kind", PALETTE)
+@looped("kind", PALETTE)
 @given(seed=st.integers(0, 10**9))
-@examples(12)
+@examples(6)
 def test_a_rule_is_what_it_says(kind: str, seed: int) -> None:
     random = Random(seed)
     sketch = without_costs(random_sketch(random, [kind]))
@@ -162,9 +162,9 @@ def test_a_rule_is_what_it_says(kind: str, seed: int) -> None:
         assert total == expected
 
 
-@pytest.mark.parametrize("kind", PALETTE)
+@looped("kind", PALETTE)
 @given(seed=st.integers(0, 10**9))
-@examples(12)
+@examples(6)
 def test_over_values_a_rule_is_true_or_false(kind: str, seed: int) -> None:
     random = Random(seed)
     sketch = random_sketch(random, [kind])

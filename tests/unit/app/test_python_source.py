@@ -6,7 +6,6 @@ import ast
 from random import Random
 
 import msgspec
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,6 +16,7 @@ from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.written import Written, text_with, written
 from robochoc.model.problem import Team
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import HOSTILE, random_sketch, without_costs
 
@@ -35,9 +35,9 @@ def team_of(source: str) -> Team:
     return team
 
 
-@pytest.mark.parametrize("kind", PALETTE)
+@looped("kind", PALETTE)
 @given(seed=st.integers(0, 10**9))
-@examples(12)
+@examples(6)
 def test_every_rule_makes_the_same_team(kind: str, seed: int) -> None:
     sketch = without_costs(random_sketch(Random(seed), [kind]))
     assert team_of(python_source(sketch)) == model_of(sketch).team
@@ -104,7 +104,7 @@ def test_decisions_have_names_of_their_own_in_python() -> None:
     assert names == ["a_b_of", "a_b__of", "a_b___of", "class_of", "robots_of"]
 
 
-@pytest.mark.parametrize("text", [*HOSTILE, "'", '"', "\\", '{"', '"""', "\\'", "{0}", "a\rb"])
+@looped("text", [*HOSTILE, "'", '"', "\\", '{"', '"""', "\\'", "{0}", "a\rb"])
 def test_no_text_leaves_its_quotes(text: str) -> None:
     assert ast.literal_eval(written(text)) == text
     assert ast.literal_eval(written([(text,), [text, 1]])) == [(text,), [text, 1]]
@@ -112,7 +112,7 @@ def test_no_text_leaves_its_quotes(text: str) -> None:
     assert told == f"{text}.mid.{text}"
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@looped("name", HOSTILE)
 def test_a_hostile_sketch_writes_nothing_else(name: str) -> None:
     """Not even a sketch that has errors writes a program that does anything but what its texts say."""
     robots = (SketchRobot(name, Cell(0, 0)), *ROBOTS)

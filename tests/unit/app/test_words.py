@@ -5,7 +5,6 @@ from __future__ import annotations
 from random import Random
 
 import msgspec
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,6 +12,7 @@ from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.words import listed, robot_words, sentence, short, value_words, weight_of
 from robochoc.app.texts import catalogue, say
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, spoiled
 
@@ -21,7 +21,7 @@ ROBOTS = tuple(SketchRobot(name, Cell(0, 0)) for name in ("North", "South", "Eas
 TEAM = Sketch("team", Area(4, 3), ROBOTS, (LEVEL, PLACE))
 
 
-@pytest.mark.parametrize("key", PALETTE)
+@looped("key", PALETTE)
 def test_every_rule_of_the_palette_has_words(key: str) -> None:
     entry = PALETTE[key]
     for part in ("name", "short", "sentence", "help"):

@@ -16,6 +16,7 @@ from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Ro
 from robochoc.model.team_edits import without_robots
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.explanation import invalidated_by
+from tests.support.cases import looped
 from tests.support.complex_changes import random_complex_changing_team
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
@@ -70,7 +71,7 @@ def arranged(team: Team, chance: Random) -> Team:
         return team
 
 
-@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
+@looped("family", FAMILIES)
 def test_a_team_comes_back(family) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001 - makers of teams
     """Through all its epochs, in another order, and without one of its robots."""
     for seed in range(PER_FAMILY):
@@ -127,7 +128,7 @@ def test_one_that_can_be_written_after_it_is_told_whole() -> None:
     assert {*writer.given(team).robots} == {*team.order}
 
 
-@pytest.mark.parametrize(
+@looped(
     ("change", "says"),
     [
         ({"order": ("Robot1.1", "Robot9.9")}, "the problem of Robot9.9 is missing"),

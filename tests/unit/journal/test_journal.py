@@ -36,6 +36,7 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.objective import Objective
+from tests.support.cases import looped
 from tests.support.events import any_event, headers, outcomes
 from tests.support.examples import examples
 from tests.support.problems import team_of
@@ -144,7 +145,7 @@ def test_what_is_too_large_for_a_block_is_left_out_and_said() -> None:
 # While it is written
 
 
-@pytest.mark.parametrize(
+@looped(
     "poison",
     [
         Sent(t=1, sender="R", receiver="S", type="X", content={"x": {(1, 2): 3}}, bytes=1, clock=0),
@@ -153,7 +154,6 @@ def test_what_is_too_large_for_a_block_is_left_out_and_said() -> None:
         Settled(t=1, robot="R", clock=1, checks=2**64 - 1),
         Received(t=1, sender="S", receiver="R", type="X", clock=-(2**63) - 1),
     ],
-    ids=["keys that are no text", "extension", "clock", "checks", "negative"],
 )
 def test_what_could_not_be_read_again_spoils_nothing(poison: AnyEvent) -> None:
     """A robot of another machine may tell of it: all that msgpack holds comes over the wire."""
@@ -294,7 +294,7 @@ class _Interrupted:
         self.content += block
 
 
-@pytest.mark.parametrize("at", range(2, 6))
+@looped("at", range(2, 6))
 def test_an_interrupt_costs_no_event(at: int) -> None:
     sink, other = _Interrupted(at), io.BytesIO()
     recorder = JournalRecorder(HEADER, sinks=[other.write, sink])
@@ -384,9 +384,7 @@ def test_a_runs_journal_is_small_and_has_everything(runtime: Runtime) -> None:
     assert 5 * len(content) < sum(map(len, lines_of(journal)))
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\x89", b"PK\x03\x04", b'{"event":"Began","protocol":"x","t":0}\n', b"[" * 10**6]
-)
+@looped("content", [b"", b"\x89", b"PK\x03\x04", b'{"event":"Began","protocol":"x","t":0}\n', b"[" * 10**6])
 def test_what_is_no_journal_is_refused(content: bytes) -> None:
     with pytest.raises(JournalError):
         read_journal(content)

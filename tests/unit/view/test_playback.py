@@ -30,6 +30,7 @@ from robochoc.view.page import scene_page
 from robochoc.view.palette import GREY, RED, web
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
+from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.flights import FPS, LEG_S, TILT, epochs_of_three, five, straight
 from tests.support.flights import scene_of as flown_scene_of
@@ -290,7 +291,7 @@ def test_the_caption_tells_of_the_flight() -> None:
 # No flight
 
 
-@pytest.mark.parametrize("error", [MemoryError("no room"), FloatingPointError(), ValueError("nonsense")])
+@looped("error", [MemoryError("no room"), FloatingPointError(), ValueError("nonsense")])
 def test_drones_that_cannot_fly_are_where_they_would_be(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object, **__: object) -> None:
         raise error

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import pytest
-
 from robochoc.flight.mission import mission_of
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from tests.support.cases import looped
 from tests.support.flights import scene_of
 
 
-@pytest.mark.parametrize(
+@looped(
     ("values", "scale"),
     [({"V1.1": 1, "V1.2": 10**12}, None), ({"V1.1": 1, "V1.2": 2}, 1e9), ({"V1.1": 10**7, "V1.2": 10**7 + 1}, None)],
 )

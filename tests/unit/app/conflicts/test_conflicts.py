@@ -11,11 +11,12 @@ import pytest
 from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder
 from robochoc.app.conflicts.process import found_in
 from robochoc.app.conflicts.rules import candidates, minimal, rule_of
+from tests.support.cases import looped
 from tests.support.rule_teams import can_hold, random_rules
 from tests.support.slot_sketches import slots
 
 
-@pytest.mark.parametrize("way", ["assumptions", "leaving out", "own"])
+@looped("way", ["assumptions", "leaving out", "own"])
 def test_that_it_cannot_hold_and_each_proper_subset_can(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     use_cpmpy = way != "own"
     if use_cpmpy:

@@ -26,6 +26,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from tests.support.cases import looped
 from tests.support.slot_sketches import slots
 from tests.support.small_teams import graph_team, pair, pkc_team, triangle
 
@@ -74,7 +75,7 @@ def _has_solution(team: Team, rules: Iterable[str]) -> bool:
 
 
 @pytest.mark.parametrize("use_cpmpy", [True, False])
-@pytest.mark.parametrize("name", TEAMS)
+@looped("name", TEAMS)
 def test_that_it_cannot_hold_and_each_proper_subset_can(tmp_path: Path, name: str, *, use_cpmpy: bool) -> None:
     if use_cpmpy:
         pytest.importorskip("cpmpy")
@@ -129,7 +130,7 @@ def test_that_our_own_solver_looks_where_cpmpy_fails(
     assert len(caplog.records) == 2
 
 
-@pytest.mark.parametrize(
+@looped(
     ("body", "undefined"),
     [
         ("div(X,Y)", True),

@@ -5,11 +5,10 @@ from __future__ import annotations
 import itertools
 from random import Random
 
-import pytest
-
 from robochoc.app.flights.answer import broken
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRule
+from tests.support.cases import looped
 from tests.support.sketches import random_sketch
 
 
@@ -45,7 +44,7 @@ def test_who_stepped_aside_and_what_is_switched_off_break_nothing() -> None:
     assert [*broken(_pair(SketchRule("", "different", "level", on=False)), ALL_ONE)] == []
 
 
-@pytest.mark.parametrize("seed", range(30))
+@looped("seed", range(30))
 def test_that_every_kind_of_rule_can_be_asked(seed: int) -> None:
     random = Random(seed)
     sketch = random_sketch(random)

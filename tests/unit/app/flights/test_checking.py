@@ -25,6 +25,7 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, CostUnits, Domain, Function, ProblemKind, Variable
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
+from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
 from tests.support.program import ROOT
 
@@ -47,7 +48,7 @@ def _found(run: Run) -> Checked | None:
 LEVELS = {"Drone1.level": 1, "Drone2.level": 2, "Drone3.level": 3}
 
 
-@pytest.mark.parametrize(
+@looped(
     ("differing", "found", "words"),
     [
         (
@@ -98,7 +99,7 @@ def test_what_a_file_says_is_held_against_its_team(
     assert words is None or words in headline(run)
 
 
-@pytest.mark.parametrize("cost", ["1e999999999", "1e-999999999", "1e400", "-1e-401"])
+@looped("cost", ["1e999999999", "1e-999999999", "1e400", "-1e-401"])
 def test_that_no_number_takes_all_memory(tmp_path: Path, cost: str) -> None:
     run = kept_run(tmp_path, cube())
     file = run.folder / "result.json"
@@ -152,7 +153,7 @@ def test_that_too_large_a_team_is_not_checked(tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize("wrong", [False, True])
-@pytest.mark.parametrize("example", ["rescue", "hangar", "patrol"])
+@looped("example", ["rescue", "hangar", "patrol"])
 def test_that_teams_of_files_are_checked(tmp_path: Path, example: str, *, wrong: bool) -> None:
     files = ROOT / "docs/examples" / example
     found = opened(files)
@@ -170,7 +171,7 @@ def test_that_teams_of_files_are_checked(tmp_path: Path, example: str, *, wrong:
     assert run.record.checked is (Checked.BROKEN if wrong else Checked.KEPT)
 
 
-@pytest.mark.parametrize(("cost", "found"), [(3.5, Checked.KEPT), (3, Checked.COST), (-3.5, Checked.COST)])
+@looped(("cost", "found"), [(3.5, Checked.KEPT), (3, Checked.COST), (-3.5, Checked.COST)])
 def test_that_a_worth_is_checked_in_the_users_numbers(tmp_path: Path, cost: float, found: Checked) -> None:
     product = Function("product", ("X", "Y"), parse("sub(mul(X,Y),1)", ("X", "Y"), Type.INTEGER))
     values = Domain("D", (range(3),))
@@ -190,7 +191,7 @@ def test_that_a_worth_is_checked_in_the_users_numbers(tmp_path: Path, cost: floa
     assert right in claimed(run, "")
 
 
-@pytest.mark.parametrize(
+@looped(
     "options",
     [
         RunOptions(protocol="$(reboot)"),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
-
 from robochoc.app.flights.names import file_name
+from tests.support.cases import looped
 
 
-@pytest.mark.parametrize(
+@looped(
     ("name", "expected"),
     [
         ("Cube", "Cube.zip"),

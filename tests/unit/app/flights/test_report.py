@@ -6,12 +6,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import msgspec
-import pytest
 
 from robochoc.app.flights.report import Pages, report, summary
 from robochoc.app.runs.options import RESULT, RunOptions
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
 
 HOSTILE = "</script><img src=x onerror=\"alert('$1')\">"
@@ -118,7 +118,7 @@ def test_that_what_is_as_large_as_can_be_is_a_worth(tmp_path: Path) -> None:
     assert summary(cube(), run) == ("All 3 decide together, and no other answer is worth more: proven. It is worth 6.")
 
 
-@pytest.mark.parametrize("robots", [5, None, "all", [{}]])
+@looped("robots", [5, None, "all", [{}]])
 def test_that_an_epoch_of_a_stranger_may_say_anything_of_its_robots(tmp_path: Path, robots: object) -> None:
     sketch = Sketch("Files", robots=(SketchRobot("Ada", Cell(0, 0)),))
     run = kept_run(tmp_path, sketch, epochs=[{"robots": robots}])
@@ -135,7 +135,7 @@ def test_that_the_command_of_a_stranger_is_not_told(tmp_path: Path) -> None:
     assert "solve" not in _Read(report(run.sketch, run, Pages(), "1")).words
 
 
-@pytest.mark.parametrize("started", [1e300, -1e300, float("inf"), float("nan")])
+@looped("started", [1e300, -1e300, float("inf"), float("nan")])
 def test_a_strangers_numbers_are_no_error(tmp_path: Path, started: float) -> None:
     run = kept_run(tmp_path, cube())
     run.record.started = started

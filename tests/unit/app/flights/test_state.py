@@ -23,6 +23,7 @@ from robochoc.app.sketch.opening import ForeignTeam, opened
 from robochoc.app.sketch.sketch import MAX_ROBOTS, Area, Cell, Sketch, SketchRobot
 from robochoc.app.store import Store
 from robochoc.formats import read_team
+from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
 from tests.support.program import ROOT
 
@@ -169,7 +170,7 @@ def test_the_messages_that_are_packed_can_be_opened_again(tmp_path: Path) -> Non
     assert is_too_long(run)
 
 
-@pytest.mark.parametrize(
+@looped(
     "change",
     [
         b"{",
@@ -179,7 +180,6 @@ def test_the_messages_that_are_packed_can_be_opened_again(tmp_path: Path) -> Non
         msgspec.json.encode({"after": Sketch(area=Area(10**6, 10**6)), "happened": []}),
         msgspec.json.encode({"after": cube(), "happened": ["told" * 10] * 10_000}),
     ],
-    ids=["no JSON", "no sketch", "deep", "name", "map", "told"],
 )
 def test_a_run_with_an_unsound_change_is_left_out(tmp_path: Path, change: bytes) -> None:
     run = kept_run(tmp_path / "here", cube())
@@ -190,7 +190,7 @@ def test_a_run_with_an_unsound_change_is_left_out(tmp_path: Path, change: bytes)
     assert not (tmp_path / "elsewhere").exists()
 
 
-@pytest.mark.parametrize("name", ["run.json", "sketch.json", "change.json", "result.json"])
+@looped("name", ["run.json", "sketch.json", "change.json", "result.json"])
 def test_too_large_a_file_of_a_run_is_not_read_to_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -24,6 +24,7 @@ from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch
 from robochoc.formats import write_team
 from robochoc.formats.ground_map import BlockedCell
 from robochoc.model.problem import RemoveAgent, ScenarioEvent
+from tests.support.cases import looped
 from tests.support.kept_runs import STARTED, cube, kept_run
 from tests.support.small_teams import pair
 
@@ -217,7 +218,7 @@ def test_the_last_answer_is_flown_if_there_is_none_in_the_end(tmp_path: Path, ve
     assert (b"The flight shows the last answer that there was" in page) is flown
 
 
-@pytest.mark.parametrize("epoch", [{}, {"assignment": 5}, {"assignment": None}, {"assignment": []}])
+@looped("epoch", [{}, {"assignment": 5}, {"assignment": None}, {"assignment": []}])
 def test_an_epoch_of_a_stranger_may_say_anything(tmp_path: Path, epoch: dict[str, object]) -> None:
     run = kept_run(tmp_path, cube(), assignment={}, epochs=[epoch])
     assert run.result is not None

@@ -25,6 +25,7 @@ from robochoc.formats import read_team
 from robochoc.model.constraint import Constraint, Predicate, Relation, Semantics
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
+from tests.support.cases import looped
 from tests.support.program import ROOT
 from tests.support.small_teams import pair, pkc_team, triangle
 
@@ -84,7 +85,7 @@ def test_one_robot_is_read_with_its_file_and_its_constraints_in_words(tmp_path: 
     assert spare.count == len(spare.sentences) > 0
 
 
-@pytest.mark.parametrize(
+@looped(
     ("text", "says"),
     [
         ("and(ne(X,Y),ne(abs(sub(X,Y)),2))", "(a ≠ b) and (|a - b| ≠ 2)"),

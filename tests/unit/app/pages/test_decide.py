@@ -9,7 +9,6 @@ from typing import cast
 from xml.etree import ElementTree as ET
 
 import msgspec
-import pytest
 
 from robochoc.app.pages.decide.answer import headline, table_html
 from robochoc.app.pages.decide.conflict import hints_about_rules
@@ -26,6 +25,7 @@ from robochoc.app.sketch.edits import with_importance
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, Value
 from robochoc.model.outcome import Verdict
 from robochoc.verification.checker import assignment_cost
+from tests.support.cases import looped
 from tests.support.rule_teams import random_rules
 from tests.support.sketches import random_sketch
 from tests.support.slot_sketches import slots
@@ -48,7 +48,7 @@ def _run(
     return run
 
 
-@pytest.mark.parametrize(
+@looped(
     ("run", "words"),
     [
         (_run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, cost=5)), "All 3 decide. It costs 5: proven the best."),
@@ -235,12 +235,12 @@ def test_that_only_protocols_that_fit_are_offered() -> None:
     assert with_costs.why
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b'{"verdict":"optimal"}', b"nonsense\n", b"[]\n", b"\xff\n"])
+@looped("content", [b"", b"{", b'{"verdict":"optimal"}', b"nonsense\n", b"[]\n", b"\xff\n"])
 def test_that_half_a_result_is_none(content: bytes) -> None:
     assert decoded(content) is None
 
 
-@pytest.mark.parametrize("seed", range(40))
+@looped("seed", range(40))
 def test_that_rules_cost_in_any_answer_what_the_checker_says(seed: int) -> None:
     random = Random(seed)
     drawn = random_sketch(random)

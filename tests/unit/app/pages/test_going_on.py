@@ -13,9 +13,10 @@ from robochoc.app.sketch.changes import AnyChange, Battery, Blocked, Fails, Join
 from robochoc.app.sketch.differences import changing_model
 from robochoc.app.sketch.examples import example
 from robochoc.app.sketch.sketch import Cell, Sketch
+from tests.support.cases import looped
 
 
-@pytest.mark.parametrize(
+@looped(
     ("key", "change", "says"),
     [
         ("channels", Fails("Radio1"), ""),

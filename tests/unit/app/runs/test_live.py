@@ -17,6 +17,7 @@ from robochoc.model.costs import normalized
 from robochoc.run import Options, Runtime
 from robochoc.run.recording import objective_to_record
 from robochoc.verification.objective import Objective
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.recorded_journals import record
 
@@ -100,7 +101,7 @@ HOSTILE: list[AnyEvent] = [
 ]
 
 
-@pytest.mark.parametrize("order", range(5))
+@looped("order", range(5))
 def test_that_hostile_records_are_survived(tmp_path: Path, order: int) -> None:
     file, facts = tmp_path / "run.journal", Live()
     recorder = JournalRecorder(HEADER)
@@ -114,7 +115,7 @@ def test_that_hostile_records_are_survived(tmp_path: Path, order: int) -> None:
     assert facts.bound is None
 
 
-@pytest.mark.parametrize("content", [b"", b"no journal", b"\x89RJL\r\n\x1a\nxxxx", b'{"event":"Journal"}\n', b"{\n"])
+@looped("content", [b"", b"no journal", b"\x89RJL\r\n\x1a\nxxxx", b'{"event":"Journal"}\n', b"{\n"])
 def test_that_what_is_no_journal_tells_nothing(tmp_path: Path, content: bytes) -> None:
     file, facts = tmp_path / "run.journal", Live()
     file.write_bytes(content)

@@ -17,6 +17,7 @@ from robochoc.journal.journal import Header, JournalRecorder
 from robochoc.run import Options, Runtime
 from robochoc.run.options import Withdrawal
 from robochoc.sniffer.growing_file import NoFileError
+from tests.support.cases import looped
 from tests.support.recorded_journals import record
 from tests.support.small_teams import triangle
 
@@ -98,7 +99,7 @@ def test_that_epochs_are_told_apart_in_a_long_conversation() -> None:
     assert tape.unsettled_at(0) == {"A", "B"}
 
 
-@pytest.mark.parametrize("count", [1, MOST_MOMENTS, 2 * MOST_MOMENTS, 2 * MOST_MOMENTS + 1, 20_011])
+@looped("count", [1, MOST_MOMENTS, 2 * MOST_MOMENTS, 2 * MOST_MOMENTS + 1, 20_011])
 def test_that_a_long_conversation_has_few_moments_and_nothing_is_lost(count: int) -> None:
     chance, entries = Random(count), list[JournalEntry]()
     now: dict[str, int] = {}
@@ -172,7 +173,7 @@ def test_that_the_end_is_the_answer_where_robots_step_aside(protocol: str) -> No
     assert tape.values_at(len(tape.moments) - 1) == journal.outcome.assignment
 
 
-@pytest.mark.parametrize("content", [b"", b"nonsense", b"{}\n"])
+@looped("content", [b"", b"nonsense", b"{}\n"])
 def test_that_what_is_no_journal_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "j").write_bytes(content)
     with suppress(JournalError):
@@ -181,7 +182,7 @@ def test_that_what_is_no_journal_is_refused(tmp_path: Path, content: bytes) -> N
         recorded(tmp_path, _tape())
 
 
-@pytest.mark.parametrize(("count", "seconds"), [(1, LEAST_S), (38, 5.7), (400, MOST_S)])
+@looped(("count", "seconds"), [(1, LEAST_S), (38, 5.7), (400, MOST_S)])
 def test_that_it_is_played_in_a_time_that_can_be_followed(count: int, seconds: float) -> None:
     player = Player(count)
     player.toggle()

@@ -19,6 +19,7 @@ from robochoc.app.texts import say
 from robochoc.experiments.plan import plan_of
 from robochoc.experiments.study import read_study
 from robochoc.formats import write_team
+from tests.support.cases import looped
 from tests.support.small_teams import pkc_team
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABCD"))
@@ -71,12 +72,12 @@ def test_rules_of_a_pair_count_together() -> None:
     assert family.options["tightness"] == [0.21, 0.31, 0.41]  # a pair of 10/16, five of 4/16: 0.3125 on average
 
 
-@pytest.mark.parametrize("sketch", [team(), team(LITTLE), Sketch("team", robots=ROBOTS[:1], decisions=(SLOT,))])
+@looped("sketch", [team(), team(LITTLE), Sketch("team", robots=ROBOTS[:1], decisions=(SLOT,))])
 def test_without_links_there_is_no_family(sketch: Sketch) -> None:
     assert family_of(sketch) is None
 
 
-@pytest.mark.parametrize("rules", [(DIFFERENT,), (DIFFERENT, APART), (APART, LITTLE)])
+@looped("rules", [(DIFFERENT,), (DIFFERENT, APART), (APART, LITTLE)])
 @pytest.mark.parametrize("of_family", [True, False])
 def test_a_study_is_what_the_command_takes(tmp_path: Path, rules: tuple[SketchRule, ...], *, of_family: bool) -> None:
     sketch = team(*rules)
