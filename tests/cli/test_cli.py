@@ -138,7 +138,7 @@ def test_broken_input_is_status_1_and_one_clear_message(
 # solve
 
 
-@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+@pytest.mark.parametrize("runtime", ["simulator", pytest.param("processes", marks=pytest.mark.more)])
 def test_solve_json_is_the_contract(runtime: str) -> None:
     done = robochoc_within("solve", "instances/", "--json", "--runtime", runtime, folder=ROOT)
     assert done.returncode == 0
@@ -198,7 +198,7 @@ def test_a_seed_repeats_a_run(four: Path) -> None:
     assert first["metrics"] != other["metrics"]
 
 
-@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+@pytest.mark.parametrize("runtime", ["simulator", pytest.param("processes", marks=pytest.mark.more)])
 def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     write_team(queens3d(10), tmp_path / "ten")
     done = robochoc_within(

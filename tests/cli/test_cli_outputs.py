@@ -22,7 +22,8 @@ from tests.support.program import PROGRAM, ROOT, robochoc_within
 def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> None:
     folder = four.parent
     done = robochoc_within(
-        "solve", four, "--withdraw", "--json", "--journal", folder / "run.jsonl", "--html", folder / "solve.html"
+        *("solve", four, "--withdraw", "--runtime", "simulator", "--json"),
+        *("--journal", folder / "run.jsonl", "--html", folder / "solve.html"),
     )
     (folder / "result.json").write_text(done.stdout)
     for words in (("run.jsonl",), ("run.jsonl", "--team", four), ("result.json", "--team", four)):
@@ -94,9 +95,12 @@ def test_what_goes_to_standard_output_does_not_replace_it(four: Path) -> None:
 @pytest.mark.parametrize(
     ("runtime", "closed"),
     [
-        *(("processes", closed) for closed in ("0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-")),
-        ("simulator", "0<&- 1>&- 2>&-"),
-        *(pytest.param("simulator", closed, marks=pytest.mark.slow) for closed in ("0<&-", "1>&-", "2>&-")),
+        *((runtime, "0<&- 1>&- 2>&-") for runtime in ("processes", "simulator")),
+        *(
+            pytest.param(runtime, closed, marks=pytest.mark.more)
+            for runtime in ("processes", "simulator")
+            for closed in ("0<&-", "1>&-", "2>&-")
+        ),
     ],
 )
 def test_closed_streams_do_no_harm(four: Path, runtime: str, closed: str) -> None:

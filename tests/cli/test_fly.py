@@ -4,33 +4,21 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 
-from robochoc.cli.group import cli
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from tests.support.cases import cases
 from tests.support.program import ROOT, robochoc_within
+from tests.support.solve_ros import HANGAR, SIMULATED, messages, ran
 
-HANGAR = ROOT / "docs" / "examples" / "hangar"
 RESCUE = ROOT / "docs" / "examples" / "rescue"
-SIMULATED = ("--protocol", "dynabt", "--runtime", "simulator")
 HOSTILE = "</script><img src=x onerror=alert(1)>\n\x1b[31m"
-
-
-def ran(*words: object) -> Result:
-    done = CliRunner().invoke(cli, [*map(str, words)], catch_exceptions=False)
-    assert "Traceback" not in done.output
-    return done
 
 
 def flown(*words: object) -> dict[str, Any]:
@@ -61,13 +49,6 @@ def planar(n: int) -> dict[str, int]:
     return {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
 
 
-def messages(path: Path, topics: Iterable[str] = ()) -> list[tuple[str, float, Any]]:
-    """Topic, second and message, as the reference reader of MCAP finds them."""
-    with path.open("rb") as stream:
-        read = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages([*topics] or None)
-        return [(channel.topic, message.log_time / 1e9, decoded) for _, channel, message, decoded in read]
-
-
 @pytest.fixture
 def two(tmp_path: Path) -> Path:
     return saved(tmp_path, {"V1.1": 1, "V1.2": 2})
@@ -96,7 +77,7 @@ def test_a_table_for_people(two: Path) -> None:
     assert "drones are named for variables" in result.stderr
 
 
-@pytest.mark.parametrize("n", [7, 11])
+@pytest.mark.parametrize("n", [7, pytest.param(11, marks=pytest.mark.more)])
 def test_everybody_is_at_its_place_and_nobody_too_near(n: int, tmp_path: Path) -> None:
     values = planar(n)
     told = flown(saved(tmp_path, values, name=f"planar-{n}"), "--scale", 1)

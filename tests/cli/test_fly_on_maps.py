@@ -8,22 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
+from click.testing import Result
 
-from robochoc.cli.group import cli
 from tests.support.maps import write_map
 from tests.support.octomaps import FREE, write_octomap
+from tests.support.solve_ros import messages, ran
 
 HALL = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
 """Two rooms with a door, 0.5 m a pixel."""
-
-
-def ran(*words: object) -> Result:
-    done = CliRunner().invoke(cli, [*map(str, words)], catch_exceptions=False)
-    assert "Traceback" not in done.output
-    return done
 
 
 @pytest.fixture
@@ -102,14 +94,8 @@ def test_solve_flies_and_publishes_in_the_scale_of_the_map(team: Path, tmp_path:
     assert done.exit_code == 0, done.output
     assert "nearest to a wall: " in done.output
     assert "</i>wall</li>" in page.read_text()
-    with bag.open("rb") as stream:
-        places = [
-            (message.pose.position.x, message.pose.position.y, message.pose.position.z)
-            for _, channel, _, message in make_reader(
-                stream, decoder_factories=[DecoderFactory()]
-            ).iter_decoded_messages()
-            if channel.topic.endswith("/waypoint")
-        ]
+    sent = [message.pose.position for topic, _, message in messages(bag) if topic.endswith("/waypoint")]
+    places = [(position.x, position.y, position.z) for position in sent]
     assert sorted(places) == [(3.5, 1.0, 0.5), (3.5, 2.5, 0.5)]
     plain = ran("solve", team, *simulator, "--html", page)
     assert plain.exit_code == 0

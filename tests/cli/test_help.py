@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
+import pytest
 from click.testing import CliRunner
 
 from robochoc import load
@@ -31,17 +32,18 @@ def commands(group: click.Group, *path: str) -> Iterator[tuple[str, click.Comman
         yield " ".join((*path, name)), command
 
 
-ALL = dict(commands(cli))
-SECTIONED = {name: command for name, command in ALL.items() if isinstance(command, SectionedCommand)}
+@pytest.fixture(scope="module", name="every")
+def every_command() -> dict[str, click.Command]:
+    return dict(commands(cli))
 
 
 def options_of(command: click.Command) -> list[click.Option]:
     return [one for one in command.get_params(click.Context(command)) if isinstance(one, click.Option)]
 
 
-def test_every_command_has_help_without_an_option_that_is_not_explained() -> None:
+def test_every_command_has_help_without_an_option_that_is_not_explained(every: dict[str, click.Command]) -> None:
     with cases() as each:
-        for name, command in ALL.items():
+        for name, command in every.items():
             with each(name):
                 done = CliRunner().invoke(cli, [*name.split(), "--help"])
                 assert done.exit_code == 0
@@ -49,9 +51,11 @@ def test_every_command_has_help_without_an_option_that_is_not_explained() -> Non
                 assert [one.opts for one in options_of(command) if not one.help] == []
 
 
-def test_every_option_is_in_one_section() -> None:
+def test_every_option_is_in_one_section_where_there_are_many(every: dict[str, click.Command]) -> None:
+    sectioned = {name: command for name, command in every.items() if isinstance(command, SectionedCommand)}
+    assert {name for name, command in every.items() if len(options_of(command)) > MANY} <= {*sectioned}
     with cases() as each:
-        for name, command in SECTIONED.items():
+        for name, command in sectioned.items():
             with each(name):
                 named = Counter(spelling for spellings in command.sections.values() for spelling in spellings)
                 there = options_of(command)
@@ -59,11 +63,6 @@ def test_every_option_is_in_one_section() -> None:
                 assert set(named) <= spelt | {"--help"}
                 assert [one.opts for one in there if sum(named[spelling] for spelling in one.opts) != 1] == []
                 assert next(iter(command.sections)) == COMMON
-
-
-def test_commands_with_many_options_have_sections() -> None:
-    long = {name for name, command in ALL.items() if len(options_of(command)) > MANY}
-    assert long <= {*SECTIONED}
 
 
 def test_help_on_solve_shows_what_most_runs_need_on_the_first_screen() -> None:

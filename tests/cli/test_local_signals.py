@@ -64,7 +64,14 @@ def struck(name: str, signum: signal.Signals, pause_s: float, saved: Path, home:
         assert run.left_behind() == []
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "validate",
+        "solve",
+        *(pytest.param(one, marks=pytest.mark.more) for one in [*COMMANDS] if one not in {"validate", "solve"}),
+    ],
+)
 def test_a_signal_at_the_start(name: str, saved: Path, tmp_path: Path) -> None:
     signum = random.Random(name).choice([signal.SIGINT, signal.SIGTERM])
     struck(name, signum, 0, saved, tmp_path / "run")

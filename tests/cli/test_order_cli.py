@@ -21,7 +21,7 @@ def test_the_command_line_knows_every_order() -> None:
     assert set(NAMES) == set(Order)
 
 
-@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+@pytest.mark.parametrize("runtime", ["simulator", pytest.param("processes", marks=pytest.mark.more)])
 def test_solve_in_an_order_by_name(four: Path, runtime: str) -> None:
     journal = four.parent / "run.jsonl"
     words = ["solve", four, "--json", "--runtime", runtime, "--seed", 5, "--journal", journal]

@@ -11,7 +11,6 @@ import io
 import json
 import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -38,8 +37,6 @@ EXAMPLE = ROOT / "docs" / "examples" / "breakout"
 GUIDE = (ROOT / "docs" / "tutorials" / "write-a-protocol.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 COMMANDS = [place for place, (kind, _) in enumerate(BLOCKS) if kind == "sh"]
-IN_A_PROCESS = next(place for place in COMMANDS if BLOCKS[place][1].startswith("robochoc "))
-"""The first call of the program; the others are made within this process."""
 INSTALL = "pip install docs/examples/breakout"
 SUFFIXES = {"python": ".py", "toml": ".toml"}
 LONG = "pytest tests/conformance/"
@@ -84,15 +81,6 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return environment(target, HYPOTHESIS_STORAGE_DIRECTORY=str(target / "hypothesis"))
 
 
-@pytest.fixture
-def found(installed: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """This process finds the guide's package too."""
-    target = installed["PYTHONPATH"].partition(os.pathsep)[0]
-    monkeypatch.syspath_prepend(target)
-    yield
-    forget_modules(Path(target))
-
-
 def forget_modules(folder: Path) -> None:
     """What was imported from there is imported anew, or not found, by whoever comes next."""
     for name, module in [*sys.modules.items()]:
@@ -103,10 +91,12 @@ def forget_modules(folder: Path) -> None:
 # The guide
 
 
-@pytest.mark.usefixtures("found")
 @pytest.mark.parametrize(
     "place",
-    [pytest.param(place, marks=pytest.mark.slow if BLOCKS[place][1].startswith(LONG) else ()) for place in COMMANDS],
+    [
+        pytest.param(place, marks=pytest.mark.slow if BLOCKS[place][1].startswith(LONG) else pytest.mark.more)
+        for place in COMMANDS
+    ],
     ids=lambda place: BLOCKS[place][1].splitlines()[0],
 )
 def test_the_guides_commands_do_what_it_says(place: int, installed: dict[str, str]) -> None:
@@ -115,9 +105,7 @@ def test_the_guides_commands_do_what_it_says(place: int, installed: dict[str, st
     for line in BLOCKS[place][1].splitlines():
         if line == INSTALL:
             continue
-        program, *words = shlex.split(line, comments=True)
-        within = program == "robochoc" and place != IN_A_PROCESS
-        done = robochoc_within(*words, folder=ROOT) if within else run(line, installed)
+        done = run(line, installed)
         said = re.search(r"# exit status (\d)$", line)
         assert done.returncode == int(said[1] if said else 0), done.stdout + done.stderr
         printed += done.stdout
@@ -178,10 +166,15 @@ def exported(form: str, journal: Path) -> str:
     return done.stdout
 
 
-@pytest.mark.usefixtures("found")
-def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(tmp_path: Path) -> None:
+def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(here: Path, tmp_path: Path) -> None:
+    module = "robochoc_breakout"
+    package(here, module, {"breakout": f"{module}:Breakout"}, (EXAMPLE / f"{module}.py").read_text())
     journal = tmp_path / "breakout.journal"
-    assert solved("--protocol", "breakout", "--runtime", "simulator", "--journal", str(journal)).returncode == 0
+    done = solved("--protocol", "breakout", "--runtime", "simulator", "--journal", str(journal))
+    assert done.returncode == 0
+    assert any(
+        _without_seconds(done.stdout).endswith(_without_seconds(text)) for kind, text in BLOCKS if kind == "text"
+    )
     ok, improve = "V1 = 1 in this wave", "I have 0 weighted violations, and could do with 0 less"
     rows = list(csv.DictReader(io.StringIO(exported("csv", journal))))
     assert {row["type"]: row["performative"] for row in rows} == {"Ok": "inform", "Improve": "propose"}
@@ -279,7 +272,7 @@ def test_a_module_that_cannot_be_imported_is_said_in_one_line(code: str, here: P
     assert done.returncode == 2
     assert f"{SCOUTS}: mine:Silent, installed as protocol 'own', cannot be imported: " in done.stderr
     assert len(done.stderr.splitlines()) == 1
-    assert solved().returncode == 0
+    assert solved("--runtime", "simulator").returncode == 0
 
 
 def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
@@ -327,12 +320,18 @@ def test_a_wrong_solution_is_refuted(runtime: str, here: Path) -> None:
     assert "the checker refutes the answer for scouts" in done.stderr
 
 
-def test_an_exception_is_told_with_its_place(tmp_path: Path) -> None:
-    package(tmp_path, "mine", {"own": "mine:Raises"})
-    solve = f"robochoc solve {SCOUTS} --protocol own"
-    done = run(solve, environment(tmp_path))
+def test_an_exception_is_told_with_its_place(here: Path) -> None:
+    package(here, "mine", {"own": "mine:Raises"})
+    done = solved("--protocol", "own")
     assert done.returncode == 4
     assert re.search(r"was lost: ValueError: out of ideas \(.*mine\.py:\d+\)", done.stderr)
-    done = run(f"{solve} --runtime simulator", environment(tmp_path))
+    with pytest.raises(ValueError, match="out of ideas"):
+        solved("--protocol", "own", "--runtime", "simulator")
+
+
+@pytest.mark.more
+def test_in_the_simulator_an_exception_is_told_with_its_traceback(tmp_path: Path) -> None:
+    package(tmp_path, "mine", {"own": "mine:Raises"})
+    done = run(f"robochoc solve {SCOUTS} --protocol own --runtime simulator", environment(tmp_path))
     assert "Traceback" in done.stderr
     assert "ValueError: out of ideas" in done.stderr

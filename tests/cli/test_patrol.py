@@ -16,7 +16,6 @@ from tests.support.program import ROOT
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
 PATROL = ROOT / "docs" / "examples" / "patrol"
-MINIMISING = [name for name in ANY_TEAM if protocol_named(name).traits.costs]
 BEST = {"lead": 3, "north": 2, "south": 1, "west": 2}
 
 
@@ -32,7 +31,7 @@ WITHOUT_ANSWER = {"async-maxsum", "bounded-maxsum"}
 
 def test_every_protocol_that_minimises_comes_to_the_tutorials_answer() -> None:
     with cases() as each:
-        for protocol in MINIMISING:
+        for protocol in (name for name in ANY_TEAM if protocol_named(name).traits.costs):
             with each(protocol):
                 outcome = solve(read_team(PATROL), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
                 if protocol in WITHOUT_ANSWER:

@@ -161,6 +161,8 @@ def test_other_packages_protocols_are_listed_beside_ours() -> None:
 
 @pytest.mark.usefixtures("package")
 def test_what_is_broken_is_shown_with_its_reason() -> None:
+    table, told = run(), objects(run("--json"))
+    assert table.exit_code == 0
     with cases() as each:
         for name, reason in [
             ("zz-gone", "no_such_module:Gone (package others-protocols 1.2) cannot be imported: ModuleNotFoundError"),
@@ -172,12 +174,10 @@ def test_what_is_broken_is_shown_with_its_reason() -> None:
             ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
         ]:
             with each(name):
-                table = run()
-                assert table.exit_code == 0
                 assert f"{name} " in table.stdout
                 assert "broken" in next(line for line in table.stdout.splitlines() if line.split()[:1] == [name])
                 assert reason in next(line for line in table.stdout.splitlines() if line.startswith(f"{name}: "))
-                assert reason.rpartition(")")[2].strip() in str(objects(run("--json"))[name]["broken"])
+                assert reason.rpartition(")")[2].strip() in str(told[name]["broken"])
                 asked = run(name)
                 assert asked.exit_code == 2
                 assert reason in asked.stderr

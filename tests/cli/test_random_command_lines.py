@@ -26,7 +26,6 @@ from tests.support.loose_problems import minimum_cost
 from tests.support.program import robochoc_within
 from tests.support.random_command_lines import FORMATS, ORDERS, any_team, assert_refused, by_the_time, endless, some
 
-AS_ARRAYS = [name for name in protocol_names() if protocol_named(name).traits.arrays]
 COUNTING = ("count-dpop", "list-dpop") * 3
 """They say more than others: how many optima there are, and which."""
 SEEDS = (0, 7, 2**32, 2**63, 2**64 - 1)
@@ -35,7 +34,9 @@ SETTINGS = ("cycles=3", "cycles=", "variant=B", "damping=0.5", "preference=inf",
 
 def command_line(folder: Path, chance: Random) -> list[str]:
     runtime = chance.choice(("simulator", "simulator", "simulator", "arrays"))
-    protocols = (*protocol_names(), "auto") if runtime == "simulator" or chance.random() < 0.2 else AS_ARRAYS
+    protocols: tuple[str, ...] = (*protocol_names(), "auto")
+    if runtime == "arrays" and chance.random() >= 0.2:
+        protocols = tuple(name for name in protocol_names() if protocol_named(name).traits.arrays)
     words = ["--runtime", runtime, *some(chance, 0.7, "--protocol", *protocols, *COUNTING)]
     words += some(chance, 0.5, "--order", *ORDERS)
     words += some(chance, 0.5, "--seed", *SEEDS)

@@ -23,11 +23,14 @@ from tests.support.problems import with_unique_definitions
 from tests.support.random_command_lines import TEAMS, some
 from tests.support.warm_programs import WarmPrograms
 
-PROTOCOLS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
-
 
 def command_line(team: Team, chance: Random) -> list[str]:
-    fit = [name for name in PROTOCOLS if protocol_named(name).traits.costs or team.kind is ProblemKind.DISCSP]
+    ours = {name: protocol_named(name) for name in protocol_names()}
+    fit = [
+        name
+        for name, one in ours.items()
+        if one.__module__.startswith("robochoc.") and (one.traits.costs or team.kind is ProblemKind.DISCSP)
+    ]
     words = some(chance, 0.8, "--protocol", *fit)
     words += some(chance, 0.5, "--deadline", 0.001, 0.05, 0.3)
     words += some(chance, 0.5 if "--deadline" in words else 0.03, "--improve", 0.001, 0.3)

@@ -90,8 +90,8 @@ def test_the_report_of_the_tutorial_is_what_is_printed() -> None:
 
 def test_the_scene_shows_the_robots_of_the_last_epoch(tmp_path: Path) -> None:
     html, journal, result = (tmp_path / name for name in ("page.html", "run.jsonl", "result.json"))
-    words = ("solve", RESCUE, "--protocol", "dynabt", "--json", "--html", html, "--journal", journal)
-    result.write_text(robochoc_within(*words).stdout)
+    words = ("solve", RESCUE, "--protocol", "dynabt", "--runtime", "simulator", "--json")
+    result.write_text(robochoc_within(*words, "--html", html, "--journal", journal).stdout)
     for saved in (journal, result):
         page = tmp_path / f"{saved.name}.html"
         assert robochoc_within("animate", saved, "--team", RESCUE, "-o", page).returncode == 0

@@ -78,7 +78,7 @@ Path({told!r} + ".part").rename({told!r})
 """
 
 
-@pytest.mark.parametrize("command", ["sniff", "solve"])
+@pytest.mark.parametrize("command", ["sniff", pytest.param("solve", marks=pytest.mark.more)])
 def test_no_process_shows_the_secret_address_to_others(
     command: str, teams: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,7 +133,10 @@ def test_a_file_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
         assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(("signum", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
+@pytest.mark.parametrize(
+    ("signum", "status"),
+    [(signal.SIGINT, 0), pytest.param(signal.SIGTERM, 128 + signal.SIGTERM, marks=pytest.mark.more)],
+)
 def test_a_journal_is_shown_until_a_signal(tmp_path: Path, signum: int, status: int) -> None:
     events, outcome = run_events()
     file = tmp_path / "run.journal"
@@ -150,7 +153,7 @@ def test_a_journal_is_shown_until_a_signal(tmp_path: Path, signum: int, status: 
 # robochoc solve --sniff
 
 
-@pytest.mark.parametrize("runtime", ["processes", "simulator"])
+@pytest.mark.parametrize("runtime", ["simulator", pytest.param("processes", marks=pytest.mark.more)])
 def test_a_run_is_shown_until_ctrl_c_and_its_result_is_told_before(teams: Path, tmp_path: Path, runtime: str) -> None:
     command = [PROGRAM, "solve", str(teams / "short"), "--runtime", runtime, "--withdraw", "--json", "--sniff"]
     with running(command, tmp_path / "run") as run:
@@ -165,6 +168,7 @@ def test_a_run_is_shown_until_ctrl_c_and_its_result_is_told_before(teams: Path, 
         assert run.status() == 0
 
 
+@pytest.mark.more
 @pytest.mark.parametrize(
     ("signum", "watched"),
     [
@@ -202,6 +206,7 @@ def robot_of(run: Run, viewer: int) -> int:
     return next(pid for pid in run.robots() if pid != viewer)
 
 
+@pytest.mark.more
 def test_a_run_goes_on_without_its_viewer_and_says_so(teams: Path, tmp_path: Path) -> None:
     with running(
         [PROGRAM, "solve", str(teams / "long"), *LONG, "--protocol", "abt", "--sniff"], tmp_path / "run"
@@ -216,6 +221,7 @@ def test_a_run_goes_on_without_its_viewer_and_says_so(teams: Path, tmp_path: Pat
         assert "the page is gone: its process ended during the run, which went on without it" in run.errors()
 
 
+@pytest.mark.more
 def test_a_page_outlives_a_run_that_has_failed(teams: Path, tmp_path: Path) -> None:
     with running(
         [PROGRAM, "solve", str(teams / "long"), *LONG, "--protocol", "abt", "--sniff"], tmp_path / "run"

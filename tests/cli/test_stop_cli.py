@@ -18,7 +18,8 @@ from tests.support.program import ROOT
 from tests.support.slot_sketches import slots
 
 
-@pytest.mark.parametrize("runtime", [pytest.param("simulator", marks=pytest.mark.slow), "processes"])
+@pytest.mark.more
+@pytest.mark.parametrize("runtime", ["simulator", "processes"])
 def test_that_it_tells_the_best_so_far(tmp_path: Path, runtime: str) -> None:
     team, journal = tmp_path / "team", tmp_path / "run.journal"
     model_of(slots(14, 14)).save(team)
@@ -41,7 +42,14 @@ def test_that_it_tells_the_best_so_far(tmp_path: Path, runtime: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("signum", "status"), [(STOP, 0), (signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)]
+    ("signum", "status"),
+    [
+        (STOP, 0),
+        *(
+            pytest.param(signum, status, marks=pytest.mark.more)
+            for signum, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9))
+        ),
+    ],
 )
 def test_while_better_answers_are_searched_for(tmp_path: Path, signum: signal.Signals, status: int) -> None:
     """Whatever ends the run then, no process and no half-written file is left."""

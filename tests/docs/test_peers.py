@@ -78,6 +78,7 @@ def test_nobody_is_left_behind(load: Any, tmp_path: Path) -> None:  # noqa: ANN4
     os.close(reader)
 
 
+@pytest.mark.more
 def test_a_run_is_cut_off_when_its_cpu_is_spent(load: Any) -> None:  # noqa: ANN401
     run = load("peer_runs").watched([sys.executable, "-c", "while True: pass"], 100, 1)
     assert run.status is None
@@ -154,6 +155,7 @@ def test_problems_are_written_for_all(load: Any, tmp_path: Path) -> None:  # noq
     assert {path.name for path in (tmp_path / "costs").iterdir()} == {"team", "frodo.xml", "pydcop.yaml"}
 
 
+@pytest.mark.more
 def test_a_contestant_solves(load: Any, tmp_path: Path) -> None:  # noqa: ANN401
     load("peer_problems").write_problem(coloring(3, 2, 2, conflicts="hard"), tmp_path / "triangle")
     one = load("contestants").robochoc("abt", "simulator")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,10 @@ from tests.support.program import ROOT
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-pytest.importorskip("material", reason="the extra docs is not installed: make docs")
+pytestmark = [
+    pytest.mark.more,
+    pytest.mark.skipif(find_spec("material") is None, reason="the extra docs is not installed: make docs"),
+]
 
 
 @pytest.fixture(scope="module")

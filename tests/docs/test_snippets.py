@@ -20,6 +20,26 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 ELSEWHERE = {"write-a-protocol.md": "tests/cli/test_own_protocol.py"}
 """Pages whose snippets another test runs."""
 HERE = [page for page in PAGES if page.name not in ELSEWHERE]
+WHOLE_PROGRAMS = {
+    "docs/index.md",
+    "docs/tutorials/fly.md",
+    "docs/tutorials/two-machines.md",
+    *(
+        f"docs/guides/{name}.md"
+        for name in (
+            "experiments",
+            "large-teams",
+            "losses",
+            "maps",
+            "ros",
+            "scene",
+            "several-machines",
+            "sniffer",
+            "verify",
+        )
+    ),
+}
+"""Pages whose commands start many processes or take more than a second."""
 LANGUAGES = {"sh", "console", "python", "text", "xml", "yaml", "toml", "json", "lisp", "bibtex", "make"}
 BROWSER = """\
 #!{python} -SE
@@ -84,7 +104,15 @@ def follow(page: Path, reader: Reader, *, slow: bool) -> None:
         reader.stop()
 
 
-@pytest.mark.parametrize("page", [page for page in HERE if has(page, slow=False)], ids=name_of)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.more if name_of(page) in WHOLE_PROGRAMS else ())
+        for page in HERE
+        if has(page, slow=False)
+    ],
+    ids=name_of,
+)
 def test_the_snippets_of_a_page_do_what_it_says(page: Path, reader_of: Reader) -> None:
     follow(page, reader_of, slow=False)
 

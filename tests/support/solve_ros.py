@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from click.testing import CliRunner, Result
 
@@ -44,3 +45,13 @@ def published(path: Path, topic: str, kind: str = "geometry_msgs/PoseStamped") -
             assert heard.fields["header"]["stamp"] == heard.at_ns
             found.append((heard.at_ns / 1e9, (at["x"], at["y"], at["z"])))
     return found
+
+
+def messages(path: Path) -> list[tuple[str, float, Any]]:
+    """Return topic, second and content of each message in a recording, as the reference reader of MCAP finds them."""
+    from mcap.reader import make_reader  # noqa: PLC0415 - heavy
+    from mcap_ros2.decoder import DecoderFactory  # noqa: PLC0415 - heavy
+
+    with path.open("rb") as stream:
+        read = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        return [(channel.topic, message.log_time / 1e9, decoded) for _, channel, message, decoded in read]

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-pytest.importorskip("matplotlib")
-
-from robochoc.experiments.axes import MOST_WAYS, styles_of
-from robochoc.experiments.figures import Drawing, Figures, figures_of, told_apart
 from tests.support.cases import cases
+
+if TYPE_CHECKING:
+    from robochoc.experiments.figures import Drawing, Figures
+
+
+def figures_of(rows: list[dict[str, Any]], over: str, metrics: list[str], **more: float) -> Figures:
+    """Return the figures of runs. Matplotlib is imported for these tests only."""
+    from robochoc.experiments import figures  # noqa: PLC0415 - heavy
+
+    return figures.figures_of(rows, over, metrics, **more)
 
 
 def row(label: str, problem: int, messages: float | None, status: str = "done", **more: object) -> dict[str, Any]:
@@ -51,6 +57,7 @@ def drawn(drawing: Drawing) -> Any:  # noqa: ANN401 - matplotlib's
 @pytest.fixture(scope="module", autouse=True)
 def _fonts() -> None:
     """Draw once: fonts that matplotlib has opened stay open."""
+    pytest.importorskip("matplotlib")
     drawn(figures_of(rows("n", [1, 2], ["a", "b"]), "n", ["messages"]).drawings[0])
 
 
@@ -98,6 +105,8 @@ def test_over_many_problems_nothing_is_drawn_but_profiles() -> None:
 
 def test_many_ways_to_run_are_told_apart() -> None:
     """Any two differ in two of colour, marker and dashes: in grey, too, and where marks or dashes are not seen."""
+    from robochoc.experiments.axes import MOST_WAYS, styles_of  # noqa: PLC0415 - heavy
+
     ways = [f"way {number}" for number in range(MOST_WAYS + 3)]
     styles = list(styles_of(ways).values())
     assert len(styles) == MOST_WAYS >= 24
@@ -259,4 +268,6 @@ def test_labels_are_written_as_they_are() -> None:
 
 
 def test_names_of_files_are_told_apart() -> None:
+    from robochoc.experiments.figures import told_apart  # noqa: PLC0415 - heavy
+
     assert told_apart(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]

@@ -20,7 +20,6 @@ import pytest
 from robochoc.experiments import statistics, summary
 from robochoc.experiments.account import Account
 from robochoc.experiments.duplicates import without_duplicates
-from robochoc.experiments.figures import figures_of
 from robochoc.experiments.ranking import answers
 from robochoc.experiments.results import Results
 from robochoc.experiments.statistics import Band, Comparison, median_ratio
@@ -166,6 +165,8 @@ def test_costs_over_messages() -> None:
 
 
 def test_shares_and_captions() -> None:
+    from robochoc.experiments.figures import figures_of  # noqa: PLC0415 - heavy
+
     drawings = {one.name: one for one in figures_of(study(), "size", ["messages"]).drawings}
     lines = drawings["solved-over-size"].drawn().axes[0].get_lines()
     assert [np.asarray(line.get_ydata()).round(6).tolist() for line in lines[:2]] == [

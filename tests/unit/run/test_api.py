@@ -197,6 +197,7 @@ def site(tmp_path: Path) -> Iterator[Deployment]:
         yield site
 
 
+@pytest.mark.more
 def test_figures_3_and_4(site: Deployment) -> None:
     files = site.folder / "files"
     write_team(PAIR, files)

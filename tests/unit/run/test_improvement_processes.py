@@ -68,7 +68,7 @@ class Killer(Told):
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_a_robot_that_dies_meanwhile_ends_the_run_or_leaves() -> None:
     """What was published stands; nothing is left (a fixture looks)."""
-    team = costly()
+    team = costly(4)
     options = Options(protocol="dsa", runtime=Runtime.PROCESSES, deadline=0.3, improve=600, settings=LONG)
     with pytest.raises(RobotsLostError, match=f"{team.order[2]} was lost"):
         solve(team, options, audience=Killer())

@@ -15,14 +15,14 @@ import pytest
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.model.team_edits import without_robots
 from robochoc.run import Options, Runtime, solve
 from tests.support.faults import PROGRAM, Run, running
 from tests.support.limits import HANG_S
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+pytestmark = [pytest.mark.more, pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")]
 
 TEAMS = {team.name: team for team in (queens3d(4), queens3d(5), queens3d(7))}
 LONGEST_S = {"queens3d-4": 0.3, "queens3d-5": 0.8, "queens3d-7": 0.8}
@@ -140,8 +140,3 @@ def test_a_spare_whose_file_is_gone_stays_out(folders: dict[str, Path], tmp_path
             assert "could not come back" in str(answer["reason"])
             return
     raise AssertionError("every run was over before the robot died")
-
-
-def test_an_outcome_without_losses_has_no_epochs() -> None:
-    outcome: Outcome = solve(TEAMS["queens3d-4"], Options(timeout=HANG_S))
-    assert outcome.epochs == ()

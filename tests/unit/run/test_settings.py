@@ -8,17 +8,16 @@ from robochoc.protocols.settings import MOST, SettingsError, settings_of
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.cases import cases
 
-NUMBERS = [
-    (name, field)
-    for name in protocol_names()
-    for field in protocol_named(name).settings.__struct_fields__
-    if isinstance(getattr(protocol_named(name).settings, field), int | float)
-]
-
 
 def test_no_number_is_beyond_the_limit() -> None:
+    numbers = [
+        (name, field)
+        for name in protocol_names()
+        for field in protocol_named(name).settings.__struct_fields__
+        if isinstance(getattr(protocol_named(name).settings, field), int | float)
+    ]
     with cases() as each:
-        for protocol, field in NUMBERS:
+        for protocol, field in numbers:
             with each((protocol, field)):
                 for value in (str(MOST + 1), "9" * 60, str(-MOST - 1), "1e400", "nan"):
                     with pytest.raises(SettingsError, match=field):

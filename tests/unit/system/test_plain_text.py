@@ -9,12 +9,9 @@ import pytest
 
 from robochoc.cli.commands.directory import _print_table
 from robochoc.cli.reports.failures import LOST, Failure
-from robochoc.communication.network.control_messages import Joined, Leave
-from robochoc.communication.network.refusals import Refusals
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.system.plain_text import LONGEST, LONGEST_REASON, on_one_line
 from tests.support.cases import cases
-from tests.support.lone_robot import played
 
 HOSTILE = {
     "\x1b[2J\x1b[H": r"\x1b[2J\x1b[H",
@@ -60,12 +57,17 @@ def is_plain(text: str, at_most: int) -> bool:
 
 
 def test_what_the_master_says_reaches_the_robots_owner_plain() -> None:
+    from robochoc.communication.network.control_messages import Joined, Leave  # noqa: PLC0415 - heavy
+    from tests.support.lone_robot import played  # noqa: PLC0415 - heavy
+
     ending, _ = played(lambda _post, word: [Leave(HUGE[:1_000_000], failed=True)] if isinstance(word, Joined) else [])
     assert ending.why.startswith(r"\x1b[2J\u202e")
     assert is_plain(ending.why, 11 * LONGEST_REASON)
 
 
 def test_what_is_refused_is_plain() -> None:
+    from robochoc.communication.network.refusals import Refusals  # noqa: PLC0415 - heavy
+
     told: list[str] = []
     refusals = Refusals(lambda *words: told.extend(words))
     for text in (*HOSTILE, HUGE):
