@@ -194,23 +194,12 @@ def test_what_is_lost_depends_on_where_robots_are(tmp_path: Path) -> None:
     assert "--channel radio: positions: there is no robot Bose (did you mean 'Base'?)" in refused.stderr
 
 
-def test_wrong_usage_and_bad_files_are_told() -> None:
-    with cases() as each:
-        for words, status, message in [
-            (("--channel", "wlan"), 2, "add --runtime simulator"),
-            (("--channel", "wlan", "--runtime", "simulator", "--delay", "5"), 2, "drop --delay"),
-            (("--channel", "wlan", "--runtime", "simulator", "--schedule", "random"), 2, "drop --delay and --schedule"),
-            (("--channel", "wlam", "--runtime", "simulator"), 2, "did you mean 'wlan'?"),
-            (("--channel", "", "--runtime", "simulator"), 2, "channels: wlan"),
-            (("--channel", "wlan", "--runtime", "simulator", "--protocol", "central"), 2, "not for --protocol central"),
-            (("--channel", ROOT / "README.md", "--runtime", "simulator"), 1, "is not a valid TOML file"),
-            (("--channel", ROOT, "--runtime", "simulator"), 1, "is no file"),
-        ]:
-            with each(words):
-                done = robochoc_within("solve", ROOT / "docs" / "examples" / "scouts", *words)
-                assert done.returncode == status
-                assert message in done.stderr
-                assert not done.stdout
+def test_a_channel_that_is_no_file_of_a_channel_is_told() -> None:
+    for path, message in ((ROOT / "README.md", "is not a valid TOML file"), (ROOT, "is no file")):
+        words = ("--runtime", "simulator", "--channel", path)
+        done = robochoc_within("solve", ROOT / "docs" / "examples" / "scouts", *words)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert message in done.stderr
 
 
 def test_an_unknown_field_has_its_line_and_the_nearest_name(tmp_path: Path) -> None:

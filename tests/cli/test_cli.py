@@ -208,38 +208,6 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     assert json.loads(done.stdout)["verdict"] == "unknown"
 
 
-def test_wrong_usage_is_status_2(four: Path) -> None:
-    with cases() as each:
-        for words, said in [
-            (["--protocol", "abtt"], "no protocol 'abtt' is installed; did you mean 'abt'"),
-            (["--protocol", "qqq"], "no protocol 'qqq' is installed; 'robochoc protocols' lists them"),
-            (["--runtime", "threads"], "threads"),
-            (["--seed", "-1"], "--seed"),
-            (["--timeout", "0"], "--timeout"),
-            (["--withdraw=most"], "minimum"),
-            (["--set", "cycles"], "NAME=VALUE"),
-            (["--protocol", "abt", "--set", "cycles=5"], "no setting"),
-            (["--protocol", "dsa", "--set", "cycles=0"], "cycles"),
-            (["--protocol", "dsa", "--set", "cycles=many"], "cycles"),
-            (["--protocol", "dsa", "--set", "circles=5"], "cycles"),
-            (["--protocol", "dsa", "--withdraw"], "proves nothing"),
-            (["--protocol", "central", "--set", "cycles=5"], "--set"),
-            (["--explain", "--json"], "--explain"),
-            (["--nonsense"], "--nonsense"),
-            (["--timeout", "nan"], "--timeout"),
-            (["--html", ""], "--html"),
-            (["--html", "x", "--journal", "./x"], "are one place"),
-            ([""], "empty"),
-            (["--delay", "3"], "--runtime simulator"),
-            (["--schedule", "random"], "--runtime simulator"),
-            (["--runtime", "simulator", "--schedule", "random", "--delay", "3"], "--schedule concurrent"),
-        ]:
-            with each(words):
-                done = robochoc_within("solve", four, *words)
-                assert done.returncode == 2
-                assert said in done.stderr
-
-
 def test_a_process_ends_with_the_status_of_its_command(four: Path) -> None:
     """Most tests run commands within their own process; those that end with 4, and by signals, are elsewhere."""
     for status, words in (
@@ -265,13 +233,6 @@ def test_a_command_that_there_is_not_is_status_2() -> None:
     ):
         done = robochoc_within(word)
         assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"Error: {said}")
-
-
-def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
-    done = robochoc_within("solve", "instances/", "--html", tmp_path / "page.html", folder=ROOT)
-    assert done.returncode == 2
-    assert "2 were found" in done.stderr
-    assert not (tmp_path / "page.html").exists()
 
 
 def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) -> None:

@@ -134,19 +134,6 @@ def test_nothing_is_done_by_half_where_a_path_is_wrong(four: Path, tmp_path: Pat
         ]
 
 
-def test_a_misspelt_value_of_an_option_that_may_stand_alone(four: Path) -> None:
-    for words, said in [
-        (["--withdraw", "minimal"], "'minimal' is no kind of withdrawal and no folder: minimum or maximal"),
-        (["--withdraw", "maximla"], "'maximla' is no kind of withdrawal and no folder: minimum or maximal"),
-        (["--spare", "two"], "'two' is no number of robots and no folder"),
-        (["--sniff", "Robto1.*"], "no robot of queens3d-4 is called 'Robto1.*'"),
-        (["--sniff=Robot1.1,Nobody"], "no robot of queens3d-4 is called 'Nobody'"),
-    ]:
-        status, told = line("solve", four, *words)
-        assert status == 2
-        assert said in " ".join(told.split())
-
-
 def test_nothing_that_is_read_is_written_over(four: Path, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_bytes(json.dumps(RESULT).encode())

@@ -204,8 +204,7 @@ def test_solve_says_in_words_which_limit_was_reached(rows: Path) -> None:
 
 def test_limits_that_are_none_are_wrong_usage() -> None:
     for words in ("--local-solutions=0", "--local-timeout=0", "--local-timeout=nan", "--local-timeout=-1"):
-        for command in ("compile", "solve"):
-            assert robochoc_within(command, words, SMALL_QUEENS).returncode == 2, (command, words)
+        assert robochoc_within("compile", words, SMALL_QUEENS).returncode == 2, words
 
 
 # Verdicts
@@ -257,18 +256,6 @@ def test_rows_have_the_solutions_that_cells_have(rows: Path) -> None:
     answer = answered("solve", rows)
     assert (answer["verdict"], answer["verified"]) == ("solution", True)
     assert not list(violations(read_team(QUEENS), answer["assignment"]))
-
-
-def test_what_would_be_ignored_is_wrong_usage(tmp_path: Path) -> None:
-    for words in [
-        ["--protocol", "abt", "--count"],
-        ["--protocol", "central", "--verify"],
-        ["--protocol", "central", "--withdraw", "maximal"],
-        ["--protocol", "central", "--count", "--html", "page.html"],
-    ]:
-        done = robochoc_within("solve", SMALL_QUEENS, *words, folder=tmp_path)
-        assert (done.returncode, done.stdout) == (2, "")
-        assert next(word for word in reversed(words) if word.startswith("--")) in done.stderr
 
 
 # Export, and what is broken

@@ -79,21 +79,14 @@ def test_help_on_robochoc_names_every_command() -> None:
 
 
 def test_a_protocol_is_known_in_any_case(four: Path) -> None:
-    for typed, name in [("ABT", "abt"), ("AFC-ng", "afc-ng"), ("Central", "central"), ("?", "?")]:
+    for typed, name in [("ABT", "abt"), ("AFC-ng", "afc-ng"), ("Central", "central")]:
         assert installed_spelling(typed) == name
-        done = robochoc_within("solve", str(four), "--runtime", "simulator", "--protocol", typed)
-        assert done.returncode == (2 if name == "?" else 0)
-        assert name in (done.stderr if name == "?" else done.stdout)
-
-
-def test_a_protocol_is_known_in_any_case_from_python(four: Path) -> None:
+        done = robochoc_within("solve", four, "--runtime", "simulator", "--protocol", typed)
+        assert (done.returncode, name in done.stdout) == (0, True)
+    assert installed_spelling("?") == "?"
     assert load(four).solve("DisFC", "simulator").protocol == "disfc"
 
 
 def test_the_minimum_withdrawal_has_its_former_name_too(four: Path) -> None:
-    for word in ["minimum", "fewest", "", "Fewest"]:
-        option = f"--withdraw={word}" if word else "--withdraw"
-        done = robochoc_within("solve", str(four), "--runtime", "simulator", option)
-        assert done.returncode == (2 if word == "Fewest" else 0)
-        if word == "Fewest":
-            assert "minimum" in done.stderr
+    for option in ("--withdraw=minimum", "--withdraw=fewest", "--withdraw"):
+        assert robochoc_within("solve", four, "--runtime", "simulator", option).returncode == 0

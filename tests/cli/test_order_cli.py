@@ -88,18 +88,6 @@ def test_what_is_no_text_is_no_order(tmp_path: Path, content: bytes | None, said
         read_order(listed, graph_team(["AB"]))
 
 
-def test_wrong_orders_are_wrong_usage(four: Path) -> None:
-    for words, said in [
-        (["--order", "max-degre"], "did you mean 'max-degree'"),
-        (["--order", "no/such/file"], "no order and no file"),
-        (["--order", ""], "no order"),
-        (["--order", "dfs", "--protocol", "central"], "--protocol central"),
-    ]:
-        done = robochoc_within("solve", four, *words)
-        assert done.returncode == 2
-        assert said in done.stderr
-
-
 def test_links_that_cannot_be_turned_are_said_in_one_sentence(tmp_path: Path) -> None:
     write_team(pkc_team(), tmp_path / "private")
     listed = tmp_path / "order.txt"

@@ -246,18 +246,6 @@ def test_an_invalid_team_has_no_page(tmp_path: Path) -> None:
     assert "http://" not in done.stderr
 
 
-def test_what_does_not_go_together_is_wrong_usage(teams: Path) -> None:
-    for words, said in [
-        (["{teams}", "--sniff"], "for one team; 2 were found"),
-        (["{teams}/short", "--sniff", "--serve"], "both stay until Ctrl-C"),
-        (["{teams}/short", "--open"], "--open is for the page of --sniff"),
-        (["{teams}/short", "--sniff", "--protocol", "central", "--count"], "--count gives only a number"),
-    ]:
-        done = robochoc_within("solve", *(word.format(teams=teams) for word in words))
-        assert done.returncode == 2
-        assert said in " ".join(done.stderr.split())
-
-
 def test_patterns_may_be_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     for words, sniff in [
         (["team", "--sniff"], ""),

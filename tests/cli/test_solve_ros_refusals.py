@@ -11,8 +11,7 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.ros.recordings.mcap_file import McapSink
-from tests.support.cases import cases
-from tests.support.solve_ros import HANGAR, SCOUTS, ran, solved
+from tests.support.solve_ros import HANGAR, ran, solved
 
 
 def test_a_run_that_fails_leaves_the_file_as_it_was(tmp_path: Path) -> None:
@@ -56,59 +55,6 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert "has a topic to publish its waypoints on" in result.stderr
     assert not (tmp_path / "run.mcap").exists()
-
-
-def test_what_does_not_go_together(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    with cases() as each:
-        for words, said in [
-            (("--situation", "flight", "--withdraw"), "--withdraw is for problems that do not change"),
-            (("--situation", "flight", "--runtime", "network"), "--runtime network is for problems that do not change"),
-            (
-                ("--situation", "flight", "--protocol", "central"),
-                "--protocol central is for problems that do not change",
-            ),
-            (("--ros", "mcap:a.mcap", "--count", "--protocol", "central"), "--count gives only a number"),
-            (("--obstacle", "1,1,1"), "--obstacle is for the simulated flight"),
-            (("--fail", "Fin"), "--fail is for the simulated flight"),
-            (("--wind", "1,1,1", "--situation", "mcap:a"), "--wind is for the simulated flight"),
-            (("--distance", "1"), "--distance is for the simulated flight"),
-            (("--improve", "1"), "--improve goes on after --deadline SECONDS"),
-            (("--improve", "1", "--deadline", "1", "--protocol", "central"), "--deadline is for robots"),
-            (("--downwash", "2"), "--downwash is for the simulated flight"),
-            (("--situation", "flight", "--downwash", "2", "--fail", "Fin"), "with downwash neither motors can fail"),
-            (("--patience", "1", "--runtime", "simulator"), "--patience is for robots with processes"),
-            (("--patience", "1", "--protocol", "central"), "--patience is for robots with processes"),
-            (("--patience", "0"), "--patience"),
-            (("--battery", "0.1", "--situation", "flight"), "--battery is for robots that report"),
-            (("--frame", "hall"), "--frame is for what is published"),
-            (("--scale", "2"), "--scale is for what is published"),
-            (("--ros", "mcap:a", "--situation", "mcap:a"), "--situation mcap:a and --ros mcap:a are one place"),
-            (("--ros", "mcap:a", "--ros", "mcap:a"), "mcap:a is given twice"),
-            (("--ros", "mcap:a.mcap", "--ros", "./a.mcap"), "--ros mcap:a.mcap and --ros ./a.mcap are one place"),
-            (("--ros", "a.mcap", "--ros", "rosbag:a.mcap"), "--ros a.mcap and --ros rosbag:a.mcap are one place"),
-            (("--ros", "mcap:a", "--journal", "a"), "--journal a and --ros mcap:a are one place"),
-            (("--ros", "mcap:a", "--html", "a"), "--html a and --ros mcap:a are one place"),
-            (("--situation", "flight", "--wind", "1e9"), "is faster than 200 m/s"),
-            (("--situation", "flight", "--gusts", "1e9"), "gusts have to be a number from 0 to 200 m/s"),
-            (("--scale", "1e300", "--ros", "mcap:a"), "--scale"),
-            (("--situation", "flight", "--fail", "Wing"), "no drone 'Wing' that could fail"),
-            (("--situation", "flight", "--fail", "Fin@soon"), "is not ROBOT or ROBOT@SECONDS"),
-            (("--situation", "flight", "--obstacle", "1,2"), "is not three numbers"),
-            (("--situation", "flight", "--obstacle", "1,2,nan"), "is not three numbers"),
-            (("--scale", "nan", "--ros", "mcap:a"), "--scale"),
-            (("--scale", "inf", "--ros", "mcap:a"), "--scale"),
-            (("--battery", "nan", "--situation", "mcap:a"), "--battery"),
-            (("--patience", "nan"), "--patience"),
-            (("--report-timeout", "nan", "--situation", "mcap:a"), "--report-timeout"),
-            (("--report-timeout", "1"), "--report-timeout is for robots that report"),
-            ((str(SCOUTS), "--ros", "mcap:a"), "--ros and --situation are for one team; 2 were found"),
-        ]:
-            with each(words):
-                monkeypatch.chdir(tmp_path)
-                result = ran("solve", HANGAR, *words)
-                assert result.exit_code == 2, result.output
-                assert said in " ".join(result.stderr.split())
-                assert not list(tmp_path.iterdir())
 
 
 def test_a_live_place_is_published_to_and_listened_to(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,10 +105,3 @@ def test_a_result_that_is_flown_is_not_written_over(tmp_path: Path) -> None:
     windy = ran("fly", result, "--wind", "1e9")
     assert windy.exit_code == 2
     assert "is faster than 200 m/s" in windy.stderr
-
-
-def test_a_frame_has_a_name(tmp_path: Path) -> None:
-    for frame in ["", "two words", "a\nb"]:
-        result = ran("solve", HANGAR, "--ros", f"mcap:{tmp_path / 'run.mcap'}", "--frame", frame)
-        assert result.exit_code == 2
-        assert "is no name of a frame, such as map" in result.stderr

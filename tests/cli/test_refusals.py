@@ -1,0 +1,138 @@
+"""Wrong usage of `robochoc solve`: status 2 and a message, and nothing is done, printed or written."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from tests.support.cases import cases
+from tests.support.program import ROOT, robochoc_within
+
+EXAMPLES = ROOT / "docs" / "examples"
+REFUSED = {
+    ROOT / "instances" / "queens3d-4": [
+        ("--protocol abtt", "no protocol 'abtt' is installed; did you mean 'abt'"),
+        ("--protocol qqq", "no protocol 'qqq' is installed; 'robochoc protocols' lists them"),
+        ("--runtime threads", "threads"),
+        ("--seed -1", "--seed"),
+        ("--timeout 0", "--timeout"),
+        ("--withdraw=most", "minimum"),
+        ("--set cycles", "NAME=VALUE"),
+        ("--protocol abt --set cycles=5", "no setting"),
+        ("--protocol dsa --set cycles=0", "cycles"),
+        ("--protocol dsa --set cycles=many", "cycles"),
+        ("--protocol dsa --set circles=5", "cycles"),
+        ("--protocol dsa --withdraw", "proves nothing"),
+        ("--protocol central --set cycles=5", "--set"),
+        ("--explain --json", "--explain"),
+        ("--nonsense", "--nonsense"),
+        ("--timeout nan", "--timeout"),
+        ("--html ''", "--html"),
+        ("--html x --journal ./x", "are one place"),
+        ("''", "empty"),
+        ("--delay 3", "--runtime simulator"),
+        ("--schedule random", "--runtime simulator"),
+        ("--runtime simulator --schedule random --delay 3", "--schedule concurrent"),
+        ("--withdraw minimal", "'minimal' is no kind of withdrawal and no folder: minimum or maximal"),
+        ("--withdraw maximla", "'maximla' is no kind of withdrawal and no folder: minimum or maximal"),
+        ("--spare two", "'two' is no number of robots and no folder"),
+        ("--sniff 'Robto1.*'", "no robot of queens3d-4 is called 'Robto1.*'"),
+        ("--sniff=Robot1.1,Nobody", "no robot of queens3d-4 is called 'Nobody'"),
+        ("--order max-degre", "did you mean 'max-degree'"),
+        ("--order no/such/file", "no order and no file"),
+        ("--order ''", "no order"),
+        ("--order dfs --protocol central", "--protocol central"),
+        ("--protocol abt --count", "--count"),
+        ("--protocol central --verify", "--verify"),
+        ("--protocol central --withdraw maximal", "--withdraw"),
+        ("--protocol central --count --html page.html", "--html"),
+        ("--local-solutions=0", "--local-solutions"),
+        ("--local-timeout=0", "--local-timeout"),
+        ("--local-timeout=nan", "--local-timeout"),
+        ("--local-timeout=-1", "--local-timeout"),
+        ("--sniff --serve", "both stay until Ctrl-C"),
+        ("--open", "--open is for the page of --sniff"),
+        ("--sniff --protocol central --count", "--count gives only a number"),
+        ("--withdraw=Fewest", "minimum"),
+        ("--protocol '?'", "'?'"),
+    ],
+    EXAMPLES / "scouts": [
+        ("--channel wlan", "add --runtime simulator"),
+        ("--channel wlan --runtime simulator --delay 5", "drop --delay"),
+        ("--channel wlan --runtime simulator --schedule random", "drop --delay and --schedule"),
+        ("--channel wlam --runtime simulator", "did you mean 'wlan'?"),
+        ("--channel '' --runtime simulator", "channels: wlan"),
+        ("--channel wlan --runtime simulator --protocol central", "not for --protocol central"),
+    ],
+    EXAMPLES / "hangar": [
+        ("--situation flight --withdraw", "--withdraw is for problems that do not change"),
+        ("--situation flight --runtime network", "--runtime network is for problems that do not change"),
+        ("--situation flight --protocol central", "--protocol central is for problems that do not change"),
+        ("--ros mcap:a.mcap --count --protocol central", "--count gives only a number"),
+        ("--obstacle 1,1,1", "--obstacle is for the simulated flight"),
+        ("--fail Fin", "--fail is for the simulated flight"),
+        ("--wind 1,1,1 --situation mcap:a", "--wind is for the simulated flight"),
+        ("--distance 1", "--distance is for the simulated flight"),
+        ("--improve 1", "--improve goes on after --deadline SECONDS"),
+        ("--improve 1 --deadline 1 --protocol central", "--deadline is for robots"),
+        ("--downwash 2", "--downwash is for the simulated flight"),
+        ("--situation flight --downwash 2 --fail Fin", "with downwash neither motors can fail"),
+        ("--patience 1 --runtime simulator", "--patience is for robots with processes"),
+        ("--patience 1 --protocol central", "--patience is for robots with processes"),
+        ("--patience 0", "--patience"),
+        ("--battery 0.1 --situation flight", "--battery is for robots that report"),
+        ("--frame hall", "--frame is for what is published"),
+        ("--scale 2", "--scale is for what is published"),
+        ("--ros mcap:a --situation mcap:a", "--situation mcap:a and --ros mcap:a are one place"),
+        ("--ros mcap:a --ros mcap:a", "mcap:a is given twice"),
+        ("--ros mcap:a.mcap --ros ./a.mcap", "--ros mcap:a.mcap and --ros ./a.mcap are one place"),
+        ("--ros a.mcap --ros rosbag:a.mcap", "--ros a.mcap and --ros rosbag:a.mcap are one place"),
+        ("--ros mcap:a --journal a", "--journal a and --ros mcap:a are one place"),
+        ("--ros mcap:a --html a", "--html a and --ros mcap:a are one place"),
+        ("--situation flight --wind 1e9", "is faster than 200 m/s"),
+        ("--situation flight --gusts 1e9", "gusts have to be a number from 0 to 200 m/s"),
+        ("--scale 1e300 --ros mcap:a", "--scale"),
+        ("--situation flight --fail Wing", "no drone 'Wing' that could fail"),
+        ("--situation flight --fail Fin@soon", "is not ROBOT or ROBOT@SECONDS"),
+        ("--situation flight --obstacle 1,2", "is not three numbers"),
+        ("--situation flight --obstacle 1,2,nan", "is not three numbers"),
+        ("--scale nan --ros mcap:a", "--scale"),
+        ("--scale inf --ros mcap:a", "--scale"),
+        ("--battery nan --situation mcap:a", "--battery"),
+        ("--patience nan", "--patience"),
+        ("--report-timeout nan --situation mcap:a", "--report-timeout"),
+        ("--report-timeout 1", "--report-timeout is for robots that report"),
+        ("--situation flight --wind strong", "'strong' is no speed such as 3, nor three numbers"),
+        ("--situation flite", "rospy; did you mean 'flight'?"),
+        ("--seed x", "'x' is no whole number of at least 0"),
+        ("--message-loss 3", "'3' is no number from 0 to 0.9"),
+        ("--deadline 0", "'0' is no number greater than 0"),
+        ("--ros mcap:run.mcap --frame ''", "is no name of a frame, such as map"),
+        ("--ros mcap:run.mcap --frame 'two words'", "is no name of a frame, such as map"),
+        ("--ros mcap:run.mcap --frame 'a\nb'", "is no name of a frame, such as map"),
+    ],
+    EXAMPLES / "rescue": [
+        ("--withdraw", "--withdraw is for problems that do not change"),
+        ("--protocol central --count", "--count is for problems that do not change"),
+    ],
+    ROOT / "instances": [
+        ("--sniff", "for one team; 2 were found"),
+        ("--html page.html", "2 were found"),
+        ("--ros mcap:a", "--ros and --situation are for one team; 2 were found"),
+    ],
+}
+"""By team: further words of the command line, and a part of the message."""
+
+
+@pytest.mark.usefixtures("in_a_folder")
+def test_wrong_usage_is_status_2(tmp_path: Path) -> None:
+    with cases() as each:
+        for team, rows in REFUSED.items():
+            for words, said in rows:
+                with each(f"{team.name} {words}"):
+                    done = robochoc_within("solve", team, *shlex.split(words))
+                    assert (done.returncode, done.stdout) == (2, "")
+                    assert said in " ".join(done.stderr.split())
+                    assert not list(tmp_path.iterdir())
