@@ -10,19 +10,12 @@ import pytest
 import robochoc
 from robochoc.cli.reports.choice import LONG_S, OrderNote
 from robochoc.communication.run_result import Progress
-from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.orders import Order
 from robochoc.run import Options, Withdrawal
 from tests.support.program import ROOT, robochoc_within
 
 PATROL = ROOT / "docs" / "examples" / "patrol"
-
-
-@pytest.fixture
-def four(tmp_path: Path) -> Path:
-    write_team(queens3d(4), tmp_path / "four")
-    return tmp_path / "four"
 
 
 def test_what_was_chosen_is_said_with_the_reason_and_more_on_request(four: Path) -> None:

@@ -29,6 +29,7 @@ WITHOUT_DOCSTRING = """
     from robochoc.protocols.satisfaction.first_fit import FirstFit
     from robochoc.protocols.satisfaction.messages.first_fit import Placed
     from robochoc.protocols.dynamic import DynamicProtocol
+    from robochoc.protocols.protocol import Protocol
     from robochoc.protocols.traits import Traits
 
     class Other(FirstFit, DynamicProtocol):
@@ -48,6 +49,14 @@ WITHOUT_DOCSTRING = """
     class Odd(FirstFit):
         traits = "none"
 
+    class Mute(Protocol):
+        def start(self): pass
+        def receive(self, sender, message): pass
+
+    class Half(Protocol):
+        messages = Placed
+        def start(self): pass
+
     NUMBER = 3
 """
 
@@ -66,6 +75,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "zz-odd": "others:Odd",
         "zz-static": "others:Static",
         "zz-number": "others:NUMBER",
+        "zz-mute": "others:Mute",
+        "zz-half": "others:Half",
         "zz-gone": "no_such_module:Gone",
         "zz-without": "others:Without",
         "zz-leaving": "leaving:Leaving",
@@ -165,8 +176,18 @@ def test_what_is_broken_is_shown_with_its_reason() -> None:
     assert table.exit_code == 0
     with cases() as each:
         for name, reason in [
-            ("zz-gone", "no_such_module:Gone (package others-protocols 1.2) cannot be imported: ModuleNotFoundError"),
-            ("zz-without", "others:Without (package others-protocols 1.2) cannot be imported: AttributeError"),
+            (
+                "zz-gone",
+                "no_such_module:Gone (package others-protocols 1.2) cannot be imported: "
+                 "ModuleNotFoundError: No module named 'no_such_module'",
+            ),
+            (
+                "zz-without",
+                "others:Without (package others-protocols 1.2) cannot be imported: "
+                 "AttributeError: module 'others' has no attribute 'Without'",
+            ),
+            ("zz-mute", "does not declare its messages"),
+            ("zz-half", "does not define receive"),
             ("zz-leaving", "cannot be imported: SystemExit: 3"),
             ("zz-garbled", "cannot be imported: SyntaxError"),
             ("zz-number", "is no subclass of Protocol"),
@@ -182,7 +203,7 @@ def test_what_is_broken_is_shown_with_its_reason() -> None:
                 assert asked.exit_code == 2
                 assert reason in asked.stderr
                 assert len(asked.stderr.splitlines()) == 1
-                with pytest.raises(UnknownProtocolError, match=name):
+                with pytest.raises(UnknownProtocolError, match=f"installed as protocol '{name}', "):
                     protocol_named(name)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import doctest
 import subprocess
 import sys
-from collections.abc import Iterator
 from decimal import Decimal
 from pathlib import Path
 from types import ModuleType
@@ -189,12 +188,6 @@ container.set_main_container("{place}")
 for name, ending in container.run().items():
     print(name, ending.why, ending.assignment)
 """
-
-
-@pytest.fixture
-def site(tmp_path: Path) -> Iterator[Deployment]:
-    with Deployment(tmp_path) as site:
-        yield site
 
 
 @pytest.mark.more

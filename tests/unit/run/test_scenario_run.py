@@ -1,4 +1,7 @@
-"""A team on its way through events and losses, with a session that does as it is told."""
+"""A team on its way through events and losses: who comes back is as its file and the scenario say.
+
+The session is made up.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from robochoc.communication.run_result import RunResult
-from robochoc.communication.session import Epoch, Session
+import pytest
+
+from robochoc.communication.session import Epoch
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.formats import read_team, write_team
-from robochoc.model.change import apply_changes
-from robochoc.model.outcome import Metrics, Verdict
+from robochoc.formats import PREDEFINED, read_team, write_team
+from robochoc.model.change import apply_changes, team_after_events
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -31,140 +35,147 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.model.team_edits import without_robots
 from robochoc.protocols.satisfaction.dynabt import DynABT
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import invalidated_by
+from tests.support.losing import Losing
 from tests.support.problems import team_of
-from tests.support.small_teams import differ
+from tests.support.small_teams import differ, named_constraint, newcomer, triangle
 
-BASE = team_of(dict.fromkeys("ABC", range(1, 4)), [differ("A", "B"), differ("B", "C")])
-DONE = RunResult(Verdict.SOLUTION, None, {}, Metrics({"Ok": 7}))
-
-
-class Scripted(Session):
-    """Ends each search as it was told to, and notes what it is given."""
-
-    def __init__(self, team: Team, *results: RunResult) -> None:
-        super().__init__(team)
-        self.results = list(results)
-        self.epochs: list[Epoch] = []
-        self.limits: list[int | None] = []
-
-    @property
-    def lossless(self) -> bool:
-        return True
-
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        assert timeout is None
-        self.limits.append(messages)
-        return self.results.pop(0) if self.results else DONE
-
-    def change(self, epoch: Epoch) -> None:
-        self.compiled = epoch.compiled
-        self.epochs.append(epoch)
-
-    def close(self) -> None:
-        """Nothing to close."""
+CHANGES: list[Change] = [
+    RemoveConstraint("RC", "RB", "C"),
+    RemoveValue("C", 1),
+    AddValue("C", 7),
+    AddConstraint("RC", "RB", named_constraint("N", "B", "C")),
+    AddConstraint("RD", "RC", named_constraint("M", "C", "D")),
+]
 
 
-def losing(*names: str) -> RunResult:
-    return replace(DONE, verdict=Verdict.UNKNOWN, lost=dict.fromkeys(names, "it was hit by a meteor"))
+@pytest.fixture
+def team(tmp_path: Path) -> Team:
+    """Four robots, with files that can be read again."""
+    write_team(triangle(), tmp_path / "team")
+    return read_team(tmp_path / "team")
 
 
 def event(*changes: Change) -> ScenarioEvent:
     return ScenarioEvent(changes)
 
 
-def journey_of(team: Team, *, spares: int = 0, messages: int | None = None) -> ScenarioRun:
-    return ScenarioRun(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
+def travel(
+    team: Team, losses: Sequence[str], *, spares: int = 0, messages: int | None = None
+) -> tuple[ScenarioRun, Losing, list[FinishedEpoch]]:
+    journey = ScenarioRun(team, None, CompiledTeam, lambda: None, messages=messages, spares=spares)
+    session = Losing(journey.team, losses)
+    return journey, session, list(journey.epochs(session, lambda _: None))
 
 
-def travel(journey: ScenarioRun, session: Scripted) -> list[FinishedEpoch]:
-    return list(journey.epochs(session, lambda _: None))
-
-
-def teams(played: Sequence[FinishedEpoch]) -> list[tuple[str, ...]]:
-    return [one.team.order for one in played]
-
-
-def newcomer(name: str, *parents: str) -> Robot:
-    own = name[1:]
-    domain = Domain("D", (range(1, 4),))
-    links = tuple(Parent(parent, (differ(parent[1:], own),)) for parent in parents)
-    return Robot(name, (Variable(own, domain),), parents=links)
-
-
-def on_disk(team: Team, folder: Path) -> Team:
-    """The team with files that can be read again."""
-    write_team(replace(team, scenario=()), folder)
-    return replace(read_team(folder), scenario=team.scenario)
-
-
-def test_a_lost_robot_leaves_and_the_others_go_on() -> None:
-    journey, session = journey_of(BASE), Scripted(BASE, losing("RB"))
-    assert teams(travel(journey, session)) == [("RA", "RB", "RC"), ("RA", "RC")]
+def test_who_is_lost_leaves_and_the_others_go_on(team: Team) -> None:
+    journey, session, played = travel(team, ["RB"])
+    assert [one.team for one in played] == [team, without_robots(team, ["RB"])]
     assert journey.withdrawn == ["RB"]
+    assert session.epochs[0].restarted == frozenset()
     assert "RB" in session.epochs[0].invalidated.agents
 
 
-def test_events_go_on_without_those_that_were_lost() -> None:
-    team = replace(
-        BASE,
-        scenario=(event(AddAgent(newcomer("RD", "RA", "RB"))), event(RemoveAgent("RB")), event(RemoveValue("D", 1))),
+def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team) -> None:
+    journey, session, played = travel(team, ["RB"], spares=1)
+    assert [one.team for one in played] == [team, team]
+    assert journey.withdrawn == []
+    (epoch,) = session.epochs
+    assert epoch.team.order == ("RA", "RC", "RD", "RB")
+    assert epoch.restarted == frozenset({"RB"})
+    assert "RB" in epoch.invalidated.agents
+
+
+def test_so_many_come_back_as_there_are_spares(team: Team) -> None:
+    journey, session, played = travel(team, ["RB RD", "RA"], spares=1)
+    assert journey.withdrawn == ["RD", "RA"]
+    assert [one.team.order for one in played[1:]] == [("RA", "RB", "RC"), ("RB", "RC")]
+    assert [epoch.team.order for epoch in session.epochs] == [("RA", "RC", "RB"), ("RC", "RB")]
+    assert [epoch.restarted for epoch in session.epochs] == [{"RB"}, set()]
+
+
+def test_who_comes_back_after_changes_has_them_too(team: Team) -> None:
+    changing = replace(team, scenario=(event(*CHANGES), event(AddValue("C", 1))))
+    for name in team.order:
+        played = travel(changing, ["", name], spares=1)[2]
+        for one, events in zip(played, (0, 1, 1, 2), strict=True):
+            now = team_after_events(changing, events)
+            assert {robot.name: robot for robot in one.team.robots} == {robot.name: robot for robot in now.robots}
+
+
+def test_changes_of_one_who_left_do_not_concern_who_comes_under_its_name(team: Team) -> None:
+    again = replace(team["RD"], parents=team["RD"].parents)
+    events = (event(AddValue("D", 7)), event(RemoveAgent("RD"), AddAgent(again)))
+    *_, last = travel(replace(team, scenario=events), ["", "", "RD"], spares=1)[2]
+    assert list(last.team.variables["D"].domain) == [1, 2]
+
+
+def test_events_go_on_without_those_that_were_lost(team: Team) -> None:
+    link = Parent("RA", (differ("A", "E"),)), Parent("RB", (differ("B", "E"),))
+    events = (
+        event(AddValue("B", 7), AddValue("C", 7), AddAgent(newcomer(*link))),
+        event(RemoveAgent("RB"), RemoveValue("C", 1)),
+        event(RemoveValue("E", 1)),
     )
-    journey = journey_of(team)
-    played = travel(journey, Scripted(journey.team, losing("RB")))
-    assert teams(played) == [("RA", "RB", "RC"), ("RA", "RC"), *[("RA", "RC", "RD")] * 3]
-    assert [parent.name for parent in played[-1].team["RD"].parents] == ["RA"]
-    assert list(played[-1].team.variables["D"].domain) == [2, 3]
+    journey, _, played = travel(replace(team, scenario=events), ["RB"])
+    others = ("RA", "RC", "RD")
+    assert [one.team.order for one in played] == [team.order, others, *[(*others, "RE")] * 3]
+    last = played[-1].team
+    assert [parent.name for parent in last["RE"].parents] == ["RA"]
+    assert [[*last.variables[name].domain] for name in "CE"] == [[2, 7], [2]]
     assert journey.withdrawn == [], "it would have left by now"
 
 
 def test_a_team_that_all_have_left_may_be_joined() -> None:
-    everybody = event(*map(RemoveAgent, BASE.order))
-    team = replace(BASE, scenario=(everybody, event(AddAgent(newcomer("RD")))))
-    assert teams(travel(journey_of(team), Scripted(team))) == [("RA", "RB", "RC"), (), ("RD",)]
+    base = team_of(dict.fromkeys("ABC", range(1, 4)), [differ("A", "B"), differ("B", "C")])
+    team = replace(base, scenario=(event(*map(RemoveAgent, base.order)), event(AddAgent(newcomer()))))
+    assert [one.team.order for one in travel(team, [])[2]] == [base.order, (), ("RE",)]
     news = iter(team.scenario)
     here = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
-    outcome = solve(BASE, here, environment=lambda *_: next(news, None))  # a scenario must leave somebody, as in files
+    outcome = solve(base, here, environment=lambda *_: next(news, None))  # a scenario must leave somebody, as in files
     assert [str(epoch.verdict) for epoch in outcome.epochs] == ["solution"] * 3
 
 
-def test_all_are_lost() -> None:
-    played = travel(journey_of(BASE), Scripted(BASE, losing(*BASE.order)))
-    assert len(played) == 1
-    assert set(played[0].result.lost) == {"RA", "RB", "RC"}
+def test_a_file_that_cannot_be_read_keeps_its_robot_away(team: Team) -> None:
+    Path(team["RB"].file).write_text("<instance>")
+    journey, _, _ = travel(team, ["RB"], spares=1)
+    assert journey.withdrawn == ["RB"]
+    assert "RB could not come back" in journey.failed_returns[0]
 
 
-def test_a_spare_comes_back_at_the_end_of_the_order(tmp_path: Path) -> None:
-    journey = journey_of(on_disk(BASE, tmp_path / "team"), spares=1)
-    session = Scripted(journey.team, losing("RA"), losing("RC"))
-    travel(journey, session)
-    assert [epoch.team.order for epoch in session.epochs] == [("RB", "RC", "RA"), ("RB", "RA")]
-    assert [epoch.restarted for epoch in session.epochs] == [{"RA"}, set()]
-    assert journey.withdrawn == ["RC"]
+def test_a_file_that_has_lost_a_variable_meanwhile_does_not_stop_the_scenario(team: Team) -> None:
+    alone = without_robots(team, ["RA", "RB", "RC"])
+    file = Path(alone["RD"].file)
+    text = file.read_text()
+    start, end = text.index("<agents_neighbours>"), text.index("</agents_neighbours>")
+    bare = text[:start] + text[end:].replace("</agents_neighbours>", "<agents_neighbours/>")
+    file.write_text(bare.replace('<variable name="D"', '<variable name="E"'))
+    journey, _, played = travel(replace(alone, scenario=(event(AddValue("D", 7)),)), ["RD"], spares=1)
+    assert journey.withdrawn == []
+    assert list(played[-1].team.variables) == ["E"]
 
 
-def test_what_has_happened_meanwhile_happens_to_a_spare_too(tmp_path: Path) -> None:
-    happened = event(
-        RemoveValue("A", 1), RemoveConstraint("RB", "RA", "C"), AddConstraint("RC", "RA", differ("A", "C", "new"))
-    )
-    team = on_disk(replace(BASE, scenario=(happened, event(AddValue("A", 1)))), tmp_path / "team")
-    journey, session = journey_of(team, spares=1), Scripted(team, DONE, losing("RA"))
-    played = travel(journey, session)
-    back = played[2].team
-    assert list(back.variables["A"].domain) == [2, 3]
-    assert [constraint.variables for constraint in back.constraints()] == [("B", "C"), ("A", "C")]
-    assert list(played[3].team.variables["A"].domain) == [1, 2, 3]
-    assert [constraint.name for constraint in session.epochs[1].team["RA"].shared] == ["new"]
+def test_nobody_is_left(team: Team) -> None:
+    journey, _, played = travel(team, ["RA RB RC RD"])
+    assert [set(one.result.lost) for one in played] == [{*team.order}]
+    assert journey.team.robots == ()
 
 
-def test_messages_are_counted_over_all_epochs() -> None:
-    team = replace(BASE, scenario=(event(AddValue("A", 8)), event(AddValue("A", 9))))
-    session = Scripted(BASE)
-    played = travel(journey_of(team, messages=10), session)
+def test_definitions_of_added_constraints_stay(team: Team) -> None:
+    less = Constraint("L", PREDEFINED["lt"], ("B", "C"), ("B", "C"))
+    added = event(AddConstraint("RC", "RB", less))
+    *_, last = travel(replace(team, scenario=(added,)), ["", "RC"], spares=1)[2]
+    assert apply_changes(team, added.changes)["RC"].shared == last.team["RC"].shared
+
+
+def test_messages_are_counted_over_all_epochs(team: Team) -> None:
+    changing = replace(team, scenario=(event(AddValue("A", 8)), event(AddValue("A", 9))))
+    _, session, played = travel(changing, [], messages=10)
     assert session.limits == [10, 3]
     assert [one.result.verdict for one in played] == [Verdict.SOLUTION, Verdict.SOLUTION, Verdict.UNKNOWN]
 
