@@ -16,6 +16,7 @@ from robochoc import Model
 from robochoc.formats import PREDEFINED, read_team, write_team
 from robochoc.model.problem import Constraint
 from robochoc.verification.checker import violations
+from tests.support.ace_stable import AceStable
 from tests.support.complex_problems import complex_team
 from tests.support.program import ROOT, robochoc_within
 
@@ -37,6 +38,12 @@ LIMITS = {
     "solutions": (["--local-solutions", 10, "--no-cache"], "--local-solutions"),
     "time": (["--ace", "--local-timeout", 0.001, "--no-cache"], "--local-timeout"),
 }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_solver(ace_stable: AceStable) -> Iterator[None]:
+    with ace_stable.lent():
+        yield
 
 
 @pytest.fixture(scope="module")

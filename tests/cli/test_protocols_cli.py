@@ -176,16 +176,8 @@ def test_what_is_broken_is_shown_with_its_reason() -> None:
     assert table.exit_code == 0
     with cases() as each:
         for name, reason in [
-            (
-                "zz-gone",
-                "no_such_module:Gone (package others-protocols 1.2) cannot be imported: "
-                 "ModuleNotFoundError: No module named 'no_such_module'",
-            ),
-            (
-                "zz-without",
-                "others:Without (package others-protocols 1.2) cannot be imported: "
-                 "AttributeError: module 'others' has no attribute 'Without'",
-            ),
+            ("zz-gone", "no_such_module:Gone (package others-protocols 1.2) cannot be imported: ModuleNotFoundError"),
+            ("zz-without", "others:Without (package others-protocols 1.2) cannot be imported: AttributeError"),
             ("zz-mute", "does not declare its messages"),
             ("zz-half", "does not define receive"),
             ("zz-leaving", "cannot be imported: SystemExit: 3"),
