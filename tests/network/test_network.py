@@ -22,6 +22,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.brute_force import least_cost, solutions
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_cost_team
 from tests.support.limits import HANG_S
@@ -69,7 +70,7 @@ def assignment_of(result: RunResult) -> dict[str, int]:
     return {name: value for values in result.assignments.values() for name, value in values.items()}
 
 
-@pytest.mark.parametrize(("protocol", "filters"), FEW)
+@looped(("protocol", "filters"), FEW)
 def test_random_problems(protocol: str, filters: tuple[str, ...]) -> None:
     """A random team with constraints over several robots, of both kinds of verdict in the two seeds."""
     agrees(random_team(Random(f"network {protocol}"), n_ary=protocol_named(protocol).traits.n_ary), protocol, filters)

@@ -135,7 +135,7 @@ def dripping(connection: socket.socket) -> None:
     drip(connection, b"\x16\x03\x03\x3f\xff" + bytes(1000))
 
 
-@pytest.mark.parametrize("behaviour", [silent, dripping])
+@looped("behaviour", [silent, dripping])
 def test_a_service_that_takes_for_ever_is_left(behaviour: Callable[[socket.socket], None], tmp_path: Path) -> None:
     def serve() -> None:
         connection, _ = listener.accept()

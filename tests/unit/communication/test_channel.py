@@ -206,7 +206,7 @@ def test_other_seeds_are_other_times() -> None:
 SATISFY = ("aas", "abt", "abt-hyb", "afc", "afc-ng", "awc", "disfc", "dynabt", "sbt")
 
 
-@pytest.mark.parametrize("channel", sorted(CHANNELS))
+@looped("channel", sorted(CHANNELS))
 def test_verdicts_are_those_of_brute_force(channel: str) -> None:
     for seed in range(6):
         team = random_team(Random(f"{channel} {seed}"), n_ary=False)
@@ -226,7 +226,7 @@ def test_the_least_cost_is_the_same_by_every_channel() -> None:
             assert (outcome.verdict, outcome.cost) == (Verdict.OPTIMAL, least), (model.name, protocol)
 
 
-@pytest.mark.parametrize("loss", [0.1, 0.5, 0.9])
+@looped("loss", [0.1, 0.5, 0.9])
 def test_loss_only_delays(loss: float) -> None:
     team = queens3d(3)
     perfect = msgspec.structs.replace(LOSSY, loss=0)

@@ -168,8 +168,7 @@ def test_without_losses_quiescence_is_the_end() -> None:
     assert state.verdict is Verdict.SOLUTION
 
 
-@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
-@pytest.mark.parametrize("protocol", ["dsa", "mgm2"])
+@looped(("runtime", "protocol"), [(Runtime.PROCESSES, "dsa"), (Runtime.PROCESSES, "mgm2"), (Runtime.NETWORK, "mgm2")])
 def test_a_search_goes_on_without_what_robots_drop(runtime: Runtime, protocol: str) -> None:
     team = random_csp(4, 3, 0.7, 0, 4, max_cost=9)
     outcome = solve(team, lossy(protocol, runtime, cycles="4"))
@@ -180,7 +179,7 @@ def test_a_search_goes_on_without_what_robots_drop(runtime: Runtime, protocol: s
     assert outcome.cost >= least_cost(team)
 
 
-@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
+@looped("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
 def test_no_claim_of_a_protocol_that_needs_every_message_stands(runtime: Runtime) -> None:
     """`abt` would prove that two queens have no place."""
     assert solve(queens3d(2), lossy("abt", runtime, 0)).verdict is Verdict.NO_SOLUTION
@@ -232,7 +231,7 @@ def test_who_comes_back_is_caught_up_with_although_messages_are_lost(tmp_path: P
 
 @looped(
     ("team", "loss", "name"),
-    [
+    lambda: [
         (random_csp(4, 3, 0.7, 0, max_cost=9), 0.1, "regret-matching"),
         (queens3d(2), 0.1, "gdba"),
         (queens3d(2), 0.2, "dsa"),

@@ -1,11 +1,13 @@
 """Whatever dies, whenever it dies: the run ends, says who was lost, and leaves nothing behind.
 
-Runs of the whole program, whose search never ends by itself, are struck. `make test` strikes once in each way, at
-events of the run; `make test-slow` 50 times in each, at random moments (the seed of a repetition is its number).
+Runs of the whole program, whose search never ends by itself, are struck. `make test` strikes a robot and a simulator,
+`make test-more` once in each way, at events of the run; `make test-slow` 50 times in each, at random moments (the seed
+of a repetition is its number).
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import re
@@ -16,13 +18,17 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Lost, Sent
 from robochoc.journal.journal import Ended, Follower, Header, read_journal, sorted_by_time
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.endless_runs import (
     CROWD,
     NAMES,
@@ -41,6 +47,7 @@ from tests.support.endless_runs import (
 )
 from tests.support.faults import Run, running
 from tests.support.faulty_protocols import TEAM as FAULTY
+from tests.support.faulty_protocols import Raises
 from tests.support.limits import wait_until
 from tests.support.program import ROOT
 
@@ -49,7 +56,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pro
 MANY = 50
 SPAN_S = 1.5
 """In so much time the program begins, imports, reads the team, starts its robots, and they talk."""
-slow = pytest.mark.slow
+more, slow = pytest.mark.more, pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -120,18 +127,18 @@ def struck(
 @pytest.mark.parametrize(
     ("strike", "moment", "watched"),
     [
-        (a_robot, at_the_start, False),
         (a_robot, once_it_is_told, True),
-        (the_parent, at_the_start, False),
-        (interrupt, once_it_is_told, True),
-        (terminate, in_the_middle, False),
+        pytest.param(a_robot, at_the_start, False, marks=more),
+        pytest.param(the_parent, at_the_start, False, marks=more),
+        pytest.param(interrupt, once_it_is_told, True, marks=more),
+        pytest.param(terminate, in_the_middle, False, marks=more),
     ],
 )
 def test_a_strike_leaves_nothing(strike: Strike, moment: Moment, *, watched: bool, team: Path, tmp_path: Path) -> None:
     struck(strike, moment, random.Random(strike.__name__), team, tmp_path / "run", watched=watched)
 
 
-@pytest.mark.parametrize("strike", [the_parent, interrupt, terminate])
+@pytest.mark.parametrize("strike", [interrupt, terminate, pytest.param(the_parent, marks=more)])
 def test_strikes_in_the_simulator(strike: Strike, team: Path, tmp_path: Path) -> None:
     options = ("--runtime", "simulator")
     struck(strike, once_it_is_told, random.Random(1), team, tmp_path / "run", *options, watched=True)
@@ -156,6 +163,7 @@ def test_ten_strikes_in_the_simulator(strike: Strike, repetition: int, crowd: Pa
     struck(strike, moment, chance, crowd, tmp_path / "run", *options, watched=repetition % 2 == 1)
 
 
+@more
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("pause_s", [0, 0.02, *(pytest.param(s, marks=slow) for s in (0.01, 0.03, 0.04))])
 def test_a_signal_before_the_program_has_begun(
@@ -193,6 +201,7 @@ except KeyboardInterrupt:
         assert run.errors() == ""
 
 
+@more
 @pytest.mark.parametrize("pause_s", [0, *(pytest.param(s, marks=slow) for s in (0.02, 0.2))])
 def test_ctrl_c_twice(pause_s: float, team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run", watched=True) as run:
@@ -207,6 +216,7 @@ def test_ctrl_c_twice(pause_s: float, team: Path, tmp_path: Path) -> None:
     the_journal_is_whole((tmp_path / "run" / "run.journal").read_bytes(), [], killed=False)
 
 
+@more
 @pytest.mark.parametrize("runtime", ["processes", pytest.param("simulator", marks=slow)])
 def test_the_journal_of_a_run_that_was_killed_lacks_its_last_block(runtime: str, team: Path, tmp_path: Path) -> None:
     """It can be read while the run goes on, and what was read then is in what is left."""
@@ -234,6 +244,7 @@ def test_the_journal_of_a_run_that_was_killed_lacks_its_last_block(runtime: str,
     assert journal.outcome is None
 
 
+@more
 def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run", watched=True) as run:
         once_it_is_told(run)
@@ -251,6 +262,7 @@ def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     assert len(lost) == len(named) or f"and {len(lost) - len(named)} others were lost" in run.errors()
 
 
+@more
 def test_all_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run") as run:
         in_the_middle(run)
@@ -262,6 +274,7 @@ def test_all_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
         nothing_is_left(run)
 
 
+@more
 @pytest.mark.parametrize(
     "signum", [signal.SIGRTMIN + 3, *(pytest.param(s, marks=slow) for s in (signal.SIGTERM, signal.SIGABRT))]
 )
@@ -276,6 +289,7 @@ def test_a_robot_ended_by_another_signal(signum: int, team: Path, tmp_path: Path
         nothing_is_left(run)
 
 
+@more
 def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: Path) -> None:
     for limit_s in (1, 10, 60):
         with searching(team, tmp_path / str(limit_s), "--timeout", str(limit_s)) as run:
@@ -292,6 +306,7 @@ def test_a_stopped_robot_does_not_outlive_the_time_limit(team: Path, tmp_path: P
     pytest.fail("16 robots do not start within a minute")
 
 
+@more
 def test_a_stopped_robot_does_not_outlive_ctrl_c(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run") as run:
         in_the_middle(run)
@@ -302,6 +317,7 @@ def test_a_stopped_robot_does_not_outlive_ctrl_c(team: Path, tmp_path: Path) -> 
         nothing_is_left(run)
 
 
+@more
 def test_a_stopped_robot_does_not_outlive_a_killed_parent(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run") as run:
         in_the_middle(run)
@@ -310,6 +326,7 @@ def test_a_stopped_robot_does_not_outlive_a_killed_parent(team: Path, tmp_path: 
         run.end()
 
 
+@more
 def test_robots_that_compute_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     with running(faulty("TEAM", "Spins"), tmp_path / "run") as run:
         robots = run.wait_for_robots(len(FAULTY.robots))
@@ -327,6 +344,7 @@ def computes(pid: int) -> bool:
 # Limits, and outputs that nobody reads
 
 
+@more
 def test_nobody_reads_the_output(tmp_path: Path) -> None:
     write_team(queens3d(4), tmp_path / "team")
     reader, writer = os.pipe()
@@ -341,6 +359,26 @@ def test_nobody_reads_the_output(tmp_path: Path) -> None:
         os.close(writer)
 
 
+@looped(
+    ("module", "refusal"),
+    [
+        ("forked_process", r"only 0 of 4 robots have a process: Too many open files .*ulimit -n"),
+        ("pool", r"does not let \S+ have a queue to \S+: Too many open files .*ulimit -n"),
+    ],
+)
+def test_without_more_open_files_a_run_says_which_limit_to_raise(
+    module: str, refusal: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_pipe() -> tuple[int, int]:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    here = SimpleNamespace(**{**vars(os), "pipe": no_pipe})
+    monkeypatch.setattr(f"robochoc.communication.processes.{module}.os", here)
+    with ProcessesRun(FAULTY, Raises) as run, pytest.raises(UnsupportedError, match=refusal):
+        run.search()
+
+
+@more
 @pytest.mark.parametrize("open_files", [64, *(pytest.param(count, marks=slow) for count in (90, 120))])
 def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> None:
     """At 120 the parent has more than half of the robots started, at 64 a few."""
@@ -352,6 +390,7 @@ def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> Non
         nothing_is_left(run)
 
 
+@more
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -371,6 +410,7 @@ def test_too_few_open_files_for_robots_that_talk(arguments: list[str], said: str
 # The live scene
 
 
+@more
 @pytest.mark.parametrize(
     "signum", [signal.SIGINT, *(pytest.param(s, marks=slow) for s in (signal.SIGTERM, signal.SIGKILL))]
 )
@@ -387,6 +427,7 @@ def test_the_port_of_the_live_scene_is_free_again(signum: signal.Signals, tmp_pa
         pass
 
 
+@more
 def test_a_run_opens_no_port(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run") as run:
         in_the_middle(run)

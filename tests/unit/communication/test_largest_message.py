@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
-import pytest
-
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
@@ -15,10 +13,11 @@ from robochoc.journal.journal import metrics_of
 from robochoc.model.outcome import Metrics
 from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
+from tests.support.cases import looped
 from tests.support.problems import ON_ONE_MACHINE
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+@looped("runtime", ON_ONE_MACHINE)
 def test_the_largest_message_is_the_largest_that_was_sent(runtime: Runtime) -> None:
     events: list[AnyEvent] = []
     options = Options(protocol="sfb", runtime=runtime, withdraw=Withdrawal.MINIMUM, cache=False)
