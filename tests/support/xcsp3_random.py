@@ -29,9 +29,15 @@ _BY_ACE = ["lt", "le", "ge", "gt", "eq"]
 class Instance:
     """An instance in XML, and its solutions by brute force."""
 
-    xml: str
+    variables: str
+    constraints: list[str]
     solutions: set[Row]
     forms: list[str]
+
+    @property
+    def xml(self) -> str:
+        body = f"<variables>{self.variables}</variables><constraints>{''.join(self.constraints)}</constraints>"
+        return f'<instance format="XCSP3" type="CSP">{body}</instance>'
 
 
 class _Draw:
@@ -607,6 +613,8 @@ FOR_ALL: Sequence[Callable[[_Draw], Form]] = (
 NOT_FOR_ACE: Sequence[Callable[[_Draw], Form]] = (
     all_equal_except, all_equal_lists, n_values_lists, extremum_with_index, place_of_extremum, clause,
 )  # fmt: skip
+KINDS = len(FOR_ALL) + len(NOT_FOR_ACE)
+"""So many instances one after the other begin with a constraint of another form each."""
 
 
 def random_instance(seed: int, *, for_ace: bool = False) -> Instance:
@@ -622,5 +630,4 @@ def random_instance(seed: int, *, for_ace: bool = False) -> Instance:
         if found:
             break
     array = f'<array id="x" size="[{draw.number}]"> {draw.low}..{draw.high} </array>'
-    body = f"<variables>{array}</variables><constraints>{''.join(xml for xml, _ in drawn)}</constraints>"
-    return Instance(f'<instance format="XCSP3" type="CSP">{body}</instance>', found, [form.__name__ for form in chosen])
+    return Instance(array, [xml for xml, _ in drawn], found, [form.__name__ for form in chosen])

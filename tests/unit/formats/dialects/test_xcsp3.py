@@ -26,6 +26,7 @@ from tests.support.cases import looped
 from tests.support.cost_problems import cost_of, random_cost_team
 from tests.support.problems import random_team
 from tests.support.xcsp3_forms import FORMS
+from tests.support.xcsp3_random import KINDS, random_instance
 
 Row = tuple[int, ...]
 ABC = "<var id='a'> 0..2 </var><var id='b'> 0..2 </var><var id='c'> 0..2 </var>"
@@ -254,7 +255,9 @@ def test_what_has_no_counterpart_is_refused_by_name_with_its_line(xml: str, tmp_
 
 def test_unknown_parts_anywhere_in_a_constraint_are_refused(tmp_path: Path) -> None:
     """Each element of each form gets an unknown child, an unknown attribute and a text in turn."""
-    for form, (xml, _) in FORMS.items():
+    drawn = [random_instance(seed) for seed in range(KINDS)]
+    forms = [(xml, ARRAY) for xml, _ in FORMS.values()] + [(one.constraints[0], one.variables) for one in drawn]
+    for xml, variables in forms:
         elements = [match.end() - 1 for match in re.finditer(r"<\w[^>/]*>", xml)]
         ends = [match.start() for match in re.finditer(r"</\w+>", xml)]
         changed = [f"{xml[:place]} strange='1'{xml[place:]}" for place in elements]
@@ -262,10 +265,10 @@ def test_unknown_parts_anywhere_in_a_constraint_are_refused(tmp_path: Path) -> N
         changed += [f"{xml[:place]} strange {xml[place:]}" for place in ends]
         for wrong in changed:
             with pytest.raises(InvalidInputError) as refused:
-                csp(tmp_path, f"\n{wrong}")
+                csp(tmp_path, f"\n{wrong}", variables)
             (mistake,) = refused.value.diagnostics
-            assert " strange " in wrong or "strange" in f"{mistake.message} {mistake.hint}", (form, wrong)
-            assert mistake.line == 2, (form, wrong)
+            assert " strange " in wrong or "strange" in f"{mistake.message} {mistake.hint}", wrong
+            assert mistake.line == 2, wrong
 
 
 def test_unknown_parts_outside_of_constraints_are_refused(tmp_path: Path) -> None:
