@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,12 +12,6 @@ import pytest
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
-PROGRAMS = [
-    path.relative_to(ROOT)
-    for folder in ("tests", "benchmarks")
-    for path in sorted((ROOT / folder).rglob("*.py"))
-    if re.search(r'^if __name__ == "__main__":$', path.read_text(encoding="utf-8"), re.MULTILINE)
-]
 ONLY_STARTED_BY_OTHERS = {
     Path("benchmarks/peer_runs.py"),  # what it imports would count as memory of who is measured
     Path("benchmarks/pydcop_once.py"),  # its words are those of pyDCOP
@@ -25,8 +19,18 @@ ONLY_STARTED_BY_OTHERS = {
     Path("tests/support/faulty_protocols.py"),
 }
 NEED_OTHER_LIBRARIES = {Path(f"benchmarks/{peer}_once.py") for peer in ("mujoco", "raven", "rotorpy")}
-TOOLS = [path for path in PROGRAMS if path not in ONLY_STARTED_BY_OTHERS | NEED_OTHER_LIBRARIES]
 READING_ORDER = ROOT / "docs" / "explanation" / "reading-order.md"
+
+
+@cache
+def programs() -> list[Path]:
+    """Return the files of the repository that can be started."""
+    files = (path for folder in ("tests", "benchmarks") for path in sorted((ROOT / folder).rglob("*.py")))
+    return [path.relative_to(ROOT) for path in files if '\nif __name__ == "__main__":\n' in path.read_text("utf-8")]
+
+
+def tools() -> list[Path]:
+    return [path for path in programs() if path not in ONLY_STARTED_BY_OTHERS | NEED_OTHER_LIBRARIES]
 
 
 def help_of(tool: Path) -> str:
@@ -45,9 +49,11 @@ def times_of_change() -> dict[Path, int]:
 
 
 def test_every_program_reads_its_words_by_argparse() -> None:
-    assert len(TOOLS) > 15
-    assert {*PROGRAMS} > ONLY_STARTED_BY_OTHERS | NEED_OTHER_LIBRARIES
-    others = [path for path in PROGRAMS if "argparse.ArgumentParser(" not in (ROOT / path).read_text(encoding="utf-8")]
+    assert len(tools()) > 15
+    assert {*programs()} > ONLY_STARTED_BY_OTHERS | NEED_OTHER_LIBRARIES
+    others = [
+        path for path in programs() if "argparse.ArgumentParser(" not in (ROOT / path).read_text(encoding="utf-8")
+    ]
     assert {*others} == ONLY_STARTED_BY_OTHERS
 
 
@@ -61,6 +67,6 @@ def test_a_tool_that_rewrites_says_how_it_is_used_and_rewrites_nothing() -> None
 @pytest.mark.timeout(600)
 def test_every_tool_says_how_it_is_used_and_changes_nothing() -> None:
     before = times_of_change()
-    for tool in TOOLS:
+    for tool in tools():
         assert help_of(tool).startswith("usage: "), tool
     assert times_of_change() == before

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from random import Random
 from typing import Any
 
-import cpmpy as cp
-
 from robochoc.model.problem import Team
 from robochoc.solver.encoding import allows_function
+from tests.support.lazy import LazyModule
 
+cp = LazyModule("cpmpy")
 Term = Any
 """CPMpy's expressions."""
 

@@ -74,5 +74,7 @@ def read_document(content: bytes) -> Document:
         rows = element.findtext("supports")
         scope, positive = (element.findtext("list") or "").split(), rows is not None
         tables.append((scope, rows_of((rows if positive else element.findtext("conflicts")) or ""), positive))
-    different = [" ".join(map(str, element.itertext())).split() for element in root.iterfind("constraints//allDifferent")]
+    different = [
+        " ".join(map(str, element.itertext())).split() for element in root.iterfind("constraints//allDifferent")
+    ]
     return Document(domains, tables, different, (root.findtext("objectives/minimize/list") or "").split())

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from contextlib import suppress
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -16,33 +17,32 @@ from robochoc.model.problem import Team
 from robochoc.modelling.cpmpy_models import cpmpy_team
 from robochoc.solver.central import CentralSolver
 from tests.support.examples import count
+from tests.support.random_cpmpy import Judge, RandomExpressions, cp
 
-if TYPE_CHECKING:
-    from tests.support import random_cpmpy
-else:
-    random_cpmpy = pytest.importorskip("tests.support.random_cpmpy", reason="the extra cpmpy")
-
-cp = pytest.importorskip("cpmpy", reason="the extra cpmpy")
-argval = pytest.importorskip("cpmpy.expressions.utils").argval
-IncompleteFunctionError = pytest.importorskip("cpmpy.exceptions").IncompleteFunctionError
+pytestmark = pytest.mark.skipif(importlib.util.find_spec("cpmpy") is None, reason="the extra cpmpy")
 
 Term = Any
 """CPMpy's expressions."""
 
 
-def drawn(seed: int) -> random_cpmpy.RandomExpressions:
-    return random_cpmpy.RandomExpressions(Random(seed))
+def argval(expression: Term) -> Any:  # noqa: ANN401 - a number or a truth value
+    """Return what CPMpy computes for the values that its variables have."""
+    return cp.expressions.utils.argval(expression)
 
 
-def model_of(given: random_cpmpy.RandomExpressions, *constraints: Term) -> Term:
+def drawn(seed: int) -> RandomExpressions:
+    return RandomExpressions(Random(seed))
+
+
+def model_of(given: RandomExpressions, *constraints: Term) -> Term:
     """Return a model of `constraints` in which all variables stand."""
     return cp.Model([*(variable >= variable.lb for variable in given.variables), *constraints])
 
 
-def check_solutions(given: random_cpmpy.RandomExpressions, constraint: Term) -> None:
+def check_solutions(given: RandomExpressions, constraint: Term) -> None:
     """Check that the team of a constraint allows the assignments for which CPMpy says that the constraint holds."""
     team = cpmpy_team(model_of(given, constraint))
-    judge = random_cpmpy.Judge(team, [variable.name for variable in given.variables])
+    judge = Judge(team, [variable.name for variable in given.variables])
     for values in given.assignments():
         assert judge.allows(values) is bool(argval(constraint)), (values, str(constraint))
 
@@ -84,7 +84,7 @@ def test_one_global_constraint_that_must_hold_and_is_negated_elsewhere() -> None
         }[name]()
         for constraints in ([same, given.b.implies(~same)], [given.b.implies(~same), same], [same | given.b, ~same]):
             team = cpmpy_team(model_of(given, *constraints))
-            judge = random_cpmpy.Judge(team, [variable.name for variable in given.variables])
+            judge = Judge(team, [variable.name for variable in given.variables])
             for values in given.assignments():
                 assert judge.allows(values) is all(argval(one) for one in constraints), (values, name)
 
@@ -123,12 +123,12 @@ def test_an_element_is_compared_with_any_expression_on_either_side() -> None:
                 check_solutions(given, constraint)
 
 
-def by_hand(model: Term, given: random_cpmpy.RandomExpressions) -> tuple[bool, int | None]:
+def by_hand(model: Term, given: RandomExpressions) -> tuple[bool, int | None]:
     """Return whether there is a solution, and the best objective: each constraint is asked for its value."""
     found: list[int] = []
     for _ in given.assignments():
         if all(argval(one) for one in model.constraints):
-            with suppress(IncompleteFunctionError):
+            with suppress(cp.exceptions.IncompleteFunctionError):
                 found.append(0 if model.objective_ is None else int(argval(model.objective_)))
     if not found or model.objective_ is None:
         return bool(found), None
