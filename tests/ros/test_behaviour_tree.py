@@ -11,17 +11,16 @@ from typing import Any
 
 import pytest
 
-from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.ros.decide_service import DecideService
 from robochoc.ros.decision import FollowedDecision
 from robochoc.run import Options, Runtime, solve
+from tests.support.example_teams import hangar
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 
 py_trees = pytest.importorskip("py_trees", reason="no py_trees here: pip install py-trees")
 FILE = ROOT / "docs" / "ros2" / "robochoc_ros" / "robochoc_ros" / "behaviour.py"
-HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 SIMULATED = Options(runtime=Runtime.SIMULATOR, timeout=HANG_S)
 ENDLESS = Options(protocol="dsa", runtime=Runtime.SIMULATOR, timeout=HANG_S, settings={"cycles": "1000000000"})
 
@@ -56,14 +55,14 @@ def ticked(tree: Any) -> None:  # noqa: ANN401 - py_trees is untyped
 
 
 def test_the_assignment_is_on_the_blackboard(pool: ThreadPoolExecutor) -> None:
-    tree = behaviour(Client(DecideService([HANGAR], FollowedDecision(), SIMULATED), pool), {"team": "hangar"})
+    tree = behaviour(Client(DecideService([hangar()], FollowedDecision(), SIMULATED), pool), {"team": "hangar"})
     ticked(tree)
     assert (tree.status.value, tree.feedback_message) == ("SUCCESS", "solution, 1 epoch")
-    assert tree.board.get("assignment") == solve(HANGAR, SIMULATED).assignment
+    assert tree.board.get("assignment") == solve(hangar(), SIMULATED).assignment
 
 
 def test_a_refusal_is_a_failure(pool: ThreadPoolExecutor) -> None:
-    tree = behaviour(Client(DecideService([HANGAR], FollowedDecision(), SIMULATED), pool), {"team": "yard"})
+    tree = behaviour(Client(DecideService([hangar()], FollowedDecision(), SIMULATED), pool), {"team": "yard"})
     ticked(tree)
     assert tree.status.value == "FAILURE"
     assert tree.feedback_message == "no team has the name 'yard'; known are hangar"

@@ -17,7 +17,6 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
-from robochoc.formats import read_team
 from robochoc.formats.result import read_result
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
@@ -30,13 +29,12 @@ from robochoc.ros.sink import Fields, SinkError
 from robochoc.run import Options, Runtime, solve
 from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE, ServiceClient, free_domain, subscriber
+from tests.support.example_teams import example, hangar
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import PROGRAM, ROOT
 from tests.support.small_teams import pair
 
 EXAMPLES = ROOT / "docs" / "examples"
-HANGAR = read_team(EXAMPLES / "hangar")
-RESCUE = read_team(EXAMPLES / "rescue")
 SIMULATED = Options(runtime=Runtime.SIMULATOR, timeout=HANG_S)
 SERVICE = "/robochoc/decide"
 GUID = 0x0102030405060708
@@ -55,19 +53,19 @@ def removals(kind: str, *removed: object) -> str:
 
 
 def test_a_team_decides() -> None:
-    answer = service(HANGAR).decide({"team": "hangar"})
-    expected = solve(HANGAR, SIMULATED)
+    answer = service(hangar()).decide({"team": "hangar"})
+    expected = solve(hangar(), SIMULATED)
     assert (answer["success"], answer["verdict"], answer["message"]) == (True, "solution", "solution, 1 epoch")
     assert dict(zip(answer["variables"], answer["values"], strict=True)) == expected.assignment
     assert read_result(answer["result"].encode()).assignment == expected.assignment
-    assert service(HANGAR).decide({}) | {"result": ""} == answer | {"result": ""}
+    assert service(hangar()).decide({}) | {"result": ""} == answer | {"result": ""}
     back = types_of(2).decode(f"{DECIDE}_Response", types_of(2).encode(f"{DECIDE}_Response", answer))
     assert back == answer
 
 
 def test_a_scenario_is_gone_through() -> None:
-    answer = service(RESCUE).decide({})
-    epochs = len(solve(RESCUE, SIMULATED).epochs)
+    answer = service(example("rescue")).decide({})
+    epochs = len(solve(example("rescue"), SIMULATED).epochs)
     assert epochs > 1
     assert answer["message"].endswith(f"{epochs} epochs")
     assert len(json.loads(answer["result"])["epochs"]) == epochs
@@ -75,13 +73,13 @@ def test_a_scenario_is_gone_through() -> None:
 
 def test_changes_are_made_first() -> None:
     changes = [{"remove_value": {"variable": "port", "value": 3}}, {"remove_agent": {"name": "Nose"}}]
-    answer = service(HANGAR).decide({"team": "hangar", "changes": json.dumps(changes)})
+    answer = service(hangar()).decide({"team": "hangar", "changes": json.dumps(changes)})
     values = dict(zip(answer["variables"], answer["values"], strict=True))
     assert "nose" not in values
     assert values["port"] != 3
     more = [*changes, {"add_value": {"variable": "port", "value": 3}}]
-    assert service(HANGAR).decide({"changes": json.dumps(more)})["success"]
-    assert "nose" in service(HANGAR).decide({})["variables"], "a request leaves the team as it was"
+    assert service(hangar()).decide({"changes": json.dumps(more)})["success"]
+    assert "nose" in service(hangar()).decide({})["variables"], "a request leaves the team as it was"
 
 
 def test_no_solution_is_an_answer() -> None:
@@ -91,15 +89,15 @@ def test_no_solution_is_an_answer() -> None:
 
 
 def test_a_trigger_tells_the_assignment() -> None:
-    answer = service(HANGAR, RESCUE).trigger("hangar")
+    answer = service(hangar(), example("rescue")).trigger("hangar")
     told = json.loads(answer["message"])
     assert (answer["success"], told["verdict"]) == (True, "solution")
-    assert told["assignment"] == solve(HANGAR, SIMULATED).assignment
+    assert told["assignment"] == solve(hangar(), SIMULATED).assignment
 
 
 @looped(
     ("fields", "told"),
-    [
+    lambda: [
         ({"team": "yard\x1b"}, r"no team has the name 'yard\\x1b'; known are hangar, rescue"),
         ({}, r"no team has the name ''; known are hangar, rescue"),
         ({"timeout": -1.0}, "timeout must be seconds, or 0 for the longest, is -1.0"),
@@ -115,7 +113,7 @@ def test_a_trigger_tells_the_assignment() -> None:
         ({"changes": '[{"remove_agent": {"name": "a"}, "add_value": {"variable": "b", "value": 1}}]'}, "change 1 must"),
         ({"changes": '[{"remove_agent": {"name": "Stern"}}]'}, "Stern"),
         ({"changes": '[{"add_value": {"variable": "port", "value": 3}}]'}, "port"),
-        ({"changes": removals("remove_agent", *({"name": robot.name} for robot in HANGAR.robots))}, "^team hangar: "),
+        ({"changes": removals("remove_agent", *({"name": robot.name} for robot in hangar().robots))}, "^team hangar: "),
         (
             {"changes": removals("remove_value", *({"variable": "port", "value": value} for value in range(1, 5)))},
             "^robot Port, domain levels: .* has no value",
@@ -132,7 +130,7 @@ def test_a_trigger_tells_the_assignment() -> None:
 )
 def test_what_is_wrong_with_a_request_is_answered(fields: dict[str, Any], told: str) -> None:
     named = fields if "team" in fields or not fields else {"team": "hangar", **fields}
-    answer = service(HANGAR, RESCUE).decide(named)
+    answer = service(hangar(), example("rescue")).decide(named)
     assert answer["success"] is False
     assert not {"verdict", "values"} & answer.keys()
     assert "\n" not in answer["message"]
@@ -143,9 +141,9 @@ def test_whatever_fails_is_answered() -> None:
     def failing(team: Team, options: Options) -> Outcome:
         raise RuntimeError(f"{team.name} {options.timeout}")
 
-    answer = DecideService([HANGAR], failing, SIMULATED).decide({"timeout": 3.0})
+    answer = DecideService([hangar()], failing, SIMULATED).decide({"timeout": 3.0})
     assert answer == {"success": False, "message": "RuntimeError: hangar 3.0"}
-    longer = DecideService([HANGAR], failing, SIMULATED).decide({"timeout": 1e9})
+    longer = DecideService([hangar()], failing, SIMULATED).decide({"timeout": 1e9})
     assert longer["message"] == f"RuntimeError: hangar {HANG_S}"
 
 
@@ -311,7 +309,7 @@ def _asks_at_once(domain: int) -> Iterator[ServiceClient]:
 @pytest.mark.slow
 def test_the_command_answers_whoever_asks() -> None:
     domain = free_domain()
-    expected = solve(HANGAR, SIMULATED).assignment
+    expected = solve(hangar(), SIMULATED).assignment
     with (
         served(domain, "--requests", "3") as server,
         ServiceClient(domain, {SERVICE: "Decide", "/robochoc/hangar/decide": "Trigger"}) as client,
@@ -370,7 +368,7 @@ def test_whatever_bytes_a_request_has_it_is_answered() -> None:
     changes = '[{"remove_value": {"variable": "port", "value": 3}}, {"remove_agent": {"name": "Nose"}}]'
     whole = types_of(2).encode(f"{DECIDE}_Request", {"team": "hangar", "changes": changes, "timeout": 5.0})
     decided = solve(pair(values=3), SIMULATED)
-    decider = DecideService([HANGAR], lambda *_: decided, SIMULATED)
+    decider = DecideService([hangar()], lambda *_: decided, SIMULATED)
     answered = 0
     for _ in range(2_000):
         content = bytearray(whole)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import threading
+from functools import cache
 from random import Random
 from typing import Any
 
@@ -12,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
@@ -24,15 +24,14 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.system.stopping import stop_requested
 from tests.support.cases import looped
 from tests.support.cost_problems import cost_of, random_cost_team
+from tests.support.example_teams import example, hangar
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 from tests.support.small_teams import pair
 
 EXAMPLES = ROOT / "docs" / "examples"
-RESCUE = read_team(EXAMPLES / "rescue")
 SIMULATED = Options(runtime=Runtime.SIMULATOR, timeout=HANG_S)
 ENDLESS = Options(protocol="dsa", runtime=Runtime.SIMULATOR, timeout=HANG_S, settings={"cycles": "1000000000"})
-QUEENS = queens3d(4)
 
 
 class Told(list[dict[str, Any]]):
@@ -66,7 +65,7 @@ def test_feedback_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch, runtime: 
 def test_feedback_of_a_team_that_changes_has_no_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decision, "PERIOD_S", 0.0)
     told = Told()
-    assert FollowedDecision(told)(RESCUE, SIMULATED).epochs
+    assert FollowedDecision(told)(example("rescue"), SIMULATED).epochs
     assert told[-1]["state"] == "decided"
     assert not any("cost" in one for one in told)
 
@@ -90,7 +89,7 @@ def test_it_can_be_cancelled() -> None:
     followed = FollowedDecision(lambda _: asks.set())
     canceller = threading.Thread(target=cancel)
     canceller.start()
-    outcome = DecideService([QUEENS], followed, ENDLESS).decide({})
+    outcome = DecideService([queens3d(4)], followed, ENDLESS).decide({})
     canceller.join()
     assert answers == [{"success": True, "message": "queens3d-4 decides no longer"}]
     assert (outcome["success"], outcome["message"]) == (False, "unknown, 1 epoch: somebody has asked to stop")
@@ -126,8 +125,11 @@ CHANGES = st.text(max_size=30) | st.lists(CHANGE | JSON, max_size=4).map(json.du
 REQUESTS = st.fixed_dictionaries(
     {}, optional={"team": NAMES | st.sampled_from(["hangar", "rescue"]) | JSON, "changes": CHANGES, "timeout": JSON}
 ) | st.dictionaries(st.text(max_size=5), JSON, max_size=3)
-HANGAR = read_team(EXAMPLES / "hangar")
-DECIDED = solve(HANGAR, SIMULATED)
+
+
+@cache
+def decided() -> Outcome:
+    return solve(hangar(), SIMULATED)
 
 
 @settings(max_examples=60)
@@ -135,11 +137,11 @@ DECIDED = solve(HANGAR, SIMULATED)
 def test_whatever_is_asked_is_answered_in_one_short_line_that_can_be_sent(fields: dict[str, Any]) -> None:
     asked: list[float | None] = []
 
-    def decided(_: Team, options: Options) -> Outcome:
+    def decide(_: Team, options: Options) -> Outcome:
         asked.append(options.timeout)
-        return DECIDED
+        return decided()
 
-    answer = DecideService([HANGAR, RESCUE], decided, SIMULATED).decide(fields)
+    answer = DecideService([hangar(), example("rescue")], decide, SIMULATED).decide(fields)
     assert answer["success"] is bool(asked)
     assert all(one is not None and 0 < one <= HANG_S for one in asked)
     assert "\n" not in answer["message"]
@@ -172,5 +174,5 @@ def test_whatever_is_asked_is_answered_in_one_short_line_that_can_be_sent(fields
     ],
 )
 def test_the_reason_is_the_right_one(told: str, fields: dict[str, Any]) -> None:
-    answer = DecideService([HANGAR], lambda *_: DECIDED, SIMULATED).decide(fields)
+    answer = DecideService([hangar()], lambda *_: decided(), SIMULATED).decide(fields)
     assert answer["message"] == (told or "solution, 1 epoch")

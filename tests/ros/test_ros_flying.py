@@ -11,7 +11,6 @@ import pytest
 from robochoc.flight.layout import Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission
-from robochoc.formats import read_team
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import RemoveAgent, RemoveValue, ScenarioEvent
@@ -19,9 +18,8 @@ from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.simulated_feedback import CannotFlyError, FlightSettings, SimulatedFeedback, UnknownDroneError
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import violations
-from tests.support.program import ROOT
+from tests.support.example_teams import hangar
 
-HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 PLACE: Point = (3.0, 1.0, 3.0)
 """Where Port is first sent."""
 MET = FlightSettings(obstacles=(PLACE,), failures=(("Fin", 7.0),))
@@ -40,8 +38,8 @@ class Looped:
 
 def looped(surroundings: FlightSettings, options: Options = SIMULATED, *, scale: float | None = None) -> Looped:
     flying = SimulatedFeedback(surroundings)
-    loop = ClosedLoop(HANGAR, (), flying, scale=scale)
-    outcome = solve(HANGAR, options, environment=loop)
+    loop = ClosedLoop(hangar(), (), flying, scale=scale)
+    outcome = solve(hangar(), options, environment=loop)
     flown = flying.flown()
     assert flown is not None
     assert loop.mission is not None
@@ -133,19 +131,19 @@ def test_who_falls_when_all_hover_is_missed_too() -> None:
 
 
 def test_one_after_the_other_falls_out() -> None:
-    failures = tuple((name, 2.0 + number * 0.9) for number, name in enumerate(HANGAR.order))
+    failures = tuple((name, 2.0 + number * 0.9) for number, name in enumerate(hangar().order))
     last = looped(FlightSettings(failures=failures))
     assert last.outcome.verdict is Verdict.SOLUTION
     assert last.outcome.assignment == {}
     assert last.outcome.epochs[-1].robots == ()
     assert sorted(name for words in openings(last.outcome)[1:] for name in words.split(", ")) == sorted(
-        f"-{name}" for name in HANGAR.order
+        f"-{name}" for name in hangar().order
     )
 
 
 def test_who_is_to_fail_has_to_be_there() -> None:
     with pytest.raises(UnknownDroneError, match="no drone 'Wing' that could fail, but Fin, Nose"):
-        FlightSettings(failures=(("Wing", 1.0),)).check(drones_of(HANGAR))
+        FlightSettings(failures=(("Wing", 1.0),)).check(drones_of(hangar()))
 
 
 def test_places_nearer_than_the_distance_to_keep_are_refused() -> None:

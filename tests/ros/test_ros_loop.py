@@ -7,97 +7,34 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.formats import read_team
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.ros.closed_loop import TOGETHER_S, ClosedLoop, drones_of
 from robochoc.ros.report_decoder import ReportDecoder
-from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.source import ReceivedMessage, Source
+from robochoc.ros.sink import Sink
+from robochoc.ros.source import ReceivedMessage
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import solve
 from tests.support.environments import SIMULATED, openings
+from tests.support.example_teams import example, hangar
 from tests.support.limits import HANG_S
-from tests.support.program import ROOT
+from tests.support.ros_ends import SECOND, KeptSink, Tape, WaitedClock
 
-HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
-PATROL = read_team(ROOT / "docs" / "examples" / "patrol")
-SECOND = 1_000_000_000
 SLICE_S = 1.0
 """How long the source is waited for at a time."""
 PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 """Where Port flies first."""
 
 
-class WaitedClock:
-    """A clock that goes on while somebody waits, and then only."""
-
-    def __init__(self) -> None:
-        self.waited_s = 0.0
-
-    def monotonic(self) -> float:
-        return self.waited_s
-
-    time = monotonic
-
-    def time_ns(self) -> int:
-        return round(self.waited_s * SECOND)
-
-
-class Tape(Source):
-    """A source that gives what it was given; a live one, on which nothing more comes, lets `clock` go on."""
-
-    def __init__(self, *messages: ReceivedMessage, clock: WaitedClock | None = None) -> None:
-        super().__init__("tape")
-        self.messages = list(messages)
-        self.live = clock is not None
-        self.clock = clock
-        self.topics: Mapping[str, str] = {}
-        self.busy_s = 0.0
-
-    @property
-    def is_busy(self) -> bool:
-        return self.clock is not None and self.clock.waited_s < self.busy_s
-
-    def listen(self, topics: Mapping[str, str]) -> None:
-        self.topics = topics
-
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        if self.messages:
-            return self.messages.pop(0)
-        if self.clock:
-            self.clock.waited_s += wait_s
-        return None
-
-    def close(self) -> None:
-        """Nothing to leave."""
-
-
-class Kept(Sink):
-    """A sink that keeps what is published."""
-
-    def __init__(self, *, live: bool = False) -> None:
-        super().__init__("kept")
-        self.live = live
-        self.messages: list[tuple[str, Fields, int]] = []
-
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        assert kind
-        self.messages.append((topic, fields, at_ns))
-
-    def close(self) -> None:
-        """Nothing to write."""
-
-    def topics(self) -> list[str]:
-        return [topic for topic, _, _ in self.messages]
-
-
 def at(seconds: float, topic: str, fields: Mapping[str, object]) -> ReceivedMessage:
-    kinds = ReportDecoder(drones_of(HANGAR), "map").topics
+    kinds = ReportDecoder(drones_of(hangar()), "map").topics
     return ReceivedMessage(topic, kinds.get(topic, ""), fields, round(seconds * SECOND))
 
 
-def listened(*messages: ReceivedMessage, sink: Sink | None = None, team: Team = HANGAR) -> tuple[Outcome, ClosedLoop]:
+def listened(
+    *messages: ReceivedMessage, sink: Sink | None = None, team: Team | None = None
+) -> tuple[Outcome, ClosedLoop]:
+    team = team or hangar()
     feedback = SourceFeedback(Tape(*messages), ReportDecoder(drones_of(team), "map"))
     loop = ClosedLoop(team, [sink] if sink else [], feedback)
     return solve(team, SIMULATED, environment=loop), loop
@@ -130,32 +67,32 @@ def test_reports_that_change_nothing_open_no_epoch() -> None:
 
 
 def test_what_is_known_to_come_is_not_asked_for_again() -> None:
-    team = replace(HANGAR, scenario=(ScenarioEvent((RemoveAgent("Fin"),)),))
+    team = replace(hangar(), scenario=(ScenarioEvent((RemoveAgent("Fin"),)),))
     outcome, _ = listened(at(1, "/fin/out_of_order", {"data": ""}), at(3, "/fin/battery", {"percentage": 0}), team=team)
     assert openings(outcome) == ["the start", "-Fin"]
 
 
 def test_a_recordings_time_is_the_clock_of_what_is_published() -> None:
-    sink = Kept()
+    sink = KeptSink()
     listened(at(100, "/port/blocked", PORTS), at(107, "/nose/battery", {"percentage": 1.0}), sink=sink)
-    times = [at_ns / SECOND for _, _, at_ns in sink.messages]
+    times = [at_ns / SECOND for *_, at_ns in sink.said]
     assert times == [100.0] * 6 + [100.0] + [107.0] * 6 + [107.0]
     assert sink.topics()[6::7] == ["/port/blocked", "/nose/battery"]
 
 
 def test_what_was_heard_over_a_ros_is_not_said_there_again() -> None:
-    sink = Kept(live=True)
+    sink = KeptSink(live=True)
     _, loop = listened(at(100, "/port/blocked", PORTS), sink=sink)
-    assert set(sink.topics()) == {f"/{name.lower()}/waypoint" for name in HANGAR.order}
+    assert set(sink.topics()) == {f"/{name.lower()}/waypoint" for name in hangar().order}
     assert loop.publishers[0].summary == "12 waypoints, 0 landings"
 
 
 def test_who_leaves_lands() -> None:
-    sink = Kept()
+    sink = KeptSink()
     _, loop = listened(at(1, "/fin/out_of_order", {"data": "a motor"}), sink=sink)
     assert loop.publishers[0].summary == "11 waypoints, 1 landing, 1 report"
     assert loop.mission is not None
-    assert [drone.name for drone in loop.mission.drones] == sorted(HANGAR.order)
+    assert [drone.name for drone in loop.mission.drones] == sorted(hangar().order)
     assert [leg.opened_by for leg in loop.mission.legs] == ["the start", "-Fin"]
     assert [goal.lands for goal in loop.mission.legs[1].goals.values()] == [True, False, False, False, False, False]
 
@@ -175,15 +112,15 @@ def live(
     """A loop with a live source, and when it has said that it waits."""
     tape = Tape(*messages, clock=clock)
     tape.busy_s = busy_s
-    feedback = SourceFeedback(tape, ReportDecoder(drones_of(HANGAR), "map"), patience_s)
+    feedback = SourceFeedback(tape, ReportDecoder(drones_of(hangar()), "map"), patience_s)
     idle: list[float] = []
     feedback.idle = lambda: idle.append(clock.waited_s)
-    return ClosedLoop(HANGAR, (), feedback), idle
+    return ClosedLoop(hangar(), (), feedback), idle
 
 
 def test_a_live_source_is_waited_for_and_somebody_told_so(waited: WaitedClock) -> None:
     loop, idle = live(waited, 60, at(0, "/port/blocked", PORTS))
-    outcome = solve(HANGAR, SIMULATED, environment=loop)
+    outcome = solve(hangar(), SIMULATED, environment=loop)
     assert openings(outcome) == ["the start", "port without 3"]
     assert waited.waited_s == pytest.approx(60, abs=TOGETHER_S), "from the last decision on"
     assert len(idle) >= 60 / SLICE_S
@@ -207,18 +144,18 @@ class Audience:
 @pytest.mark.usefixtures("a_second_a_look")
 def test_a_report_while_the_team_searches_on_opens_the_next_epoch(waited: WaitedClock) -> None:
     """What would be better is of no use any more: the next epoch begins, and has a deadline of its own."""
-    sink = Kept()
-    kind = ReportDecoder(drones_of(PATROL), "map").topics["/west/out_of_order"]
+    sink, patrol = KeptSink(), example("patrol")
+    kind = ReportDecoder(drones_of(patrol), "map").topics["/west/out_of_order"]
 
     class Late(Tape):
         def next(self, wait_s: float) -> ReceivedMessage | None:
-            return super().next(wait_s) if sink.messages else None
+            return super().next(wait_s) if sink.said else None
 
     tape = Late(ReceivedMessage("/west/out_of_order", kind, {"data": "a motor"}, 0), clock=waited)
-    loop = ClosedLoop(PATROL, [sink], SourceFeedback(tape, ReportDecoder(drones_of(PATROL), "map"), 5.0))
+    loop = ClosedLoop(patrol, [sink], SourceFeedback(tape, ReportDecoder(drones_of(patrol), "map"), 5.0))
     audience = Audience(loop)
     options = replace(SIMULATED, protocol="dsa", settings={"cycles": "1000000"}, deadline=5, improve=2000)
-    outcome = solve(PATROL, options, environment=loop, audience=audience)
+    outcome = solve(patrol, options, environment=loop, audience=audience)
     assert openings(outcome) == ["the start", "-West"]
     first, second = outcome.epochs
     assert [len(first.improvements) < 9, len(second.improvements) >= 1] == [True, True]
@@ -232,26 +169,26 @@ def test_a_report_while_the_team_searches_on_opens_the_next_epoch(waited: Waited
 
 def test_the_wait_begins_when_robots_are_where_they_were_sent(waited: WaitedClock) -> None:
     loop, _ = live(waited, 10, busy_s=45)
-    solve(HANGAR, SIMULATED, environment=loop)
+    solve(hangar(), SIMULATED, environment=loop)
     assert waited.waited_s == pytest.approx(55, abs=2 * SLICE_S)
 
 
 def test_robots_on_their_way_are_waited_for_no_longer_than_all_may_take(waited: WaitedClock) -> None:
     loop, _ = live(waited, 10, busy_s=10 * HANG_S)
-    solve(HANGAR, replace(SIMULATED, timeout=HANG_S), environment=loop)
+    solve(hangar(), replace(SIMULATED, timeout=HANG_S), environment=loop)
     assert 0 < waited.waited_s <= HANG_S + SLICE_S
 
 
 def test_waiting_is_bounded_by_the_time_for_all(waited: WaitedClock) -> None:
     loop, _ = live(waited, 10 * HANG_S)
-    outcome = solve(HANGAR, replace(SIMULATED, timeout=HANG_S), environment=loop)
+    outcome = solve(hangar(), replace(SIMULATED, timeout=HANG_S), environment=loop)
     assert (outcome.verdict, openings(outcome)) == (Verdict.SOLUTION, ["the start"])
     assert 0 < waited.waited_s <= HANG_S + SLICE_S
 
 
 def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
-    sink = Kept(live=True)
-    loop = ClosedLoop(HANGAR, [sink])
-    loop.publish(solve(HANGAR, SIMULATED))
-    assert (loop.team, loop.mission) == (HANGAR, None)
+    sink = KeptSink(live=True)
+    loop = ClosedLoop(hangar(), [sink])
+    loop.publish(solve(hangar(), SIMULATED))
+    assert (loop.team, loop.mission) == (hangar(), None)
     assert loop.publishers[0].summary == "6 waypoints, 0 landings"

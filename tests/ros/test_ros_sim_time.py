@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,88 +9,32 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
-from robochoc.formats import read_team
 from robochoc.ros.closed_loop import ClosedLoop, drones_of
 from robochoc.ros.recordings.mcap_file import McapSink
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sim_clock import CLOCK, CLOCK_KIND, SimClock
-from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.sinks import open_source
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import Options, Runtime, solve
 from tests.support.cases import looped
+from tests.support.example_teams import hangar
 from tests.support.program import ROOT
+from tests.support.ros_ends import SECOND, KeptSink, Tape, WaitedClock
 
 FOLDER = ROOT / "docs" / "examples" / "hangar"
-HANGAR = read_team(FOLDER)
-SECOND = 1_000_000_000
 PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 """Where Port flies first."""
 
 
-class Waited:
-    """A clock that goes on while somebody waits, and then only."""
-
-    waited_s = 0.0
-
-    def monotonic(self) -> float:
-        return self.waited_s
-
-    time = monotonic
-
-    def time_ns(self) -> int:
-        return round(self.waited_s * SECOND)
-
-
-class Live(Source):
-    """A live source that gives what it was given: messages, or seconds in which nothing comes."""
-
-    def __init__(self, clock: Waited, *messages: ReceivedMessage | float) -> None:
-        super().__init__("live")
-        self.messages = [*messages]
-        self.clock = clock
-        self.topics: Mapping[str, str] = {}
-
-    def listen(self, topics: Mapping[str, str]) -> None:
-        self.topics = topics
-
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        if self.messages and isinstance(self.messages[0], ReceivedMessage):
-            return self.messages.pop(0)  # type: ignore[return-value]  # looked at above
-        self.clock.waited_s += wait_s
-        if self.messages and self.clock.waited_s >= float(self.messages[0]):  # type: ignore[arg-type]  # a number
-            self.messages.pop(0)
-        return None
-
-    def close(self) -> None:
-        """Nothing to leave."""
-
-
-class Endless(Live):
+class Endless(Tape):
     """A live source on which one robot reports its place all the time, after what it was given."""
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
+        assert self.clock is not None
         self.clock.waited_s += min(wait_s, 0.1) or 0.01
         assert self.clock.waited_s < 1_000, "somebody waits for ever"
         return super().next(0) if self.messages else pose()
-
-
-class Kept(Sink):
-    """A recording that keeps what is published."""
-
-    live = False
-
-    def __init__(self) -> None:
-        super().__init__("kept")
-        self.messages: list[tuple[str, Fields, int]] = []
-
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        assert kind
-        self.messages.append((topic, fields, at_ns))
-
-    def close(self) -> None:
-        """Nothing to write."""
 
 
 def tick(seconds: float) -> ReceivedMessage:
@@ -107,53 +50,55 @@ def blocked() -> ReceivedMessage:
 
 
 @pytest.fixture
-def waited(monkeypatch: pytest.MonkeyPatch) -> Waited:
-    clock = Waited()
+def waited(monkeypatch: pytest.MonkeyPatch) -> WaitedClock:
+    clock = WaitedClock()
     monkeypatch.setattr("robochoc.ros.source_feedback.time", clock)
     return clock
 
 
-def run(source: Source, patience_s: float = 60.0) -> Kept:
+def run(source: Tape, patience_s: float = 60.0) -> KeptSink:
     """What is published in a run."""
-    sink = Kept()
-    feedback = SourceFeedback(source, ReportDecoder(drones_of(HANGAR), "map"), patience_s, sim_time=True)
+    sink = KeptSink()
+    feedback = SourceFeedback(source, ReportDecoder(drones_of(hangar()), "map"), patience_s, sim_time=True)
     options = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
-    solve(HANGAR, options, environment=ClosedLoop(HANGAR, [sink], feedback))
+    solve(hangar(), options, environment=ClosedLoop(hangar(), [sink], feedback))
     return sink
 
 
-def test_decisions_and_reports_have_the_time_of_the_simulation(waited: Waited) -> None:
-    source = Live(waited, 2.0, tick(100), tick(100.5), blocked(), tick(101), tick(103))
-    times = [(topic, at_ns / SECOND) for topic, _, at_ns in run(source).messages]
+def test_decisions_and_reports_have_the_time_of_the_simulation(waited: WaitedClock) -> None:
+    source = Tape(2.0, tick(100), tick(100.5), blocked(), tick(101), tick(103), clock=waited)
+    times = [(topic, at_ns / SECOND) for topic, _, _, at_ns in run(source).said]
     assert source.topics[CLOCK] == CLOCK_KIND
     waypoint = "/port/waypoint"
     assert [at_s for topic, at_s in times if topic == waypoint] == [103, 103]
     assert [at_s for topic, at_s in times if topic == "/port/blocked"] == [103]
 
 
-def test_a_report_that_came_before_the_first_decision_counts(waited: Waited) -> None:
+def test_a_report_that_came_before_the_first_decision_counts(waited: WaitedClock) -> None:
     """It waits while the clock is read."""
-    published = run(Live(waited, blocked(), tick(5))).messages
-    assert len([topic for topic, _, _ in published if topic == "/port/waypoint"]) == 2
+    published = run(Tape(blocked(), tick(5), clock=waited)).topics()
+    assert published.count("/port/waypoint") == 2
 
 
-def test_without_a_clock_the_run_ends_also_where_robots_report_all_the_time(waited: Waited) -> None:
-    with pytest.raises(SourceError, match="no time came on /clock of live within 3 s"):
-        run(Endless(waited), 3.0)
+def test_without_a_clock_the_run_ends_also_where_robots_report_all_the_time(waited: WaitedClock) -> None:
+    with pytest.raises(SourceError, match="no time came on /clock of tape within 3 s"):
+        run(Endless(clock=waited), 3.0)
 
 
-def test_reports_that_come_faster_than_they_are_read_keep_no_decision_from_its_time(waited: Waited) -> None:
-    feedback = SourceFeedback(Endless(waited, tick(5)), ReportDecoder(drones_of(HANGAR), "map"), 3.0, sim_time=True)
+def test_reports_that_come_faster_than_they_are_read_keep_no_decision_from_its_time(waited: WaitedClock) -> None:
+    feedback = SourceFeedback(
+        Endless(tick(5), clock=waited), ReportDecoder(drones_of(hangar()), "map"), 3.0, sim_time=True
+    )
     assert feedback.now_ns() == 5 * SECOND
     assert waited.waited_s <= 3.1
     assert feedback.poll() is None  # none of them says where it is
     assert waited.waited_s <= 3.4
 
 
-def test_without_a_clock_the_run_ends(waited: Waited) -> None:
-    told = r"no time came on /clock of live within 3 s; start the simulation, or leave out --use-sim-time"
+def test_without_a_clock_the_run_ends(waited: WaitedClock) -> None:
+    told = r"no time came on /clock of tape within 3 s; start the simulation, or leave out --use-sim-time"
     with pytest.raises(SourceError, match=told):
-        run(Live(waited, blocked()), patience_s=3)
+        run(Tape(blocked(), clock=waited), patience_s=3)
     assert waited.waited_s == pytest.approx(3, abs=0.5)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,11 +18,12 @@ from robochoc.ros.mappings import NoMappingError, WaypointMapping, kinds, mappin
 from robochoc.ros.names import REPORTS
 from robochoc.ros.publisher import NothingToPublishError, Publisher
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
-from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.sink import Fields
 from robochoc.ros.team_topics import PublishOptions
 from robochoc.ros.waypoint import Waypoint
 from tests.support.cases import looped
 from tests.support.installed_packages import install_entry_points
+from tests.support.ros_ends import KeptSink
 
 POSE = "geometry_msgs/PoseStamped"
 NOW = 1_700_000_000_250_000_000
@@ -58,28 +58,6 @@ WITH_HEADER = {
 LANDS = Leg("begin", Verdict.SOLUTION, {0: Goal((-2.0, 0.0, 0.0), lands=True)})
 
 
-class Heap(Sink):
-    """Keeps what it gets."""
-
-    def __init__(self) -> None:
-        super().__init__("")
-        self.advertised: list[dict[str, str]] = []
-        self.original: dict[str, str] = {}
-        self.said: list[tuple[str, str, Fields, int]] = []
-
-    def explain(self, original: Mapping[str, str]) -> None:
-        self.original = {**original}
-
-    def advertise(self, topics: Mapping[str, str]) -> None:
-        self.advertised.append({**topics})
-
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        self.said.append((topic, kind, fields, at_ns))
-
-    def close(self) -> None:
-        raise AssertionError("the publisher did not open it")
-
-
 def installed(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
     """As if a package offered these mappings: types are written with a double underscore here."""
     install_entry_points(
@@ -112,7 +90,7 @@ def failing(waypoint: Waypoint) -> Fields:
 
 
 def test_who_flies_and_who_lands_publishes_and_nobody_else() -> None:
-    heap = Heap()
+    heap = KeptSink()
     Publisher("team", DRONES, [heap]).decide(LEG, NOW)
     landing = {"position": {"x": -2.0, "y": 0.0, "z": 0.0}, "orientation": {"w": 1.0}}
     assert heap.said == [
@@ -122,7 +100,7 @@ def test_who_flies_and_who_lands_publishes_and_nobody_else() -> None:
 
 
 def test_all_is_advertised_once_to_every_sink() -> None:
-    heaps = [Heap(), Heap()]
+    heaps = [KeptSink(), KeptSink()]
     publisher = Publisher("team", DRONES, heaps)
     publisher.decide(LEG, NOW)
     for heap in heaps:
@@ -138,7 +116,7 @@ def test_all_is_advertised_once_to_every_sink() -> None:
 
 
 def test_poses_of_all_drones() -> None:
-    heap = Heap()
+    heap = KeptSink()
     publisher = Publisher("team", DRONES, [heap], frame="arena")
     turned = np.tile([0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)], (4, 1))
     publisher.poses(np.arange(12.0).reshape(4, 3), turned, NOW)
@@ -165,7 +143,7 @@ def test_poses_of_all_drones() -> None:
     ],
 )
 def test_reports(report: Report, topic: str, part: str, value: object) -> None:
-    heap = Heap()
+    heap = KeptSink()
     Publisher("team", DRONES, [heap]).report(report, NOW)
     ((where, kind, fields, at_ns),) = heap.said
     assert (where, kind, at_ns) == (f"/drone1_2/{topic}", REPORTS[topic], NOW)
@@ -176,21 +154,21 @@ def test_reports(report: Report, topic: str, part: str, value: object) -> None:
 
 
 def test_what_a_battery_does_not_measure_is_not_zero() -> None:
-    heap = Heap()
+    heap = KeptSink()
     Publisher("team", DRONES, [heap]).report(Battery("drone1.1", 1.0), NOW)
     assert math.isnan(heap.said[0][2]["voltage"])
 
 
 def test_a_team_without_topics_has_nothing_to_publish() -> None:
     with pytest.raises(NothingToPublishError, match="no drone of queens has a topic"):
-        Publisher("queens", DRONES[2:3], [Heap()])
+        Publisher("queens", DRONES[2:3], [KeptSink()])
 
 
 @looped("kind", ["sensor_msgs/Image", "PoseStamped", "", "a/b/c", "geometry_msgs/srv/Pose"])
 def test_a_type_that_nobody_maps_is_refused(kind: str) -> None:
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", kind))
     with pytest.raises(NoMappingError) as refused:
-        Publisher("team", [drone], [Heap()])
+        Publisher("team", [drone], [KeptSink()])
     told = str(refused.value)
     assert all(part in told for part in ("/drone1.1/waypoint1.1", "Robot1.1", repr(kind), POSE, "robochoc.waypoints"))
 
@@ -210,7 +188,7 @@ def test_every_built_in_type_is_a_type_of_ros_and_holds_the_place(kind: str, ver
 
 def test_a_path_leads_from_the_goal_before() -> None:
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "nav_msgs/Path"))
-    heap = Heap()
+    heap = KeptSink()
     publisher = Publisher("team", [drone], [heap])
     for place in ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)):
         publisher.decide(Leg("begin", Verdict.SOLUTION, {0: Goal(place)}), NOW)
@@ -230,7 +208,7 @@ def test_a_text_is_json() -> None:
 
 
 def test_one_type_for_all_waypoints() -> None:
-    heap = Heap()
+    heap = KeptSink()
     Publisher("team", DRONES, [heap], options=PublishOptions(kind="geometry_msgs/msg/Vector3")).decide(LEG, NOW)
     assert [kind for _, kind, _, _ in heap.said] == ["geometry_msgs/msg/Vector3"] * 2
     with pytest.raises(NoMappingError, match="'sensor_msgs/Image'"):
@@ -241,7 +219,7 @@ def test_one_type_for_all_waypoints() -> None:
 
 def test_goals_and_drones_are_frames() -> None:
     """Every message on a latched topic has all goals that stand, as later ones hear the last message alone."""
-    heap = Heap()
+    heap = KeptSink()
     publisher = Publisher("team", DRONES, [heap], options=PublishOptions(frames=True))
     publisher.decide(LEG, NOW)
     publisher.decide(LANDS, NOW + 1)
@@ -270,7 +248,7 @@ def test_goals_and_drones_are_frames() -> None:
     [(Verdict.SOLUTION, 0), (Verdict.OPTIMAL, 0), (Verdict.UNKNOWN, 1), (Verdict.NO_SOLUTION, 2)],
 )
 def test_how_the_run_stands(verdict: Verdict, level: int) -> None:
-    heap = Heap()
+    heap = KeptSink()
     publisher = Publisher("team", DRONES, [heap], options=PublishOptions(diagnostics=True))
     publisher.decide(LANDS, NOW)
     publisher.decide(Leg("-Nose\n", verdict, {1: Goal((0.0, 0.0, 0.0))}, cost=7), NOW)
@@ -292,7 +270,7 @@ def test_how_the_run_stands(verdict: Verdict, level: int) -> None:
 
 
 def test_nothing_else_is_published_that_was_not_asked_for() -> None:
-    heap = Heap()
+    heap = KeptSink()
     publisher = Publisher("team", DRONES, [heap])
     publisher.decide(LEG, NOW)
     publisher.poses(np.zeros((4, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (4, 1)), NOW)
@@ -306,7 +284,7 @@ def test_both_spellings_are_one_type() -> None:
 
 def test_a_package_brings_a_type_and_its_definition(monkeypatch: pytest.MonkeyPatch) -> None:
     installed(monkeypatch, my_msgs__Target="tests.ros.test_ros_waypoints:TARGET")
-    heap = Heap()
+    heap = KeptSink()
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/msg/Target"))
     Publisher("team", [drone], [heap]).decide(LANDS, NOW)
     ((_, kind, fields, _),) = heap.said
@@ -322,13 +300,13 @@ def test_a_broken_package_is_told(monkeypatch: pytest.MonkeyPatch, place: str) -
     installed(monkeypatch, my_msgs__Target=place)
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Target"))
     with pytest.raises(NoMappingError, match=place):
-        Publisher("team", [drone], [Heap()])
+        Publisher("team", [drone], [KeptSink()])
 
 
 def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     installed(monkeypatch, my_msgs__Failing="tests.ros.test_ros_waypoints:failing")
     drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "my_msgs/Failing"))
-    publisher = Publisher("team", [drone], [Heap()])
+    publisher = Publisher("team", [drone], [KeptSink()])
     with pytest.raises(NoMappingError, match=r"my_msgs/Failing failed: ValueError: no \("):
         publisher.decide(LANDS, NOW)
 

@@ -67,7 +67,8 @@ def test_a_graph_to_be_coloured_has_the_degree_that_was_asked_for() -> None:
 
 
 @looped(
-    "team", [random_csp(8, 3, 0.5, 0.2, 1, max_cost=0), random_csp(8, 3, 0.5, 0.2, 1, max_cost=50), coloring(8, 2, 3)]
+    "team",
+    lambda: [random_csp(8, 3, 0.5, 0.2, 1, max_cost=0), random_csp(8, 3, 0.5, 0.2, 1, max_cost=50), coloring(8, 2, 3)],
 )
 def test_the_team_is_what_its_files_say(tmp_path: Path, team: Team) -> None:
     write_team(team, tmp_path / team.name)
