@@ -52,13 +52,12 @@ def _is_free(port: int) -> bool:
         return True
 
 
-class Peer:
-    """A program at the other end, from when its topics exist until it is left."""
+class _Program:
+    """A program that says "ready" when its topics or services exist, and takes and gives lines of JSON."""
 
-    def __init__(self, what: str, domain: int, topics: Mapping[str, str], **settings: object) -> None:
-        words = [what, str(domain), json.dumps({"topics": topics, **settings})]
+    def __init__(self, path: Path, *words: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, str(_PEER), *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [sys.executable, str(path), *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
     def __enter__(self) -> Self:
@@ -70,11 +69,28 @@ class Peer:
         assert self.process.stdout is not None
         return json.loads(self.process.stdout.readline())
 
+    def begin(self, name: str, fields: object) -> None:
+        """Give it a line, and do not wait for the answer."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps([name, fields]) + "\n")
+        self.process.stdin.flush()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.process.kill()
+        self.process.communicate(timeout=HANG_S)
+
+
+class Peer(_Program):
+    """A program at the other end of topics."""
+
+    def __init__(self, what: str, domain: int, topics: Mapping[str, str], **settings: object) -> None:
+        super().__init__(_PEER, what, str(domain), json.dumps({"topics": topics, **settings}))
+
     def say(self, topic: str, **fields: object) -> None:
         """Have it publish a message."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps([topic, fields]) + "\n")
-        self.process.stdin.flush()
+        self.begin(topic, fields)
         assert self.heard() == "written"
 
     def rest(self) -> Iterator[Any]:
@@ -82,45 +98,17 @@ class Peer:
         said, _ = self.process.communicate(timeout=HANG_S)
         return map(json.loads, said.splitlines())
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.process.kill()
-        self.process.communicate(timeout=HANG_S)
 
-
-class ServiceClient:
-    """A program at the other end of services, from when they are there until it is left."""
+class ServiceClient(_Program):
+    """A program at the other end of services."""
 
     def __init__(self, domain: int, services: Mapping[str, str]) -> None:
-        words = [sys.executable, str(_CLIENT), str(domain), json.dumps({**services})]
-        self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-    def __enter__(self) -> Self:
-        assert self.heard() == "ready"
-        return self
-
-    def heard(self) -> Any:  # noqa: ANN401 - JSON
-        """The next line that it says."""
-        assert self.process.stdout is not None
-        return json.loads(self.process.stdout.readline())
-
-    def begin(self, name: str, fields: object) -> None:
-        """Have it ask, and do not wait for the answer."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps([name, fields]) + "\n")
-        self.process.stdin.flush()
+        super().__init__(_CLIENT, str(domain), json.dumps({**services}))
 
     def ask(self, name: str, **fields: object) -> Any:  # noqa: ANN401 - JSON
         """Have it ask; return the answer."""
         self.begin(name, fields)
         return self.heard()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.process.kill()
-        self.process.communicate(timeout=HANG_S)
 
 
 def subscriber(domain: int, topics: Mapping[str, str], *, reliable: bool = True, **settings: object) -> Peer:

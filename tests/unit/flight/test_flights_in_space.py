@@ -21,7 +21,8 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
-from tests.support.flights_in_space import FlownInSpace, flown_in_space, gaps_in_space
+from tests.support.flights_in_space import flown_in_space, gaps_in_space
+from tests.support.flown_teams import FlownTeam
 from tests.support.octomaps import FREE, Voxel, write_octomap
 
 NO_ROOM = re.compile(
@@ -65,7 +66,7 @@ def sent(
 @pytest.mark.parametrize("seed", [7, 11])
 def test_drones_fly_around_voxels_and_keep_from_each_other(seed: int, tmp_path: Path) -> None:
     made = flown_in_space(seed, tmp_path)
-    assert isinstance(made, FlownInSpace)
+    assert isinstance(made, FlownTeam)
     assert made.faults() == []
 
 
@@ -74,7 +75,7 @@ def test_drones_fly_around_voxels_and_keep_from_each_other(seed: int, tmp_path: 
 def test_drones_fly_around_voxels_on_hundreds_of_maps(block: int, tmp_path: Path) -> None:
     seeds = range(100 + 20 * block, 120 + 20 * block)
     made = {seed: flown_in_space(seed, tmp_path) for seed in seeds}
-    flown = {seed: one for seed, one in made.items() if isinstance(one, FlownInSpace)}
+    flown = {seed: one for seed, one in made.items() if isinstance(one, FlownTeam)}
     assert {seed: one.faults() for seed, one in flown.items() if one.faults()} == {}
     refused = [one for one in made.values() if isinstance(one, str) and not one.startswith("no team")]
     assert [one for one in refused if not NO_ROOM.search(one)] == []

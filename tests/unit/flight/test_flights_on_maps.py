@@ -25,7 +25,8 @@ from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
 from tests.support.cases import looped
 from tests.support.examples import examples
-from tests.support.flights_on_maps import FlownTeam, flown_team, gaps
+from tests.support.flights_on_maps import flown_team, gaps
+from tests.support.flown_teams import FlownTeam
 from tests.support.maps import write_map
 from tests.support.program import ROOT
 from tests.support.ways_on_maps import NO_TEAM, refused_way
@@ -80,7 +81,7 @@ def test_drones_fly_around_walls_on_hundreds_of_maps(block: int, tmp_path: Path)
 @example(24)
 @example(35)
 @given(st.integers(0, 2**32))
-@examples(12)
+@examples(6, 120)
 def test_no_flight_of_a_generated_team_is_refused_for_a_narrow_way(seed: int) -> None:
     with TemporaryDirectory() as folder:
         assert refused_way(seed, Path(folder)) in {"", NO_TEAM}

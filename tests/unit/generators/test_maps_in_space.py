@@ -116,7 +116,7 @@ def touched_by(cells: Cubes, cell: int) -> set[Voxel]:
 
 
 @given(SIDES, FIRST, st.integers(0, 2**32), st.sampled_from(["0.5", "0.75", "1", "1.7", "0.3"]))
-@examples(20)
+@examples(10, 200)
 def test_a_cell_is_free_where_all_its_voxels_are(sides: Voxel, first: Voxel, seed: int, side: str) -> None:
     voxels = drawn_voxels(Random(seed), sides, first, 0.05)
     if not has_free(voxels):
@@ -213,7 +213,7 @@ def touches(start: Point, end: Point, voxel: Voxel) -> bool:
     st.integers(0, 2**32),
     st.sampled_from(["0.5", "0.75", "1", "0.3"]),
 )
-@examples(35)
+@examples(20, 350)
 def test_what_is_seen_is_seen_through_free_voxels(sides: Voxel, first: Voxel, seed: int, side: str) -> None:
     voxels = drawn_voxels(Random(seed), sides, first, 0.06)
     if not has_free(voxels):
@@ -271,9 +271,10 @@ def test_formations_are_as_cheap_as_can_be_and_drones_fit_there(tmp_path: Path) 
             sum(reach.seconds[robot][slot] for robot, slot in enumerate(order))
             for order in itertools.permutations(slots)
         ]
-        for protocol in ("central", "dpop", "afb"):
+        assert best(team) == Fraction(min(totals), 10)
+        for protocol in ("central", "dpop", "afb")[seed:]:
             cost, assignment = answers(team, protocol)
-            assert cost == Fraction(min(totals), 10) == best(team)
+            assert cost == Fraction(min(totals), 10)
             for robot in range(4):
                 place = place_of(team, robot, assignment, reach.cells.side)
                 at = reach.cells.pixel(place)

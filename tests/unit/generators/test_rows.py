@@ -13,7 +13,6 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.run import Options, Runtime, solve
 from tests.support.flights import scene_of
 from tests.support.limits import HANG_S
-from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import robochoc_within
 
 
@@ -38,15 +37,16 @@ def test_a_team_of_rows_is_written_and_read_back(tmp_path: Path) -> None:
     assert read_team(tmp_path / "instances" / "queens3d-5-rows") == queens3d(5, robots="rows")
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
 @pytest.mark.parametrize(
-    ("n", "model", "verdict"),
+    ("n", "model", "verdict", "runtime"),
     [
-        (4, "planar", Verdict.NO_SOLUTION),
-        (4, "full", Verdict.NO_SOLUTION),
-        (7, "planar", Verdict.SOLUTION),
-        (7, "full", Verdict.NO_SOLUTION),
-        pytest.param(11, "planar", Verdict.SOLUTION, marks=pytest.mark.slow),
+        (4, "planar", Verdict.NO_SOLUTION, Runtime.SIMULATOR),
+        (4, "full", Verdict.NO_SOLUTION, Runtime.PROCESSES),
+        (7, "planar", Verdict.SOLUTION, Runtime.SIMULATOR),
+        (7, "full", Verdict.NO_SOLUTION, Runtime.SIMULATOR),
+        pytest.param(7, "planar", Verdict.SOLUTION, Runtime.PROCESSES, marks=pytest.mark.more),
+        pytest.param(11, "planar", Verdict.SOLUTION, Runtime.SIMULATOR, marks=pytest.mark.slow),
+        pytest.param(11, "planar", Verdict.SOLUTION, Runtime.PROCESSES, marks=pytest.mark.slow),
     ],
 )
 def test_rows_reach_the_verdict_that_cells_reach(n: int, model: str, verdict: Verdict, runtime: Runtime) -> None:
