@@ -34,6 +34,7 @@ from robochoc.formats.octomap.octree import read_octree
 from robochoc.formats.order_file import read_order
 from robochoc.ros.autopilots.fleet import FleetError, read_fleet
 from tests.support.cases import looped
+from tests.support.foreign_files import CFN, FRODO, WCSP, XDISCSPS
 
 REFUSED = (InvalidInputError, MistakeError, FleetError, ValueError)
 
@@ -90,27 +91,6 @@ STUDY = {
     "limits": {"timeout": 5.0},
     "report": {"over": "agents", "names": {"abt": "ABT"}},
 }  # fmt: skip
-FRODO = """<instance><presentation name="p" maximize="false" format="XCSP 2.1_FRODO"/>
-<agents nbAgents="2"><agent name="a"/><agent name="b"/></agents>
-<domains nbDomains="1"><domain name="d" nbValues="2">1..2</domain></domains>
-<variables nbVariables="2"><variable name="x" domain="d" agent="a"/>
-<variable name="y" domain="d" agent="b"/></variables>
-<relations><relation name="r" arity="2" nbTuples="1" semantics="soft" defaultCost="1">2: 1 1</relation></relations>
-<predicates><predicate name="p"><parameters>int X int Y</parameters>
-<expression><functional>ne(X,Y)</functional></expression></predicate></predicates>
-<functions><function name="f" return="int"><parameters>int X</parameters>
-<expression><functional>add(X,1)</functional></expression></function></functions>
-<constraints nbConstraints="4"><constraint name="c" arity="2" scope="x y" reference="r"/>
-<constraint name="e" scope="x y" reference="p"><parameters>x y</parameters></constraint>
-<constraint name="g" scope="x" reference="f"><parameters>x</parameters></constraint>
-<constraint name="h" scope="x y" reference="global:weightedSum"><parameters>[ { 1 x } { 1 y } ] <le/> 4</parameters>
-</constraint></constraints></instance>"""
-XDISCSP = """<instance><presentation name="p" type="DCOP" model="Simple" constraintModel="TKC" format="XDisCSP 1.0"/>
-<agents nbAgents="2"><agent name="a" id="1" description="one"/><agent name="b" id="2"/></agents>
-<domains><domain name="d" nbValues="2">1..2</domain></domains>
-<variables><variable name="x" id="1" domain="d" agent="a"/><variable name="y" id="1" domain="d" agent="b"/></variables>
-<relations><relation name="r" semantics="soft" defaultCost="1">2:1 1</relation></relations>
-<constraints><constraint name="c" model="PKC" ownerId="1" scope="x y" reference="r"/></constraints></instance>"""
 ROBOT = """<instance><presentation type="DisWCSP" scale="0.1"/>
 <domains nbDomains="1"><domain name="D" nbValues="2">1..2</domain></domains>
 <variables nbVariables="1"><variable name="{me}.x" domain="D"/></variables>
@@ -134,9 +114,6 @@ SCENARIO = """<scenario><event after="5 messages"><add_constraint agent="B" pare
 <constraint name="n" model="TKC" scope="A.x B.x" reference="ne"><parameters>A.x B.x</parameters></constraint>
 </add_constraint></event><event after="solved"><remove_constraint agent="B" parent="A" name="n"/></event>
 <event after="solved"><remove_agent name="B"/></event></scenario>"""
-WCSP = "small 2 2 1 9\n2 2\n2 0 1 0 1\n0 0 3\n"
-CFN = """{ problem: { name: small, mustbe: "<9.0" }, variables: {x: 2, y: [a b]},
-functions: { f: {scope: [x y], costs: [0 1 2 3]}}}"""
 OCTOMAP = b"# Octomap OcTree binary file\nid OcTree\nsize 2\nres 0.5\ndata\n\x01\x00"
 
 
@@ -203,7 +180,7 @@ ELEMENTS = [
     Reader("B.xml", SECOND, team),
     Reader("scenario.xml", SCENARIO, team),
     Reader("frodo.xml", FRODO, foreign),
-    Reader("xdiscsp.xml", XDISCSP, foreign),
+    *(Reader(f"xdiscsp-{number}.xml", text, foreign) for number, text in enumerate(XDISCSPS)),
 ]
 TEXTS = [
     Reader("a.wcsp", WCSP.encode(), foreign),

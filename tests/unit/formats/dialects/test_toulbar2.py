@@ -14,28 +14,8 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.cases import looped
+from tests.support.foreign_files import CFN, WCSP
 from tests.support.foreign_problems import imported, optimum, written
-
-CFN = """# loose
-{ problem: { name: "loose" mustbe: "<20.00" }
-  variables: { x: [a b] "y": 3, z: -2 }  // three
-  functions: {
-    c: {scope: [], costs: [-1.50]}
-    {scope [x y] defaultcost: 1.259 costs: [a 0 2, b 2 inf, 1 1 -3.1]}
-    t1: {scope: [x z], costs: t2}
-    t2: {scope: [x 2], costs: [0 1 2 3]}
-} }
-"""
-WCSP = """shared 3 2 4 5
-2 2 2
--2 0 1 0 2
-0 0 1
-1 1 9
-2 1 2 0 -1
-1 2 0 1
-1 2
-0 3 0
-"""
 
 
 def test_a_loose_cfn(tmp_path: Path) -> None:
