@@ -59,7 +59,7 @@ test-slow: $(READY)  ## the rest: random batches in length, faults in all varian
 # Browsers, machines in networks of their own, vehicles, and other whole programs. The seed draws new random problems.
 test-more: $(READY)  ## whole programs: pages in a browser, networks, vehicles
 	@echo "seed $(SEED): make test-more SEED=$(SEED) draws the same examples"
-	$(PYTEST) -m 'more or (fresh and not slow)' --hypothesis-profile=fresh --hypothesis-seed=$(SEED)
+	$(PYTEST) -m '(more or fresh) and not slow' --hypothesis-profile=fresh --hypothesis-seed=$(SEED)
 
 test-all: test test-more test-slow
 

@@ -39,7 +39,18 @@ from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.cases import looped
 from tests.support.in_memory_network import RUN, ScriptedTransport
-from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task
+from tests.support.lone_robot import (
+    LEAVE,
+    UNPROVEN,
+    From,
+    answering,
+    chain_of_three,
+    counted,
+    ok,
+    played,
+    searching,
+    task,
+)
 
 
 def test_a_run_from_beginning_to_end() -> None:
@@ -75,87 +86,47 @@ def test_a_run_from_beginning_to_end() -> None:
 
 
 def test_what_others_say_before_the_task_and_the_start_waits() -> None:
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
-                yield task()
-                yield transport.frame(ProtocolMessage(1, 0, ok(2)), "RA")
-            case Ready():
-                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
-                yield StartSearch(1)
-            case Counters(_, _, _, 3):
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
+    one, other = (From("RA", ProtocolMessage(1, 0, ok(value))) for value in (1, 2))
+    ending, transport = played(
+        answering((Joined, [one, task(), other]), (Ready, [one, StartSearch(1)]), (counted(3), [LEAVE]))
+    )
     assert ending.assignment == {"B": 2}
     assert not transport.heard_of(Objection)
 
 
 def test_what_was_said_in_another_search_is_passed_over() -> None:
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task()
-            case Ready(1):
-                yield Pause()
-            case DetailedReport(1):
-                yield transport.frame(ProtocolMessage(1, 0, ok(3)), "RA")
-                yield transport.frame(Copies(1, b"\x90"), "RA")
-                yield task(epoch=2)
-            case Ready(2):
-                yield StartSearch(2)
-                yield transport.frame(ProtocolMessage(2, 0, ok(1)), "RA")
-                yield transport.frame(ProtocolMessage(1, 0, b"late, and no message"), "RA")
-                yield transport.frame(ProtocolMessage(3, 0, b"early, and no message"), "RA")
-            case Counters(2, _, _, 1):
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
+    before = [From("RA", word) for word in (ProtocolMessage(1, 0, ok(3)), Copies(1, b"\x90"))]
+    now, late, early = (
+        From("RA", ProtocolMessage(epoch, 0, content)) for epoch, content in ((2, ok(1)), (1, b"-"), (3, b"-"))
+    )
+    ending, transport = played(
+        answering(
+            (Joined, [task()]),
+            (Ready(1), [Pause()]),
+            (DetailedReport, [*before, task(epoch=2)]),
+            (Ready(2), [StartSearch(2), now, late, early]),
+            (counted(1, epoch=2), [LEAVE]),
+        )
+    )
     assert ending == Ending("over", failed=False, assignment={"B": 2})
     assert not transport.heard_of(Failed)
 
 
 def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task()
-            case Ready():
-                yield StartSearch(1)
-            case Counters(_, 0, _, 0):
-                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
-                yield Pause()
-            case DetailedReport():
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
+    late = From("RA", ProtocolMessage(1, 0, ok(1)))
+    ending, transport = played(
+        answering(
+            (Joined, [task()]), (Ready, [StartSearch(1)]), (counted(0), [late, Pause()]), (DetailedReport, [LEAVE])
+        )
+    )
     (account,) = transport.heard_of(DetailedReport)
     assert isinstance(account, DetailedReport)
     assert account.assignment == ending.assignment == {"B": 1}
 
 
-@looped(
-    "word",
-    [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {}), Recall(1, 1), Adopt(1, 1)],
-)
+@looped("word", [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {}), Recall(1, 1), Adopt(1, 1)])
 def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
-    def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match heard:
-            case Joined():
-                yield word
-            case Objection():
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
+    ending, transport = played(answering((Joined, [word]), (Objection, [LEAVE])))
     assert not ending.failed
     assert transport.heard_of(Objection) == [
         Objection(MASTER, "a frame to RB", f"{type(word).__name__} is nothing to be told now")
@@ -167,51 +138,34 @@ def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
     [StartSearch(2), CheckRequest(2, {}), CheckRequest(1, {}, 7), Recall(2, 1), Adopt(2, 0), Adopt(1, 7, "solution")],
 )
 def test_orders_of_another_search_are_objected_to(word: ControlMessage) -> None:
-    def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match heard:
-            case Joined():
-                yield task()
-            case Ready():
-                yield word
-            case Objection():
-                yield LEAVE
-            case _:
-                pass
-
+    script = answering((Joined, [task()]), (Ready, [word]), (Objection, [LEAVE]))
     assert len(played(script)[1].heard_of(Objection)) == 1
+
+
+def packed(word: ControlMessage, number: int = 1) -> bytes:
+    """Return a frame of this run, as a robot of our own would not write it."""
+    return msgspec.msgpack.encode(Frame(RUN, number, word))
 
 
 @looped(
     ("content", "why"),
     [
         (b"", "malformed"),
-        (msgspec.msgpack.encode(Frame(RUN, 1, ProtocolMessage(1, 2**64 - 1, ok(1)))), "malformed"),
-        (msgspec.msgpack.encode(Frame(RUN, 1, ProtocolMessage(1, -1, ok(1)))), "malformed"),
+        (packed(ProtocolMessage(1, 2**64 - 1, ok(1))), "malformed"),
+        (packed(ProtocolMessage(1, -1, ok(1))), "malformed"),
         (b"\x93\xa3run\x01", "malformed"),
-        (msgspec.msgpack.encode(Frame(RUN, 1, Pause())), "malformed"),
-        (msgspec.msgpack.encode(Frame(RUN, 1, Leave("now", failed=False))), "malformed"),
-        (msgspec.msgpack.encode(Frame(RUN, 1, Welcome("v", RUN, (), observed=False, private=False))), "malformed"),
+        (packed(Pause()), "malformed"),
+        (packed(Leave("now", failed=False)), "malformed"),
+        (packed(Welcome("v", RUN, (), observed=False, private=False)), "malformed"),
         (Framing("RA", "another").write("RB", ProtocolMessage(1, 0, ok(1))), "another run"),
-        (msgspec.msgpack.encode(Frame(RUN, 2, ProtocolMessage(1, 0, ok(1)))), "frame 1 is missing"),
-        (msgspec.msgpack.encode(Frame(RUN, 0, ProtocolMessage(1, 0, ok(1)))), "replay"),
+        (packed(ProtocolMessage(1, 0, ok(1)), 2), "frame 1 is missing"),
+        (packed(ProtocolMessage(1, 0, ok(1)), 0), "replay"),
+        (packed(ProtocolMessage(1, 0, b"no message")), "no message of the protocol"),
     ],
 )
 def test_frames_that_are_refused_are_objected_to_and_change_nothing(content: bytes, why: str) -> None:
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task()
-            case Ready():
-                yield StartSearch(1)
-                yield FrameArrived("RA", content)
-                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
-            case Counters(_, _, _, 1):
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
-    assert ending.assignment == {"B": 2}
+    ending, transport = played(searching(FrameArrived("RA", content), From("RA", ProtocolMessage(1, 0, ok(1)))))
+    assert ending == Ending("over", failed=False, assignment={"B": 2})
     (objection,) = transport.heard_of(Objection)
     assert isinstance(objection, Objection)
     assert (objection.who, objection.what) == ("RA", "a frame to RB")
@@ -219,85 +173,31 @@ def test_frames_that_are_refused_are_objected_to_and_change_nothing(content: byt
 
 
 def test_replays_are_objected_to() -> None:
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task()
-            case Ready():
-                yield StartSearch(1)
-                yield from [transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")] * 3
-            case Counters(_, 0, _, 1):
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
+    frame = FrameArrived("RA", packed(ProtocolMessage(1, 0, ok(1))))
+    ending, transport = played(searching(frame, frame, frame))
     assert not ending.failed
     assert len(transport.heard_of(Objection)) == 1  # of a kind, the 1st, the 10th, ...
 
 
-def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task()
-            case Ready():
-                yield StartSearch(1)
-                for content in (b"no message", ok(1)):
-                    yield FrameArrived("RA", Framing("RA", RUN).write("RB", ProtocolMessage(1, 0, content)))
-            case Counters(_, 0, _, 1):
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
-    assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert len(transport.heard_of(Objection)) == 1
-
-
 def test_who_takes_no_part_is_not_heard() -> None:
     """Such as a robot that was lost before: the protocol knows nothing of it."""
-
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task()
-            case Ready():
-                yield StartSearch(1)
-                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "R9")
-                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
-            case Counters(_, 0, _, 1):
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script)
+    said = ProtocolMessage(1, 0, ok(1))
+    ending, transport = played(searching(From("R9", said), From("RA", said)))
     assert ending == Ending("over", failed=False, assignment={"B": 2})
     assert transport.heard_of(Objection) == [Objection("R9", "a frame to RB", "R9 takes no part in this search")]
 
 
 def test_objections_are_limited() -> None:
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        if isinstance(word, Joined):
-            yield from [FrameArrived("RA", b"noise")] * 150
-            yield LEAVE
-
-    ending, transport = played(script)
+    ending, transport = played(answering((Joined, [*[FrameArrived("RA", b"noise")] * 150, LEAVE])))
     assert not ending.failed
     assert len(transport.heard_of(Objection)) == 3  # the 1st, the 10th and the 100th
 
 
 def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        if isinstance(word, Joined):
-            yield LEAVE
-
     transport = ScriptedTransport("RB", lambda _word: ())
     transport.inbox.put(FrameArrived("RA", b"noise"))
-    transport.inbox.put(FrameArrived(MASTER, msgspec.msgpack.encode(Frame("", 1, LEAVE))))
-    transport.inbox.put(
-        FrameArrived(MASTER, msgspec.msgpack.encode(Frame("", 0, RegistrationDenied("another's", "no"))))
-    )
+    for number, word in ((1, LEAVE), (0, RegistrationDenied("another's", "no"))):
+        transport.inbox.put(FrameArrived(MASTER, msgspec.msgpack.encode(Frame("", number, word))))
     transport.router = ""
     robot = NetworkRobot(
         CompiledRobot(chain_of_three()["RB"]),
@@ -308,4 +208,4 @@ def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
     )
     assert robot.run().why == "the master is gone: no link to it for 0.01 s"
     assert [type(word) for word in transport.heard] == [Register]
-    assert not played(script)[0].failed
+    assert not played(answering((Joined, [LEAVE])))[0].failed

@@ -39,50 +39,35 @@ from robochoc.protocols.satisfaction.awc import AWC
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.cases import looped
 from tests.support.in_memory_network import RUN, ScriptedTransport
-from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task
+from tests.support.lone_robot import LEAVE, UNPROVEN, Answers, From, answering, chain_of_three, ok, played, task
 
 
-def failing(
-    *said: ControlMessage | Item, protocol: type[Protocol] = ABT, at: type[ControlMessage] = Joined
-) -> tuple[Ending, Failed]:
-    """How RB fails when `said` is answered to its first word of the kind `at`: what it says itself, and tells."""
-
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        if isinstance(word, at):
-            yield from said
-        elif isinstance(word, Failed):
-            yield FrameArrived("RA", b"noise")
-            yield Leave("that was it", failed=True)
-
-    ending, transport = played(script, protocol)
+def failing(*said: ControlMessage | Item, protocol: type[Protocol] = ABT) -> Failed:
+    """Return the failure that RB reports, and ends with, when it receives these once it has joined."""
+    end: Answers = [FrameArrived("RA", b"noise"), Leave("that was it", failed=True)]
+    ending, transport = played(answering((Joined, said), (Failed, end)), protocol)
     (failed,) = transport.heard_of(Failed)
     assert isinstance(failed, Failed)
     assert ending == Ending(failed.why, failed=True, assignment={})
     assert isinstance(transport.heard[-1], Bye)
-    return ending, failed
+    return failed
 
 
 def test_an_unknown_protocol_is_told() -> None:
-    _, failed = failing(msgspec.structs.replace(task(), protocol="Nonsense"))
+    failed = failing(msgspec.structs.replace(task(), protocol="Nonsense"))
     assert (failed.why, failed.unsupported) == ("RB: no protocol 'Nonsense'", True)
 
 
 def test_lost_frames_are_told() -> None:
-    _, failed = failing(FramesLost(MASTER, 3))
+    failed = failing(FramesLost(MASTER, 3))
     assert (failed.why, failed.unsupported) == ("3 frames of the master to RB were lost for good", True)
 
 
 def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.communication.network.robot.Backlog", lambda: Backlog(Share(2, 1000)))
 
-    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        if isinstance(word, Joined):
-            yield from (transport.frame(ProtocolMessage(1, 0, ok(1)), name) for name in ("RA", "RA", "RA", "RA", "RC"))
-            yield task()
-        elif isinstance(word, Ready):
-            yield Leave("that was it", failed=False)
-
-    _, transport = played(script)
+    said = [From(name, ProtocolMessage(1, 0, ok(1))) for name in ("RA", "RA", "RA", "RA", "RC")]
+    _, transport = played(answering((Joined, [*said, task()]), (Ready, [LEAVE])))
     first, second = transport.heard_of(Objection)
     assert first == Objection("RA", "a frame to RB", "it is more than is kept of RA for epoch 1")
     assert second == Objection("RA", "a frame to RB", "frame 3 is missing before frame 4")
@@ -92,16 +77,7 @@ def test_a_gap_is_told_once_a_search_of_each() -> None:
     """A neighbour that makes it look as if frames were missing, again and again, is not to flood the master by RB."""
     before: list[Item] = [FramesLost("RA", 5), FramesLost("RA", 9)]
     then: list[Item] = [FramesLost("RA", 2), FramesLost("RC", 1), FramesLost("RA", 7)]
-
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        if isinstance(word, Joined):
-            yield from before
-            yield task()
-            yield from then
-        elif isinstance(word, Ready):
-            yield Leave("that was it", failed=False)
-
-    _, transport = played(script)
+    _, transport = played(answering((Joined, [*before, task(), *then]), (Ready, [LEAVE])))
     assert transport.heard_of(LostFrames) == [LostFrames("RA", 5), LostFrames("RA", 2), LostFrames("RC", 1)]
 
 
@@ -128,25 +104,15 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
     ],
 )
 def test_copies_that_cannot_be_are_told(told: list[FrameArrived], why: str) -> None:
-    _, failed = failing(task(AWC), *told, protocol=AWC)
+    failed = failing(task(AWC), *told, protocol=AWC)
     assert failed.why.startswith("RB received invalid data: ")
     assert why in failed.why
     assert failed.unsupported
 
 
 def test_copies_before_the_task_are_kept_and_later_ones_change_nothing() -> None:
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield copies("RC", copy())
-                yield task(AWC)
-            case Ready():
-                yield copies("RC", copy(body="eq(X, Y)"), number=2)
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script, AWC)
+    later = copies("RC", copy(body="eq(X, Y)"), number=2)
+    ending, transport = played(answering((Joined, [copies("RC", copy()), task(AWC)]), (Ready, [later, LEAVE])), AWC)
     assert not ending.failed
     assert len(transport.heard_of(Ready)) == 1
     ((receiver, content),) = transport.sent
@@ -155,19 +121,8 @@ def test_copies_before_the_task_are_kept_and_later_ones_change_nothing() -> None
 
 
 def test_without_copies_a_robot_is_not_ready_but_reports() -> None:
-    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
-        match word:
-            case Joined():
-                yield task(AWC)
-                yield StartSearch(1)
-                yield Pause()
-                yield CheckRequest(1, {})
-            case CheckResult():
-                yield LEAVE
-            case _:
-                pass
-
-    ending, transport = played(script, AWC)
+    orders: Answers = [task(AWC), StartSearch(1), Pause(), CheckRequest(1, {})]
+    ending, transport = played(answering((Joined, orders), (CheckResult, [LEAVE])), AWC)
     assert ending == Ending("over", failed=False, assignment={})
     assert not transport.heard_of(Ready)
     (account,) = transport.heard_of(DetailedReport)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import cast
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, cast
 
 from robochoc.authority.identity import Identity
+from robochoc.communication.control import Counters, Ready
 from robochoc.communication.network.control_messages import (
     ControlMessage,
+    Joined,
     Leave,
     Register,
+    StartSearch,
     Task,
     Welcome,
 )
@@ -52,6 +55,46 @@ def ok(value: int) -> bytes:
 
 
 Script = Callable[[ScriptedTransport, ControlMessage], Iterable[ControlMessage | Item]]
+Asked = type[ControlMessage] | ControlMessage | Callable[[ControlMessage], bool]
+"""A kind of message of the robot, a message, or a condition."""
+
+
+class From(NamedTuple):
+    """A message of another robot."""
+
+    sender: str
+    word: ControlMessage
+
+
+Answers = Sequence[ControlMessage | Item | From]
+"""Messages of the master, other items of the robot's inbox, and messages of others."""
+
+
+def answering(*rows: tuple[Asked, Answers]) -> Script:
+    """Return the script in which the first row that a message fits has its answers."""
+
+    def fits(asked: Asked, word: ControlMessage) -> bool:
+        if isinstance(asked, type):
+            return isinstance(word, asked)
+        return asked(word) if callable(asked) else asked == word
+
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
+        answers: Answers = next((answers for asked, answers in rows if fits(asked, word)), ())
+        for one in answers:
+            yield transport.frame(one.word, one.sender) if isinstance(one, From) else one
+
+    return script
+
+
+def searching(*answers: ControlMessage | Item | From, taken: int = 1) -> Script:
+    """Return the script of a search that is over once RB has taken so many of these messages."""
+    begun: Answers = [StartSearch(1), *answers]
+    return answering((Joined, [task()]), (Ready, begun), (counted(taken), [LEAVE]))
+
+
+def counted(received: int, epoch: int = 1) -> Callable[[ControlMessage], bool]:
+    """Return whether a message is the robot's report of so many messages received, outside a wave."""
+    return lambda word: isinstance(word, Counters) and (word.epoch, word.wave, word.received) == (epoch, 0, received)
 
 
 def played(
