@@ -13,7 +13,7 @@ from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import violations
-from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
+from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, finished, one_line, written
 from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc_within
 
@@ -28,11 +28,7 @@ FLYING = 10
 
 @pytest.mark.slow
 def test_sixteen_machines_find_what_sixteen_processes_do(site: Deployment) -> None:
-    tokens = site.enrol("--team", FOUR)
-    master = site.master("--team", FOUR, "--json", "--withdraw", "--timeout", 90)
-    robots = site.robots(FOUR, tokens)
-    assert master.status() == 0, master.errors
-    ended(robots)
+    master, robots = finished(site, FOUR, "--team", FOUR, "--json", "--withdraw", "--timeout", 90)
     told = master.object
     alone = solve(read_team(FOUR), Options(runtime=Runtime.SIMULATOR))
     assert alone.verdict is Verdict.NO_SOLUTION
@@ -50,22 +46,15 @@ def test_sixteen_machines_find_what_sixteen_processes_do(site: Deployment) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize(("files", "verdict"), [(FOUR, "no-solution"), (SEVEN, "solution")])
 def test_the_same_verdict_as_processes(files: Path, verdict: str, site: Deployment) -> None:
-    tokens = site.enrol("--team", files)
-    master = site.master("--team", files, "--json")
-    robots = site.robots(files, tokens)
-    assert master.status() == 0, master.errors
-    ended(robots)
+    master, _ = finished(site, files, "--team", files, "--json")
     team = read_team(files)
     assert master.object["verdict"] == solve(team, Options(runtime=Runtime.PROCESSES)).verdict == verdict
 
 
 def test_a_journal_by_the_robots_own_words(site: Deployment) -> None:
-    tokens = site.enrol("--team", SCOUTS)
     journal, page = site.folder / "scouts.jsonl", site.folder / "scouts.html"
-    master = site.master("--journal", journal, "--json", "--filter", "signed", "--filter", "sealed")
-    robots = site.robots(SCOUTS, tokens, "--json")
-    assert master.status() == 0, master.errors
-    ended(robots)
+    words = ("--journal", journal, "--json", "--filter", "signed", "--filter", "sealed")
+    master, robots = finished(site, SCOUTS, *words, robots=["--json"])
     told = master.object
     assert told["verdict"] == "solution"
     for name, robot in robots.items():
@@ -80,13 +69,9 @@ def test_a_journal_by_the_robots_own_words(site: Deployment) -> None:
 
 @pytest.mark.more
 def test_what_robots_keep_to_themselves(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
     journal = site.folder / "pair.jsonl"
-    master = site.master("--private", "--json", "--journal", journal, "--robots", 2)
-    robots = site.robots(files, tokens)
-    assert master.status() == 0, master.errors
-    ended(robots)
+    words = ("--private", "--json", "--journal", journal, "--robots", 2)
+    master, robots = finished(site, written(PAIR, site), *words)
     told = master.object
     assert (told["verdict"], told["assignment"], told["verified"]) == ("solution", {}, False)
     said = {name: robot.output.rpartition(" = ")[2].strip() for name, robot in robots.items()}
@@ -199,12 +184,8 @@ def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Deployment) -
     files.mkdir()
     for path in (ROOT / "docs" / "examples" / "scouts").glob("*.xml"):
         (files / path.name).write_text(re.sub(r' variable="[^"]*"', "", path.read_text()))
-    tokens = site.enrol("--team", files)
-    master = site.master("--team", files, "--json")
-    robots = site.robots(files, tokens)
-    assert master.status() == 0, master.errors
+    master, _ = finished(site, files, "--team", files, "--json")
     assert not list(violations(read_team(files), master.object["assignment"]))
-    ended(robots)
 
 
 # In mid-run

@@ -19,7 +19,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from tests.support.deployments import Deployment, ended, one_line, written
+from tests.support.deployments import Deployment, finished, one_line, written
 
 pytestmark = pytest.mark.more
 
@@ -39,11 +39,7 @@ def team_with(definition: Relation | Function) -> Team:
 def test_a_utility_in_decimals_across_machines(site: Deployment) -> None:
     utility = Relation("R", 2, Semantics.SOFT, ((0, 1), (1, 2), (2, 2)), (-75, 250, 125), -1000)
     files = written(team_with(utility), site)
-    tokens = site.enrol("--team", files)
-    master = site.master("--team", files, "--protocol", "syncbb", "--json")
-    robots = site.robots(files, tokens)
-    assert master.status() == 0, master.errors
-    ended(robots)
+    master, _ = finished(site, files, "--team", files, "--protocol", "syncbb", "--json")
     told = master.object
     assert (told["verdict"], told["assignment"]) == ("optimal", {"A": 1, "B": 2})
     assert Decimal(str(told["cost"])) == Decimal("2.45")
@@ -58,11 +54,7 @@ def test_symbols_have_their_names_across_machines(site: Deployment) -> None:
         [Constraint("C", different, ("A", "B"), ("A", "B"))],
     )
     files = written(team, site)
-    tokens = site.enrol("--team", files)
-    master = site.master("--team", files, "--json")
-    robots = site.robots(files, tokens)
-    assert master.status() == 0, master.errors
-    ended(robots)
+    master, robots = finished(site, files, "--team", files, "--json")
     assert master.object["assignment"] == {"A": "red", "B": "green"}
     assert "A = red" in robots["RA"].output
 

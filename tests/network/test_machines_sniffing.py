@@ -104,6 +104,7 @@ def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Deployment
         assert read_journal(part).damage is None
 
 
+@pytest.mark.more
 def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
@@ -129,6 +130,7 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     assert f"{len(content):,} bytes of its journal are here" in sniffer.errors
 
 
+@pytest.mark.more
 def test_in_a_private_run_only_robots_that_agreed_are_heard(site: Deployment) -> None:
     files = written(PAIR, site)
     tokens = site.enrol("--team", files)
@@ -147,6 +149,7 @@ def test_in_a_private_run_only_robots_that_agreed_are_heard(site: Deployment) ->
     assert [entry["outcome"]["assignment"] for entry in told if entry["event"] == "Ended"] == [{}]
 
 
+@pytest.mark.more
 def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deployment) -> None:
     tokens = site.enrol("Eye", "Ear", *SNIFFER)
     master = site.master()

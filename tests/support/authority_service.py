@@ -26,7 +26,7 @@ SOON_S = HANG_S
 class AuthorityService:
     """An Authority with its service, whose clock is the machine's plus what a test adds."""
 
-    def __init__(self, folder: Path, patience_s: float = 1.0) -> None:
+    def __init__(self, folder: Path, patience_s: float = HANG_S) -> None:
         self.clock = Clock(0)
         self.seen = Seen()
         self.authority = Authority.create(folder, observer=self.seen, clock=lambda: time.time() + self.clock.now)

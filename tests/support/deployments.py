@@ -125,6 +125,10 @@ class Program:
         self._process.wait()
 
 
+Crew = dict[str, Program]
+"""Robots by name."""
+
+
 class Deployment:
     """Machines around one master at `place`, with an Authority, below `folder`. A context manager: none outlives it.
 
@@ -203,6 +207,23 @@ def ended(programs: Mapping[str, Program], status: int = 0) -> None:
     found = {name: program.status() for name, program in programs.items()}
     others = {name: (it, programs[name].errors) for name, it in found.items() if it != status}
     assert not others, others
+
+
+def finished(site: Deployment, files: Path, *words: object, robots: Sequence[object] = ()) -> tuple[Program, Crew]:
+    """Return the master and the robots of a run that all have ended well.
+
+    Args:
+        site: The machines.
+        files: The folder of the team, all of whose robots are enrolled.
+        words: Options of the master.
+        robots: Options of each robot.
+    """
+    tokens = site.enrol("--team", files)
+    master = site.master(*words)
+    crew = site.robots(files, tokens, *robots)
+    assert master.status() == 0, master.errors
+    ended(crew)
+    return master, crew
 
 
 def written(team: Team, site: Deployment) -> Path:
