@@ -26,7 +26,7 @@ from tests.fuzz.mutations import spoilt_bytes
 from tests.fuzz.wire_targets import TARGETS as WIRE
 from tests.support.cases import looped
 
-INPUTS = 12
+INPUTS = 8
 """Spoilt inputs of each target: enough to see that it works."""
 
 

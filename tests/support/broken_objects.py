@@ -5,7 +5,6 @@ Every case starts from the team of `broken_case.TEAM`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -262,8 +261,3 @@ OF_OBJECTS: dict[str, Wrong] = {
         ("robot Robot2, constraint C (V1 V2 3)", "ne takes 2 terms")),
 }  # fmt: skip
 """What files cannot say, or say in other words."""
-
-
-def breakages() -> Mapping[str, Breakage]:
-    """All that can be done to the team so that it is not valid any more."""
-    return {**AS_IN_FILES, **{name: one.breakage for name, one in OF_OBJECTS.items()}}

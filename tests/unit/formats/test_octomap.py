@@ -105,9 +105,9 @@ def test_too_many_voxels_are_joined(sides: Voxel, first: Voxel, seed: int, most:
 
 
 def test_joined_leaves_and_single_ones_lie_together(tmp_path: Path) -> None:
-    """A room of 40 x 40 x 24 voxels: leaves are as large as 16 voxels there."""
-    voxels = {(x - 3, y + 5, z): FREE for x, y, z in product(range(40), range(40), range(24))}
-    voxels |= {(x - 3, 12, z): OCCUPIED for x, z in product(range(40), range(24))}
+    """A room of 24 x 32 x 17 voxels: leaves are as large as 16 voxels there."""
+    voxels = {(x - 3, y + 5, z): FREE for x, y, z in product(range(24), range(32), range(17))}
+    voxels |= {(x - 3, 12, z): OCCUPIED for x, z in product(range(24), range(17))}
     for name in ("plan.bt", "plan.ot"):
         path = write_octomap(tmp_path / name, voxels)
         leaves = read_octree(path.read_bytes()).leaves

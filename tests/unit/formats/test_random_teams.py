@@ -128,6 +128,8 @@ def test_what_is_written_is_read_back(seeds: int, tmp_path_factory: pytest.TempP
         write_team(team, folder)
         again = read_team(folder)
         assert again == team, seed
+        write_team(again, folder, replace=True)
+        assert read_team(folder) == team, seed
         for robot in team.robots:
             assert robot_in(robot_xml(robot), robot.name) == robot, seed
 

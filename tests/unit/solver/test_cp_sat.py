@@ -14,6 +14,7 @@ import pytest
 
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.random_csp import random_csp
 from robochoc.model.expression import Name
 from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
 from robochoc.model.problem import Constraint, Domain, Function, ProblemKind, Relation, Robot, Semantics, Team, Variable
@@ -29,6 +30,8 @@ from robochoc.verification.checker import RefutedError
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, random_hard_team, with_costs
+from tests.support.limits import HANG_S
+from tests.support.moved_clock import MovedClock
 from tests.support.program import robochoc_within
 
 needs_ortools = pytest.mark.skipif(importlib.util.find_spec("ortools") is None, reason="the extra ortools")
@@ -96,16 +99,21 @@ def test_decimals_that_are_maximised() -> None:
 
 
 @needs_ortools
-def test_a_time_limit_ends_its_process() -> None:
-    with CpSatSolver(deadline=time.monotonic() + 0.3) as solver:
-        began = time.monotonic()
-        answer = solver.solve(queens3d(11))
-        assert time.monotonic() - began < 10
-        pid = solver.pid
-    assert answer.verdict in {Verdict.UNKNOWN, Verdict.SOLUTION, Verdict.NO_SOLUTION}
-    if pid is not None:
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
+def test_a_time_limit_ends_its_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time is over once OR-Tools has been searching for a while."""
+    clock, pids = MovedClock(), list[int | None]()
+    monkeypatch.setattr(cp_sat, "time", clock)
+
+    def over() -> None:
+        pids.append(solver.pid)
+        clock.end()
+
+    solver = CpSatSolver(time.monotonic() + HANG_S, over)
+    assert solver.solve(random_csp(30, 8, 0.3, 0, 1, max_cost=100)).verdict is Verdict.UNKNOWN
+    assert solver.pid is None
+    assert pids[0]
+    with pytest.raises(ProcessLookupError):
+        os.kill(pids[0], 0)
 
 
 def test_without_time_nothing_is_started() -> None:
