@@ -12,6 +12,8 @@ from random import Random
 WALL, FREE, UNKNOWN = "#", ".", "?"
 _SHADES = {WALL: 0, FREE: 254, UNKNOWN: 205}  # as map_saver writes them: 205 is just above a free_thresh of 0.196
 
+ROOMS = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
+"""Two rooms with a door, for pixels of 0.5 m."""
 Pixel = tuple[int, int]
 """Column and row, from the lower left."""
 

@@ -27,20 +27,17 @@ from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.flights_on_maps import flown_team, gaps
 from tests.support.flown_teams import FlownTeam
-from tests.support.maps import write_map
+from tests.support.maps import ROOMS, write_map
 from tests.support.program import ROOT
 from tests.support.ways_on_maps import NO_TEAM, refused_way
 
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
-HALL = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
-"""Two rooms with a door, 0.5 m a pixel."""
-
 NO_ROOM = "are to be kept"
 """Words of the refusal of a flight: places are too near each other."""
 
 
 def hall(folder: Path, **how: object) -> tuple[Team, GroundMap]:
-    path = write_map(folder, HALL)
+    path = write_map(folder, ROOMS)
     given = {"map": str(path), "at": "1,1 1,2.5", "cell": 0.5, **how}
     return formation(MapChoice(**given), anchor="3.5,1.75", heading=0)  # type: ignore[arg-type]
 
@@ -111,9 +108,9 @@ def test_without_walls_they_would_fly_through_them(tmp_path: Path) -> None:
     team, ground = hall(tmp_path)
     mission = sent(team, ground, (7, 2), (7, 5))
     through = fly(replace(mission, walls=None))
-    assert gaps(HALL, 0.5, through.positions[:, :, :2].reshape(-1, 2)).min() == 0
+    assert gaps(ROOMS, 0.5, through.positions[:, :, :2].reshape(-1, 2)).min() == 0
     around = fly(mission)
-    assert gaps(HALL, 0.5, around.positions[:, :, :2].reshape(-1, 2)).min() >= 0.2
+    assert gaps(ROOMS, 0.5, around.positions[:, :, :2].reshape(-1, 2)).min() >= 0.2
     assert around.errors_m.max() < 0.01
     assert around.nearest_wall is not None
     assert around.nearest_wall.set_m == 0.2
@@ -128,7 +125,7 @@ def test_where_robots_stand_and_where_they_land(tmp_path: Path) -> None:
     log = fly(mission)
     # It lands where it has stood: the edge of the map is behind a wall.
     assert log.positions[-1, 0] == pytest.approx((1.1, 0.9, 0), abs=0.03)
-    assert gaps(HALL, 0.5, log.positions[:, :, :2].reshape(-1, 2)).min() >= 0.2
+    assert gaps(ROOMS, 0.5, log.positions[:, :, :2].reshape(-1, 2)).min() >= 0.2
 
 
 def test_one_that_falls_and_an_obstacle_are_flown_around_between_the_walls(tmp_path: Path) -> None:
@@ -136,12 +133,12 @@ def test_one_that_falls_and_an_obstacle_are_flown_around_between_the_walls(tmp_p
     mission = sent(team, ground, (7, 2), (7, 5))
     conditions = FlightConditions(failures=(MotorFailure("Robot1", 3.0),))
     log = fly(mission, conditions)
-    counted = gaps(HALL, 0.5, log.positions[:, 1, :2])
+    counted = gaps(ROOMS, 0.5, log.positions[:, 1, :2])
     assert counted.min() >= 0.2
     assert log.errors_m[1] < 0.01
     blocked = fly(mission, FlightConditions(obstacles=((3.5, 2.5, 0.5),)))
     assert "beside its place" in " ".join(event.what for event in blocked.events)
-    assert gaps(HALL, 0.5, blocked.positions[:, :, :2].reshape(-1, 2)).min() >= 0.2
+    assert gaps(ROOMS, 0.5, blocked.positions[:, :, :2].reshape(-1, 2)).min() >= 0.2
 
 
 def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
@@ -158,7 +155,7 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
 
 
 def test_a_map_with_tiny_cells_is_flown_in_a_picture_with_its_walls(tmp_path: Path) -> None:
-    path = write_map(tmp_path, HALL, resolution="0.05", origin="[100, 200, 0]")
+    path = write_map(tmp_path, ROOMS, resolution="0.05", origin="[100, 200, 0]")
     choice = MapChoice(map=str(path), at="100.1,200.1 100.1,200.25", cell=0.05, radius=0.01)
     team, ground = formation(choice, anchor="100.35,200.2", spacing=0.1)
     values = {name: own.variables[0].domain.ranges[0][0] for name, own in zip(("V1", "V2"), team.robots, strict=True)}

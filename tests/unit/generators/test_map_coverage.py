@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -125,24 +123,3 @@ def test_no_two_robots_stand_in_one_cell() -> None:
     found = best(team)
     assert found is not None
     assert found > 0  # one of them has to leave
-
-
-@looped(
-    ("make", "said"),
-    [
-        (lambda: coverage(MapChoice(map=BUILDING, agents=2), sensing=-1), "sensing is -1"),
-        (lambda: coverage(MapChoice(map=BUILDING, agents=2), worth=20_000), "worth is 20000"),
-        (lambda: coverage(MapChoice(map=BUILDING, at="1.1,1.1", within=0)), "robot 1 can get to no cell"),
-        (lambda: coverage(MapChoice(map=BUILDING, agents=2, cell=0.5)), "more than 10,000 pairs"),
-    ],
-)
-def test_impossible_ones_are_refused(make: Callable[[], object], said: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.generators.maps.coverage.MAX_TUPLES", 10_000)
-    with pytest.raises(ValueError, match=said):
-        make()
-
-
-def test_very_many_lines_of_sight_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.generators.maps.sight.MAX_PAIRS", 100)
-    with pytest.raises(ValueError, match="pairs of cells are within the sensing range, more than 100"):
-        coverage(MapChoice(map=BUILDING, agents=2))

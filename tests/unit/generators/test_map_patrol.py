@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from fractions import Fraction
 from math import floor, hypot
 from pathlib import Path
 from random import Random
-
-import pytest
 
 from robochoc.formats import check_team, read_team, write_team
 from robochoc.generators.draws import uniform
@@ -156,25 +154,3 @@ def test_each_leg_takes_no_longer_than_it_may() -> None:
         team, _ = patrol(choice, visit="0.5,4.5 4.5,4.5", rounds=2)
         assert [len(variable.domain) for variable in team.variables.values()] == [2, 2]
         assert (best(team) is not None) is bool(wanted)
-
-
-@looped(
-    ("make", "said"),
-    [
-        (lambda: patrol(MapChoice(map=BUILDING, agents=3), rounds=3), "3 robots make 9 visits, more than 6 points"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=3), points=101), "points is 101"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=3), rounds=5), "rounds is 5"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=3), points=50, rounds=3), "50 points in 3 rounds"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=1, cells=9), points=10), "fewer than 10 points"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=1), idle=-1), "idle is -1"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=1), apart=-1), "apart is -1"),
-        (lambda: patrol(MapChoice(map=BUILDING, agents=1), visit="1 2"), "visit has '1'"),
-        (
-            lambda: patrol(MapChoice(map=BUILDING, at="1,1 9,5", within=3, cell=0.5), visit="1,1 1,2"),
-            "robot 2 can get to no point",
-        ),
-    ],
-)
-def test_impossible_ones_are_refused(make: Callable[[], object], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        make()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from fractions import Fraction
 from math import floor
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.formats import InvalidInputError, check_team, read_team, write_team
+from robochoc.formats import check_team, read_team, write_team
 from robochoc.formats.ground_map import ground_map_json, read_ground_map
 from robochoc.formats.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
 from robochoc.formats.occupancy.packed import unpacked
@@ -34,12 +33,10 @@ from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 from tests.support.flights_on_maps import gaps
-from tests.support.maps import Pixel, drawn_rows, fitting, free_pixels, ways, write_map
+from tests.support.maps import ROOMS, Pixel, drawn_rows, fitting, free_pixels, ways, write_map
 from tests.support.program import ROOT
 
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
-ROOMS = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
-"""Two rooms with a door, 0.5 m a pixel."""
 
 
 @pytest.fixture
@@ -365,45 +362,3 @@ def test_the_flight_reads_the_same_map(rooms: str) -> None:
     assert (walls.radius, walls.speed) == (0, 0.5)
     assert (unpacked(walls.free, walls.rows, walls.columns) == grid.free).all()
     assert (unpacked(walls.occupied, walls.rows, walls.columns) == grid.occupied).all()
-
-
-@looped(
-    ("make", "said"),
-    [
-        (lambda choice: formation(choice(agents=None)), "agents is missing"),
-        (lambda choice: formation(choice(agents=3, at="1,1 2,1")), "agents is 3, and at has 2 places"),
-        (lambda choice: formation(choice(agents=101)), "agents is 101; it must be from 1 to 100"),
-        (lambda choice: formation(choice(at="1;1")), "at has '1;1'; expected places in metres"),
-        (lambda choice: formation(choice(at="9,9")), "robot 1 at 9,9 is not on the map"),
-        (lambda choice: formation(choice(at="0.2,1")), "robot 1 at 0.2,1 stands where it does not fit"),
-        (lambda choice: formation(choice(at="0.7,1", radius=0.45)), "robot 1 at 0.7,1 stands where it does not fit"),
-        (lambda choice: formation(choice(radius=3)), "no pixel is free for a robot of the radius 3 m"),
-        (lambda choice: formation(choice(radius=51)), "radius is 51 m, more than 100 pixels"),
-        (lambda choice: formation(choice(speed=0)), "speed is 0"),
-        (lambda choice: formation(choice(cell=5)), "no cell of 5 m is free"),
-        (lambda choice: formation(choice(cell=0.001)), "4501 columns and 3501 rows; 1000 are allowed"),
-        (lambda choice: formation(choice(cell=0.5, cells=3)), "free, more than 3"),
-        (lambda choice: formation(choice(agents=40, cell=0.5)), "40 robots do not fit on"),
-        (lambda choice: formation(choice(), shape="ring"), "shape 'ring' is none of line, column"),
-        (lambda choice: formation(choice(), anchor="1,1 2,2"), "anchor is one place"),
-        (lambda choice: formation(choice(), spacing=0), "spacing is 0"),
-        (
-            lambda choice: formation(choice(at="1,1 3.5,1", within=1.5, cell=0.5, radius=0), anchor="1,1", spacing=0.5),
-            "robot 2 can get to no slot",
-        ),
-    ],
-)
-def test_impossible_ones_are_refused(rooms: str, make: Callable[[Callable[..., MapChoice]], object], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        make(lambda **how: MapChoice(**{"map": rooms, **({} if "at" in how else {"agents": 2}), **how}))
-
-
-@looped(
-    ("text", "said"),
-    [("1,2,3", "offsets.txt:1: has 1,2,3"), ("0,0", "has 1 slots .*expected from 2"), ("0,0\n" * 101, "has 101 slots")],
-)
-def test_wrong_offsets_are_refused(rooms: str, tmp_path: Path, text: str, said: str) -> None:
-    file = tmp_path / "offsets.txt"
-    file.write_text(text)
-    with pytest.raises(InvalidInputError, match=said):
-        formation(MapChoice(map=rooms, agents=2), shape=str(file))

@@ -30,7 +30,6 @@ from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
-from tests.support.cases import looped
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
 from tests.support.octomaps import (
@@ -350,28 +349,3 @@ def test_the_flight_reads_the_same_map() -> None:
             beside = numbers.get((x + right, y + back, z + up))
             is_open = beside is not None and beside not in blocked and bool(touched_by(cells, beside) & free)
             assert bool(sides & 1 << bit) is is_open
-
-
-@looped(
-    ("make", "said"),
-    [
-        (lambda choice: formation(choice(at="1,1")), "at has '1,1'; expected X,Y,Z on a three-dimensional map"),
-        (lambda choice: formation(choice(agents=2), anchor="1,1"), "anchor has '1,1'; expected X,Y,Z"),
-        (lambda choice: patrol(choice(agents=2), visit="1,1 2,2"), "visit has '1,1'; expected X,Y,Z"),
-        (lambda choice: formation(choice(at="1,1,1,1")), "at has '1,1,1,1'; expected places in metres"),
-        (lambda choice: formation(choice(at="1,1,99")), "robot 1 at 1,1,99 is not on the map"),
-        (lambda choice: formation(choice(at="1,1,2.2")), "robot 1 at 1,1,2.2 stands where it does not fit"),
-        (lambda choice: formation(choice(agents=2, radius=3)), "no voxel is free for a robot of the radius 3 m"),
-        (lambda choice: formation(choice(agents=2, radius=26)), "radius is 26 m, more than 100 pixels"),
-        (lambda choice: formation(choice(agents=2, cell=0.005)), "1701 columns, 1301 rows and 1001 levels"),
-        (lambda choice: formation(choice(agents=2, cell=0.5, cells=3)), "free, more than 3"),
-        (lambda choice: formation(choice(agents=2, cell=3)), "no cell of 3 m is free"),
-        (
-            lambda _: formation(MapChoice(map=str(ROOT / "docs/examples/building/building.yaml"), at="1,1,1")),
-            "at has '1,1,1'; expected X,Y on a map of the ground",
-        ),
-    ],
-)
-def test_impossible_ones_are_refused(make: Callable[[Callable[..., MapChoice]], object], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        make(lambda **how: MapChoice(**{"map": HOUSE, **how}))

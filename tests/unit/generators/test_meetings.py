@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from random import Random
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -98,21 +97,3 @@ def test_who_decides_what() -> None:
     eav = meetings(6, 4, 3, 5, 2, model="eav")
     assert eav.order == ("Meeting1", "Meeting2", "Meeting3", "Meeting4")
     assert list(eav.variables) == ["V1", "V2", "V3", "V4"]
-
-
-def test_impossible_ones_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.generators.draws.MAX_CONSTRAINTS", 100)
-    for wrong, said in (
-        ((0, 3, 1, 3), "agents is 0"),
-        ((3, 3, 4, 3), "participants is 4; it must be from 1 to 3"),
-        ((3, 3, 2, 0), "slots is 0"),
-        ((1, 20, 1, 3), "more than 100 constraints"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            meetings(*wrong)
-    with pytest.raises(ValueError, match="max-length is 4; it must be from 1 to 3"):
-        meetings(3, 3, 2, 3, max_length=4)
-    with pytest.raises(ValueError, match="max-value is 0"):
-        meetings(3, 3, 2, 3, max_value=0)
-    with pytest.raises(ValueError, match="private"):
-        meetings(3, 3, 2, 3, model="private")

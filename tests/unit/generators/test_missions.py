@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from decimal import ROUND_HALF_UP, Decimal, localcontext
 from fractions import Fraction
 from random import Random
@@ -142,21 +141,3 @@ def test_straight_ways_are_rounded_exactly(across: int, along: int, places: int)
         rounded = exact.quantize(Decimal(1).scaleb(-places), ROUND_HALF_UP)
     assert way((0, along), (across, 0), Distance.STRAIGHT, places) == rounded.scaleb(places)
     assert way((0, along), (across, 0), Distance.STREETS, places) == (across + along) * 10**places
-
-
-def test_impossible_ones_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.generators.draws.MAX_CONSTRAINTS", 100)
-    cases: list[tuple[Callable[[], object], str]] = [
-        (lambda: tracking(5, 1, 2), "agents is 5; it must be from 1 to 4"),
-        (lambda: tracking(1, 5, 2), "targets is 5"),
-        (lambda: tracking(1, 1, 101), "side is 101"),
-        (lambda: tracking(20, 1, 5, sensing=5), "20 robots can get near target 1"),
-        (lambda: tracking(1000, 9, 100, mobility=50), "1,000 robots can go to 10,000 cells each"),
-        (lambda: tasks(0, 1), "agents is 0"),
-        (lambda: tasks(1, 1, skills=Skills(2, 3)), "skilled is 3; it must be from 1 to 2"),
-        (lambda: tasks(1, 1, ways=Ways(places=10)), "places is 10"),
-        (lambda: tasks(20, 1), "more than 100 constraints"),
-    ]
-    for make, said in cases:
-        with pytest.raises(ValueError, match=said):
-            make()

@@ -89,18 +89,6 @@ def test_each_epoch_is_solved(seed: int) -> None:
     assert [epoch.cost for epoch in outcome.epochs] == [best(now) for now in stages(changing)]
 
 
-def test_what_cannot_be_is_refused() -> None:
-    team = random_csp(3, 1, 0, 0)
-    with pytest.raises(ValueError, match="can take no more changes of the kinds remove-value, remove-constraint"):
-        random_scenario(team, 1, 1, kinds=["remove-value", "remove-constraint"])
-    with pytest.raises(ValueError, match="events is 0"):
-        random_scenario(team, 0, 1)
-    with pytest.raises(ValueError, match="rate is nan"):
-        random_scenario(team, 1, float("nan"))
-    with pytest.raises(ValueError, match="has a scenario already"):
-        random_scenario(random_scenario(team, 1, 1), 1, 1)
-
-
 @pytest.mark.usefixtures("in_a_folder")
 def test_the_command_writes_a_copy(tmp_path: Path) -> None:
     team = random_csp(5, 3, 0.6, 0.3, 2)

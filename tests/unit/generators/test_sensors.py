@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -107,23 +105,3 @@ def test_targets_have_cells_of_their_own() -> None:
     for seed in range(5):
         seen, _ = network(grid_sensors(3, 4, 6, seed))
         assert len({tuple(sorted(one)) for one in seen}) == 6
-
-
-def test_impossible_ones_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.generators.draws.MAX_CONSTRAINTS", 100)
-    cases: list[tuple[Callable[[], object], str]] = [
-        (lambda: sensors(0, 1), "sensors is 0"),
-        (lambda: sensors(3, 1, visibility=1.2), "visibility is 1.2"),
-        (lambda: sensors(3, 1, compatibility=float("nan")), "compatibility is nan"),
-        (lambda: sensors(3, 1, needed=11), "needed is 11"),
-        (lambda: sensors(3, 1, visibility=0), "no sensor sees target 1"),
-        (lambda: sensors(3, 1, visibility=0, model="sensors"), "no sensor sees target 1"),
-        (lambda: grid_sensors(1, 3, 1), "rows is 1"),
-        (lambda: grid_sensors(2, 3, 3), "targets is 3; it must be from 1 to 2"),
-        (lambda: grid_sensors(2, 3, 1, reach=Reach(sight=0)), "sight is 0"),
-        (lambda: sensors(200, 30, visibility=1), "1,200,000 pairs of sensors see the same target"),
-        (lambda: sensors(2, 9, visibility=1), "more than 100 constraints"),
-    ]
-    for make, said in cases:
-        with pytest.raises(ValueError, match=said):
-            make()
