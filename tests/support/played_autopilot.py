@@ -97,6 +97,12 @@ def flying(pilot: Pilot, target: Target = THERE) -> None:
     pilot.fly(1, target)
 
 
+def arrived(pilot: Pilot, played: Played) -> None:
+    """Fly to the first place."""
+    flying(pilot)
+    steps(pilot, played, 3)
+
+
 def is_over(pilot: Pilot) -> bool:
     return pilot.ended
 
