@@ -44,7 +44,8 @@ class Record:
         for fixtures in getattr(item, "_fixtureinfo").name2fixturedefs.values():  # noqa: B009
             reached |= self._fixtures.get(fixtures[-1], set())
         line = {"id": item.nodeid, "cpu": round(used, 3), "passed": self._passed.pop(item.nodeid, False)}
-        self._file.write(json.dumps({**line, "reached": sorted(reached)}) + "\n")
+        more = item.get_closest_marker("more") is not None
+        self._file.write(json.dumps({**line, "more": more, "reached": sorted(reached)}) + "\n")
         self._file.flush()
         return done
 
