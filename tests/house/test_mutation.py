@@ -148,10 +148,10 @@ def test_a_mutant_meets_the_nearest_cases_that_reach_its_function(tmp_path: Path
     lines = [json.dumps(dict(zip(("id", "cpu", "passed", "reached"), row, strict=True))) for row in rows]
     (tmp_path / "cases-main.jsonl").write_text("\n".join(lines))
     record = Record(tmp_path)
-    names = [case.name.partition("::test_")[2] for case in record.cases("robochoc/model/a.py", "f")]
+    names = [case.name.partition("::test_")[2] for case in record.cases("robochoc/model/a.py", function="f")]
     assert names == ["own", *(f"many[{n}]" for n in range(4)), "dear", "wide", "cheap", "many[4]", "many[5]"]
-    assert len(record.cases("robochoc/model/a.py", "")) == 11
-    assert record.cases("robochoc/model/a.py", "h") == []
+    assert len(record.cases("robochoc/model/b.py", "robochoc/model/a.py")) == 11
+    assert record.cases("robochoc/model/a.py", function="h") == []
     cases = [Case(f"{name}::test", cpu_s, 1) for name, cpu_s in {"a": 9.0, "b": 3.0, "c": 4.0, "d": 70.0}.items()]
     assert [[case.file for case in chosen] for chosen in rounds(cases)] == [["a"], ["b", "c"]]
 

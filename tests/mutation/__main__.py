@@ -83,9 +83,10 @@ class Record:
                     for name in {names[number] for number in line["reached"]}:
                         self._cases[name].append(case)
 
-    def cases(self, path: str, function: str) -> list[Case]:
-        """Return the cases to try with a mutant, nearest first; with one outside functions, all that reach its file."""
-        near = [name for name in self._cases if name[0] == path and function in {"", name[1]}]
+    def cases(self, *paths: str, function: str = "") -> list[Case]:
+        """Return the cases that reach a function of the first path, nearest first; without one, those of all paths."""
+        path = paths[0]
+        near = [name for name in self._cases if name[0] in paths and function in {"", name[1]}]
         found = {case for name in near for case in self._cases[name]}
         package = Path(path).parts[1]
         homes = (f"tests/unit/{package}/", f"tests/{package}/")
@@ -153,7 +154,9 @@ class Bench:
         """Try a mutant, with the cases of the test `first` before others."""
         file = self._tree / mutant.path
         as_it_was = file.stat()
-        cases = self._record.cases(mutant.path, mutant.place.function)
+        cases = self._record.cases(mutant.path, function=mutant.place.function)
+        if not (cases or mutant.place.function):  # a module without functions
+            cases = self._record.cases(*importers(self._tree, mutant.path))
         cases.sort(key=lambda case: case.test != first)
         result: dict[str, Any] = {"fate": "survived" if cases else "unreached", "reached_by": len(cases), "tried": 0}
         file.write_text(mutant.text)
@@ -217,6 +220,13 @@ def copy(source: Path, target: Path) -> None:
     left_out = shutil.ignore_patterns(".git", ".venv", ".*cache", "out", "__pycache__")
     shutil.copytree(source, target, ignore=left_out, symlinks=True)
     shutil.copytree(Path(__file__).parent, target / "tests" / "mutation", dirs_exist_ok=True)
+
+
+def importers(tree: Path, path: str) -> list[str]:
+    """Return `path`, and the files of the program that import from it."""
+    line = f"from {path.removesuffix('.py').removesuffix('/__init__').replace('/', '.')} import"
+    files = (file for file in tree.glob("robochoc/**/*.py") if line in file.read_text())
+    return [path, *sorted(str(file.relative_to(tree)) for file in files)]
 
 
 def compile_all(tree: Path) -> None:

@@ -76,10 +76,10 @@ def test_a_change_that_is_smaller_than_the_tolerance_is_not_told() -> None:
 
 
 def test_what_is_damped_is_not_settled_and_is_told_on_when_the_receiver_answers() -> None:
-    robot = middle(damping=0.5, tolerance=0.5)
+    robot = middle(damping=0.25, tolerance=0.4)
     replies(robot, ("RA", TWO))
     replies(robot, ("RC", R([[0, 0]], settled=True)))
-    assert replies(robot, ("RC", R([[0, 2]], settled=True))) == [("RA", R([[2, 4]], settled=False))]
+    assert replies(robot, ("RC", R([[0, 2]], settled=True))) == [("RA", R([[2.5, 4]], settled=False))]
     assert replies(robot, ("RA", Q([[0, 0]], settled=True))) == [("RA", R([[3, 4]], settled=True))]
     assert replies(robot, ("RA", Q([[0, 0]], settled=True))) == []
 

@@ -89,6 +89,7 @@ def test_own_instances_have_a_line_for_all() -> None:
     heads, lines = summary.medians(given, "messages", "instance")
     assert lines == [["p1", "1", "1"], ["p2", "2", "2"], ["p3", "3", "3"], ["all", "2", "2"]]
     assert heads == ["instance", "a", "b"]
+    assert summary.medians(given[:1], "messages", "instance") == (["instance", "a"], [["p1", "1"]])
 
 
 def test_how_many_runs_reach_the_best_known_cost() -> None:
@@ -203,9 +204,11 @@ def test_the_cost_over_time_is_that_of_the_last_point_before() -> None:
     assert statistics.cost_bands(rows(a=[1]), "messages") == {}
 
 
-def test_costs_are_drawn_over_cycles_where_they_are_counted() -> None:
+def test_costs_are_drawn_over_cycles_or_simulated_time_where_they_are_counted() -> None:
     curve = [(2, 0, 1.0, "9"), (6, 0, 4.0, "5")]
     given = [row("a", 1, 10, cost_over_time=curve, cycles=8), row("b", 1, 10, cost_over_time=curve, cycles=None)]
     bands = statistics.cost_bands(given, "cycles")
     assert list(bands) == ["a"]
     assert (bands["a"].spent[0], bands["a"].spent[-1], bands["a"].median[-1]) == (1.0, 8.0, 5.0)
+    timed = statistics.cost_bands([row("a", 1, 10, cost_over_time=curve, simulated_s=8.5)], "simulated_s")["a"]
+    assert (timed.spent[0], timed.spent[-1]) == (1.0, 8.5)

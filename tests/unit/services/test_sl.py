@@ -172,6 +172,13 @@ def test_descriptions_are_read_as_they_are_written(description: AgentDescription
     assert description_of(read(written(described(description)), REQUEST_CAPS)) == description
 
 
+def test_a_lease_is_written_in_days_hours_minutes_and_seconds() -> None:
+    description = AgentDescription("r", lease_s=(((1 * 24 + 2) * 60) + 3) * 60 + 4.5)
+    text = written(described(description))
+    assert ":lease-time +00000001T020304500" in text
+    assert description_of(read(text, REQUEST_CAPS)) == description
+
+
 ABT = AgentDescription(ROBOT, (ServiceDescription("abt", "robochoc", protocols=("abt",)),), ("abt",), lease_s=30.5)
 
 
