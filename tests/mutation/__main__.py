@@ -157,6 +157,7 @@ class Bench:
         cases = self._record.cases(mutant.path, function=mutant.place.function)
         if not (cases or mutant.place.function):  # a module without functions
             cases = self._record.cases(*importers(self._tree, mutant.path))
+        cases = [case for case in cases if (self._tree / case.file).exists()]
         cases.sort(key=lambda case: case.test != first)
         result: dict[str, Any] = {"fate": "survived" if cases else "unreached", "reached_by": len(cases), "tried": 0}
         file.write_text(mutant.text)

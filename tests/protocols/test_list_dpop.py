@@ -254,6 +254,15 @@ def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]],
         put_together(CompiledTeam(pair), result)
 
 
+def test_each_listed_optimum_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = team_of({"A": [1, 2], "B": [1, 2]}, [differ("A", "B")])
+    for wrong, why in (({"A": 1, "B": 1}, "broken by"), ({"A": 1}, "B has no value")):
+        listed = [{"A": 1, "B": 2}, wrong]
+        monkeypatch.setattr("robochoc.run.evaluation.put_together", lambda *_, listed=listed: (2, listed))
+        with pytest.raises(RefutedError, match=why):
+            solve(pair, IN_SIMULATOR)
+
+
 def test_a_place_that_is_none_is_a_lie() -> None:
     assert fault_of_findings(Findings(listing=Listing([-1], 1)), ()) == "it tells of optima that cannot be"
     assert not fault_of_findings(Findings(listing=Listing([0], 1)), ())
