@@ -6,7 +6,6 @@ from random import Random
 
 import pytest
 
-from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.a_dsa import ADSA
 from robochoc.protocols.local_search.messages.a_dsa import Tick
@@ -55,27 +54,17 @@ def test_there_is_no_tick_before_a_value_of_each_neighbour_is_known() -> None:
     assert replies(robot, ("RA", now(2)), ("RC", now(1))) == both(now(3))
 
 
-def test_a_tick_waits_for_no_neighbour() -> None:
+def test_a_tick_waits_for_no_neighbour_and_tells_the_value_also_if_it_is_the_old_one() -> None:
     robot = middle(STAYS, MOVES)
-    replies(robot, ("RA", now(1)), ("RC", now(2)))
+    assert replies(robot, ("RA", now(1)), ("RC", now(2))) == both(now(1))
     assert replies(robot, ("RA", now(1))) == both(now(3))
     assert robot.cycle == 2
 
 
-def test_the_value_is_told_in_each_tick_also_if_it_is_the_old_one() -> None:
-    robot = middle(STAYS)
-    assert replies(robot, ("RA", now(1)), ("RC", now(2))) == both(now(1))
-
-
-def test_a_packet_is_one_tick_and_the_last_value_of_several_counts() -> None:
+def test_a_packet_is_one_tick_by_the_last_values_and_without_news_there_is_none() -> None:
     robot = middle(MOVES)
     replies(robot, ("RC", now(2)), ("RA", now(3)), ("RA", now(2)), ("RA", now(1)))
     assert (robot.cycle, value(robot)) == (1, (3,))
-
-
-def test_without_news_there_is_no_tick() -> None:
-    robot = middle()
-    replies(robot, ("RA", now(2)), ("RC", now(2)))
     assert replies(robot) == []
     assert robot.cycle == 1
 
@@ -87,37 +76,18 @@ def test_the_last_tick_is_told_and_then_a_robot_is_silent() -> None:
     assert robot.cycle == 1
 
 
-def test_who_has_stopped_is_told_nothing_more() -> None:
+def test_who_has_stopped_is_told_nothing_more_and_may_tell_nothing() -> None:
     robot = middle(STAYS)
     assert replies(robot, ("RA", last(1)), ("RC", now(2))) == [("RC", now(1))]
+    for sender in ("RA", "RZ"):
+        with pytest.raises(ValueError, match="is no neighbour of RB, or has made its last tick"):
+            replies(robot, (sender, now(1)))
 
 
 def test_when_all_around_have_stopped_the_remaining_ticks_are_made_at_once() -> None:
     robot = middle(STAYS, STAYS, MOVES, cycles=5)
     assert replies(robot, ("RA", last(1)), ("RC", last(2))) == []
     assert (robot.cycle, value(robot)) == (5, (3,))
-
-
-@pytest.mark.parametrize("sender", ["RA", "RZ"])
-def test_what_cannot_be_is_refused(sender: str) -> None:
-    robot = middle()
-    replies(robot, ("RA", last(1)))
-    with pytest.raises(ValueError, match="is no neighbour of RB, or has made its last tick"):
-        replies(robot, (sender, now(1)))
-
-
-def test_a_robot_alone_takes_its_cheapest_value() -> None:
-    prices = Relation("P", 1, Semantics.SOFT, ((1,), (2,), (3,)), (4, 0, 2))
-    robot = robot_of(ADSA, team_of({"A": (1, 2, 3)}, [Constraint("P", prices, ("A",), ("A",))]), "RA")
-    assert started(robot) == []
-    assert robot.assignment == {"A": 2}
-
-
-def test_a_robot_with_an_empty_domain_ends_the_search() -> None:
-    team = team_of({"A": (1,), "B": ()}, [Constraint("C", EQUAL_COSTS, ("A", "B"), ("A", "B"))])
-    robot = robot_of(ADSA, team, "RB")
-    started(robot)
-    assert robot.verdict is Verdict.NO_SOLUTION
 
 
 @count("teams", 40, 600)

@@ -18,23 +18,18 @@ from robochoc.protocols.satisfaction.aas import AAS
 from robochoc.protocols.satisfaction.aggregates import AggregateStore, covers, matching, met
 from robochoc.protocols.satisfaction.messages.aas import AddLink, Narrow, Nogood, Ok
 from robochoc.protocols.satisfaction.settings.aas import AASSettings
-from robochoc.run import Options, Runtime, solve
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from robochoc.run import Runtime, solve
+from tests.support.agents import replies, started_robot, value
 from tests.support.examples import count
 from tests.support.problems import random_team, team_of
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import differ, triangle
+from tests.support.spent import spent
 
 
 def agent(team: Team, name: str, largest: int = 4) -> AAS:
-    """The protocol object of one robot, started, with nothing left to say."""
-    robot = AAS(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    robot.settings = AASSettings(largest)  # type: ignore[misc]  # as the host does
-    robot.start()
-    robot.outbox.clear()
-    return robot
+    kind = type("Limited", (AAS,), {"settings": AASSettings(largest)})
+    return started_robot(kind, team, name)
 
 
 def ok(*values: int) -> Ok:
@@ -47,15 +42,11 @@ def aggregate(robot: AAS) -> list[int | None]:
     return [robot.problem.values[index][0] for index in robot.aggregate]
 
 
-def test_a_robot_proposes_all_values_that_go_with_every_combination_it_has_heard() -> None:
-    robot = agent(triangle(3), "RC")
-    assert replies(robot, ("RA", ok(1)), ("RB", ok(1))) == [("RD", ok(2, 3))]
-    assert value(robot) == (2,)
-
-
-def test_it_proposes_no_more_than_the_largest_aggregate() -> None:
-    robot = agent(triangle(3), "RC", largest=1)
-    assert replies(robot, ("RA", ok(1)), ("RB", ok(1))) == [("RD", ok(2))]
+def test_a_robot_proposes_all_values_that_go_with_every_combination_up_to_the_largest_aggregate() -> None:
+    for largest, proposed in ((4, ok(2, 3)), (1, ok(2))):
+        robot = agent(triangle(3), "RC", largest)
+        assert replies(robot, ("RA", ok(1)), ("RB", ok(1))) == [("RD", proposed)]
+        assert value(robot) == (2,)
 
 
 def test_what_still_goes_with_the_view_is_kept_and_sent_only_when_it_has_changed() -> None:
@@ -86,16 +77,13 @@ def test_where_no_value_goes_with_all_of_the_view_the_largest_part_is_asked_for_
     assert replies(robot, ("RA", ok(2, 3)), ("RB", ok(2, 3))) == []
 
 
-def test_whoever_is_asked_proposes_less_and_says_so() -> None:
+def test_whoever_is_asked_proposes_less_and_keeps_the_rest_for_later() -> None:
     robot = agent(triangle(3), "RA")
     assert replies(robot, ("RC", Narrow(((2,), (3,))))) == [("RB", ok(2, 3)), ("RC", ok(2, 3))]
     assert replies(robot, ("RC", Narrow(((1,),)))) == []
     assert replies(robot, ("RB", Narrow(((2,), (3,))))) == []
-
-
-def test_what_was_asked_away_is_kept_for_later() -> None:
-    robot = agent(triangle(3), "RA")
-    replies(robot, ("RC", Narrow(((2,), (3,)))))
+    assert replies(robot, ("RC", Nogood({}, ((1,),)))) == [], "a nogood about nothing that is proposed is obsolete"
+    assert robot.store.all_open() == [0, 1, 2]
     assert replies(robot, ("RC", Nogood({}, ((2,), (3,))))) == [("RB", ok(1)), ("RC", ok(1))]
 
 
@@ -104,25 +92,12 @@ def test_a_nogood_rules_out_what_it_names_and_the_rest_of_the_aggregate_stays() 
     assert replies(robot, ("RB", Nogood({}, ((1,),)))) == [("RB", ok(2, 3)), ("RC", ok(2, 3))]
 
 
-def test_a_nogood_about_nothing_that_is_proposed_is_obsolete() -> None:
-    robot = agent(triangle(3), "RA")
-    replies(robot, ("RC", Narrow(((2,), (3,)))))
-    assert replies(robot, ("RC", Nogood({}, ((1,),)))) == []
-    assert robot.store.all_open() == [0, 1, 2]
-
-
-def test_a_nogood_holds_as_long_as_what_others_propose_is_covered() -> None:
+def test_a_nogood_holds_as_long_as_what_others_propose_is_covered_and_is_answered_otherwise() -> None:
     robot = agent(triangle(3), "RB")
     replies(robot, ("RA", ok(1, 2)), ("RC", Nogood({"RA": ((1,), (2,))}, ((3,),))))
-    assert robot.store[2] == {"RA": ((1,), (2,))}
-    replies(robot, ("RA", ok(2)))
-    assert robot.store[2] is not None
-    replies(robot, ("RA", ok(2, 3)))
-    assert robot.store[2] is None
-
-
-def test_a_nogood_that_does_not_cover_the_view_is_answered() -> None:
-    robot = agent(triangle(3), "RB")
+    for proposed, held in ((ok(2), True), (ok(2, 3), False)):
+        replies(robot, ("RA", proposed))
+        assert robot.store[2] == ({"RA": ((1,), (2,))} if held else None)
     replies(robot, ("RA", ok(1)))
     assert replies(robot, ("RC", Nogood({"RA": ((2,),)}, ((2,),)))) == [("RC", ok(2, 3))]
     assert robot.store[1] is None
@@ -150,24 +125,12 @@ def test_of_an_n_ary_constraint_the_lowest_robot_with_a_choice_is_asked() -> Non
     assert aggregate(robot) == [1]
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        Ok(()),
-        ok(1, 2, 3, 4, 5),
-        Nogood({}, ()),
-        Nogood({"RA": ()}, ((1,),)),
-        Nogood({"RC": ((1,),)}, ((1,),)),
-        Nogood({"RX": ((1,),)}, ((1,),)),
-        Narrow(((1, 2),)),
-    ],
-)
-def test_messages_that_cannot_be_are_refused(message: Message) -> None:
-    with pytest.raises(ValueError, match=r"RA|shorter|longer"):
-        agent(triangle(3), "RB").receive("RA", message)
-
-
-def test_an_aggregate_has_a_value() -> None:
+def test_messages_and_settings_that_cannot_be_are_refused() -> None:
+    wrong: list[Message] = [Ok(()), ok(1, 2, 3, 4, 5), Nogood({}, ()), Narrow(((1, 2),)), Nogood({"RA": ()}, ((1,),))]
+    wrong += [Nogood({name: ((1,),)}, ((1,),)) for name in ("RC", "RX")]
+    for message in wrong:
+        with pytest.raises(ValueError, match=r"RA|shorter|longer"):
+            agent(triangle(3), "RB").receive("RA", message)
     with pytest.raises(ValueError, match="largest is 0; it must be 1 or more"):
         AASSettings(0)
 
@@ -233,10 +196,5 @@ def jobs(chance: Random) -> Team:
 
 def test_aggregates_save_messages_where_constraints_are_orders_of_numbers() -> None:
     """The paper's claim, on average: single problems go either way."""
-    spent = {"1": 0, "4": 0}
-    for seed in range(4):
-        team = jobs(Random(seed))
-        for largest in spent:
-            options = Options(protocol="aas", runtime=Runtime.SIMULATOR, settings={"largest": largest})
-            spent[largest] += sum(solve(team, options).metrics.messages.values())
-    assert spent["4"] < 0.5 * spent["1"], spent
+    teams = [jobs(Random(seed)) for seed in range(4)]
+    assert spent(teams, "aas", largest="4").messages < 0.5 * spent(teams, "aas", largest="1").messages

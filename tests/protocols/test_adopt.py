@@ -8,22 +8,12 @@ from robochoc.protocols.optimization.adopt import ADOPT
 from robochoc.protocols.optimization.messages.adopt import Cost, Threshold, Value
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from tests.support.agents import replies, value
-from tests.support.pseudo_trees import context, placed, priced, root, to
-
-TEAM = priced("ZABCD", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4})
-"""B stands below A and, further up, Z; C and D are its children."""
-
-
-def middle() -> ADOPT:
-    """B, after it has begun."""
-    adopt = placed(ADOPT, TEAM, "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"])
-    adopt.outbox.clear()
-    return adopt
+from tests.support.pseudo_trees import context, middle, placed, priced, root, to
 
 
 def informed(z: int = 1, a: int = 1) -> ADOPT:
     """B, when it knows the values above."""
-    adopt = middle()
+    adopt = middle(ADOPT)
     replies(adopt, ("RZ", Value((z,), 1)), ("RA", Value((a,), 1)))
     return adopt
 
@@ -40,22 +30,18 @@ def test_initialize_takes_the_value_with_the_least_lower_bound_and_tells_all_aro
 
 
 def test_a_value_is_added_to_the_context_and_what_it_costs_to_the_bounds() -> None:
-    adopt = middle()
+    adopt = middle(ADOPT)
     said = replies(adopt, ("RA", Value((2,), 1)))
     assert adopt.context == context(A=2)
     assert list(adopt.lower) == [1, 0]
     assert to("RA", said) == [Cost(context(A=2), 0, INFINITE)]
 
 
-def test_a_cost_bounds_the_child_s_subtree_for_the_value_in_its_context() -> None:
+def test_a_cost_bounds_the_child_s_subtree_for_the_value_in_its_context_unless_that_is_obsolete() -> None:
     adopt = informed()
     replies(adopt, ("RC", Cost(context(B=2, A=1), 4, 7)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 4], [INFINITE, 7])
     assert list(adopt.lower) == [0, 8]
-
-
-def test_a_cost_in_an_obsolete_context_is_no_bound() -> None:
-    adopt = informed()
     replies(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=1), 4, 7)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 0], [INFINITE, INFINITE])
     assert adopt.context == context(A=(2, 2), Z=1)
@@ -77,15 +63,12 @@ def test_an_older_value_does_not_come_back() -> None:
     assert adopt.bounds["RD"].lb == [0, 0]
 
 
-def test_a_changed_value_voids_the_bounds_that_rest_on_it_and_no_others() -> None:
+def test_a_changed_value_voids_the_bounds_that_rest_on_it_and_the_same_value_again_none() -> None:
     adopt = informed()
     replies(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)), ("RD", Cost(context(B=1, Z=1), 3, 3)))
     replies(adopt, ("RA", Value((2,), 2)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub, adopt.t["RC"]) == ([0, 0], [INFINITE, INFINITE], [0, 0])
     assert (adopt.bounds["RD"].lb, adopt.bounds["RD"].ub) == ([3, 0], [3, INFINITE])
-
-
-def test_the_same_value_again_voids_nothing_but_is_told_with_its_new_counter() -> None:
     adopt = informed()
     replies(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)))
     said = replies(adopt, ("RA", Value((2,), 2)), ("RA", Value((1,), 3)), ("RC", Cost(context(B=1, A=1), 4, 7)))
@@ -147,11 +130,13 @@ def test_a_child_s_threshold_is_never_below_what_it_costs_at_least() -> None:
     assert adopt.t == {"RC": [0, 0], "RD": [1, 0]}
 
 
-def test_nothing_is_told_twice() -> None:
+def test_nothing_is_told_twice_and_what_is_paid_is_looked_up_only_when_a_neighbour_above_has_another_value() -> None:
     adopt = informed()
-    assert (
-        replies(adopt, ("RA", Value((1,), 1)), ("RC", Cost(context(B=1), 0, INFINITE)), ("RA", Threshold(0, {}))) == []
-    )
+    checks = adopt.problem.checks
+    packet = [("RA", Value((1,), 1)), ("RC", Cost(context(B=1), 0, INFINITE)), ("RA", Threshold(0, {}))]
+    assert replies(adopt, *packet) == []
+    replies(adopt, ("RC", Cost(context(B=1, X=1), 4, 7)), ("RA", Value((1,), 2)), ("RA", Threshold(3, {})))
+    assert adopt.problem.checks == checks
 
 
 def test_another_robot_ends_only_after_its_parent_with_the_last_values_above() -> None:
@@ -188,10 +173,3 @@ def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     assert replies(adopt, *packet) == [("RA", Cost(context(A=1, Z=1), INFINITE, INFINITE))]
     said = replies(adopt, ("RA", Value((2,), 2)), ("RC", Cost(context(B=1, A=(2, 2)), INFINITE, INFINITE)))
     assert to("RA", said) == [Cost(context(A=(2, 2), Z=1), INFINITE, INFINITE)]
-
-
-def test_what_is_paid_is_looked_up_only_when_a_neighbour_above_has_another_value() -> None:
-    adopt = informed()
-    checks = adopt.problem.checks
-    replies(adopt, ("RC", Cost(context(B=1, X=1), 4, 7)), ("RA", Value((1,), 2)), ("RA", Threshold(3, {})))
-    assert adopt.problem.checks == checks

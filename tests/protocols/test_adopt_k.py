@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
 import pytest
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt import ADOPT
 from robochoc.protocols.optimization.adopt_k import ADOPTk
@@ -19,17 +18,13 @@ from robochoc.protocols.optimization.messages.adopt_k import Value
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
-from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.ace import AceProcess
+from robochoc.run import solve
 from tests.support.agents import replies, value
-from tests.support.cost_problems import minimum_withdrawal, random_cost_team
-from tests.support.loose_problems import loosened_cost_team, minimum_cost
-from tests.support.problems import random_team
-from tests.support.pseudo_trees import context, placed, priced, root, to
+from tests.support.cases import cases, looped
+from tests.support.cost_problems import random_cost_team
+from tests.support.pseudo_trees import context, middle, root, to
 from tests.support.random_options import random_options
-
-TEAM = priced("ZABCD", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4})
-"""B stands below A and, further up, Z; C and D are its children. With both above at 1, its values cost 0 and 4."""
+from tests.support.spent import spent
 
 
 def kind(of_k: float) -> type[ADOPTk]:
@@ -42,13 +37,13 @@ def kind(of_k: float) -> type[ADOPTk]:
 
 
 def informed(k: float, allowance: float = 0, threshold: float = INFINITE) -> ADOPTk:
-    """B, when it knows the values above, both 1, and its thresholds."""
-    robot = placed(kind(k), TEAM, "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"])
+    """B, when it knows the values above, both 1, and its thresholds: its own values cost 0 and 4."""
+    robot = middle(kind(k))
     replies(robot, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold, allowance)))
     return robot
 
 
-@pytest.mark.parametrize(("k", "kept"), [(1, 5), (3, 7), (9, 9)])
+@looped(("k", "kept"), [(1, 5), (3, 7), (9, 9)])
 def test_a_value_is_left_when_its_lower_bound_is_k_above_the_first_threshold(k: int, kept: int) -> None:
     """With 9, it is left at 10: it has reached the threshold of BnB-ADOPT."""
     robot = informed(k, allowance=5, threshold=10)
@@ -65,13 +60,11 @@ def test_a_value_is_left_when_its_lower_bound_is_the_best_known_cost() -> None:
 
 
 def test_the_first_threshold_stays_between_lb_and_ub() -> None:
-    robot = informed(9, allowance=1)
-    assert robot.allowance == 1
-    replies(robot, *((child, Cost(context(B=1), 3, 9)) for child in ("RC", "RD")))
-    assert robot.allowance == robot.lb == 4
-    robot = informed(9, allowance=99)
-    replies(robot, *((child, Cost(context(B=1), 3, 9)) for child in ("RC", "RD")))
-    assert robot.allowance == robot.ub == 18
+    for allowance, bound in ((1, 4), (99, 18)):
+        robot = informed(9, allowance=allowance)
+        assert robot.allowance == allowance
+        replies(robot, *((child, Cost(context(B=1), 3, 9)) for child in ("RC", "RD")))
+        assert (robot.lb, robot.ub, robot.allowance) == (4, 18, bound)
 
 
 def test_a_first_threshold_that_is_ub_makes_the_robot_take_the_value_with_the_least_upper_bound() -> None:
@@ -106,14 +99,11 @@ def test_with_the_same_value_a_lower_share_is_told_and_no_higher_one() -> None:
     assert replies(robot, ("RA", Value((1,), 1, INFINITE, 2))) == [("RC", Value((1,), 1, INFINITE, 2))]
 
 
-def test_a_changed_value_voids_both_thresholds_and_they_are_asked_for() -> None:
+def test_a_changed_value_voids_both_thresholds_and_a_threshold_of_a_pseudo_parent_is_none() -> None:
     robot = informed(9, allowance=3, threshold=8)
     said = replies(robot, ("RZ", Value((2,), 2)))
     assert (robot.threshold, robot.allowance) == (INFINITE, robot.lb)
-    assert to("RA", said) == [Cost(context(A=1, Z=(2, 2)), 2, INFINITE, True)]
-
-
-def test_a_threshold_of_a_pseudo_parent_is_none() -> None:
+    assert to("RA", said) == [Cost(context(A=1, Z=(2, 2)), 2, INFINITE, True)], "they are asked for"
     robot = informed(9, allowance=3)
     replies(robot, ("RZ", Value((1,), 2, 7, 1)))
     assert (robot.threshold, robot.allowance) == (INFINITE, 3)
@@ -147,12 +137,16 @@ def told(chance: Random, robot: BoundingProtocol) -> tuple[str, Cost]:
     return child, Cost(context(B=number), lb, chance.randint(lb, int(high)))
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_with_k_1_it_decides_as_adopt_does(seed: int) -> None:
+def test_with_k_1_it_decides_as_adopt_does() -> None:
     """The same value, the same threshold, the same shares, after each of the same messages."""
-    chance = Random(f"as adopt {seed}")
-    robot = informed(1)
-    other = placed(ADOPT, TEAM, "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"])
+    with cases() as each:
+        for seed in range(40):
+            with each(seed):
+                decide_alike(Random(f"as adopt {seed}"))
+
+
+def decide_alike(chance: Random) -> None:
+    robot, other = informed(1), middle(ADOPT)
     replies(other, ("RZ", adopt.Value((1,), 1)), ("RA", adopt.Value((1,), 1)))
     for _ in range(20):
         if chance.random() < 0.3:
@@ -180,52 +174,15 @@ def test_with_an_infinite_k_a_run_is_bnb_adopt_s() -> None:
 
 def test_the_larger_k_the_fewer_values_are_told() -> None:
     """ADOPT returns to values again and again."""
-    counts = dict.fromkeys(("1", "4", "inf"), 0)
-    for k in counts:
-        options = Options(protocol="adopt-k", runtime=Runtime.SIMULATOR, settings={"k": k}, cache=False)
-        for seed in range(3):
-            team = random_csp(6, 3, 0.6, 0, seed, connected=True, max_cost=10)
-            counts[k] += solve(team, options).metrics.messages["Value"]
-    assert counts["1"] > counts["4"] > counts["inf"]
+    teams = [random_csp(6, 3, 0.6, 0, seed, connected=True, max_cost=10) for seed in range(3)]
+    one, four, infinite = (spent(teams, "adopt-k", k=k).by_type["Value"] for k in ("1", "4", "inf"))
+    assert one > four > infinite
 
 
 # Completeness for every k
 
 
-@pytest.fixture
-def warm(warm_ace: None) -> Iterator[AceProcess]:
-    """A solver for complex robots that need not be started for each team."""
-    del warm_ace
-    with AceProcess() as ace:
-        yield ace
-
-
-@pytest.mark.parametrize("k", ["1", "2", "5", "inf"])
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 6))])
-def test_the_least_cost_is_found_for_every_k(k: str, batch: int, warm: AceProcess) -> None:
-    chance = Random(f"adopt-k {k} {batch}")
-    for _ in range(200 if batch else 5):
-        team = loosened_cost_team(chance)
-        cost = minimum_cost(team)
-        outcome = solve(team, replace(random_options(team, "adopt-k", chance), settings={"k": k}), solver=warm)
-        assert outcome.verdict is (Verdict.NO_SOLUTION if cost == INFINITE else Verdict.OPTIMAL), team
-        assert outcome.cost == (None if cost == INFINITE else cost), team
-
-
-@pytest.mark.parametrize("k", ["1", "3", "inf"])
-@pytest.mark.parametrize("teams", [4, pytest.param(60, marks=pytest.mark.slow)])
-def test_as_few_as_possible_step_aside_for_every_k(k: str, teams: int) -> None:
-    chance = Random(f"aside adopt-k {k}")
-    for _ in range(teams):
-        team = random_team(chance)
-        robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
-        team = replace(team, robots=robots)
-        options = random_options(team, "adopt-k", chance)
-        outcome: Outcome = solve(team, replace(options, settings={"k": k}, withdraw=Withdrawal.MINIMUM))
-        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
-
-
-@pytest.mark.parametrize("k", [0, -1, 2.5, -INFINITE, float("nan")])
+@looped("k", [0, -1, 2.5, -INFINITE, float("nan")])
 def test_k_is_a_whole_number_from_1_or_infinite(k: float) -> None:
     with pytest.raises(ValueError, match="whole number, 1 or more, or inf"):
         ADOPTkSettings(k=k)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
@@ -12,10 +13,8 @@ from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.optimization.afb import AFB
 from robochoc.protocols.optimization.afb_bounds import Cost
 from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution, Terminate
-from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from robochoc.solver.agent_problem import RunParameters
+from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.problems import team_of
 
 
@@ -36,14 +35,7 @@ def chain() -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2)), constraints)
 
 
-def agent(team: Team, name: str, parameters: RunParameters = DEFAULT_PARAMETERS) -> AFB:
-    """The protocol object of one robot, started, with nothing left to say."""
-    robot = AFB(
-        LocalProblem(agent_problems(team, parameters=parameters, shared_scopes=True)[name]), PriorityOrder(team.order)
-    )
-    robot.start()
-    robot.outbox.clear()
-    return robot
+agent = partial(started_robot, AFB)
 
 
 Assigned = tuple[int, int]
@@ -74,17 +66,20 @@ def solution(cost: Cost, *values: int) -> NewSolution:
 
 
 def test_the_first_robot_generates_the_cpa_and_asks_all_others_for_estimates() -> None:
-    robot = AFB(LocalProblem(agent_problems(team := chain(), shared_scopes=True)["RA"]), PriorityOrder(team.order))
-    robot.start()
-    first = cpa((1, 1), least=[0, 0])
-    assert robot.outbox == [("RB", first), ("RC", asks((1, 1))), ("RD", asks((1, 1)))]
-    assert agent(team, "RB").value is None
+    asked = [("RC", asks((1, 1))), ("RD", asks((1, 1)))]
+    assert started(robot_of(AFB, chain(), "RA")) == [("RB", cpa((1, 1), least=[0, 0])), *asked]
+    assert agent(chain(), "RB").value is None
 
 
-def test_the_next_robot_adds_a_value_and_answers_to_the_cpa_itself() -> None:
-    said = replies(agent(chain(), "RB"), ("RA", cpa((1, 1), least=[0, 0])))
-    on = cpa((1, 1), (1, 1), least=[0, 0, 0])
-    assert said == [("RC", on), ("RD", asks((1, 1), (1, 1))), ("RA", FBEstimate([1], [0]))]
+def test_the_next_robot_adds_a_value_and_answers_and_each_assignment_raises_the_own_counter() -> None:
+    robot = agent(chain(), "RB")
+    assert replies(robot, ("RA", cpa((1, 1), least=[0, 0]))) == [
+        ("RC", cpa((1, 1), (1, 1), least=[0, 0, 0])),
+        ("RD", asks((1, 1), (1, 1))),
+        ("RA", FBEstimate([1], [0])),
+    ]
+    said = replies(robot, ("RC", back((1, 1), (1, 1))))
+    assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0]))
 
 
 def test_values_are_tried_the_cheapest_first() -> None:
@@ -92,13 +87,6 @@ def test_values_are_tried_the_cheapest_first() -> None:
     said = replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
     assert value(robot) == (2,)  # 2, and not 4
     assert said[0] == ("RD", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 2, 2]))
-
-
-def test_each_assignment_raises_the_own_counter() -> None:
-    robot = agent(chain(), "RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    said = replies(robot, ("RC", back((1, 1), (1, 1))))
-    assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0]))
 
 
 def test_a_value_with_which_the_cpa_costs_as_much_as_b_is_not_assigned() -> None:
@@ -153,7 +141,7 @@ def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
 
 def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {}, 5)])
-    assert agent(team, "RA", RunParameters(withdrawal_cost=9)).costs.estimates == [0]
+    assert agent(team, "RA", parameters=RunParameters(withdrawal_cost=9)).costs.estimates == [0]
 
 
 def test_what_a_cpa_has_in_common_with_the_last_one_is_not_priced_again() -> None:
@@ -211,6 +199,8 @@ def test_without_a_value_left_the_cpa_goes_back_to_the_robot_before() -> None:
     robot = agent(chain(), "RB")
     replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
     replies(robot, ("RC", back((1, 1), (1, 1))))
+    assert replies(robot, ("RD", back((1, 1), (1, 1)))) == [], "another value has been taken since"
+    assert value(robot) == (2,)
     assert replies(robot, ("RC", back((1, 1), (2, 2)))) == [("RA", back((1, 1)))]
 
 
@@ -229,42 +219,24 @@ def test_what_robots_in_between_and_below_cost_counts_for_the_jump_as_well() -> 
     assert replies(robot, ("RD", FBEstimate([1, 1, 1], [0, 3]))) == [("RA", back((1, 1), bound=6))]
 
 
-def test_a_cpa_comes_back_in_vain_when_another_value_has_been_taken_since() -> None:
-    robot = agent(chain(), "RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    replies(robot, ("RC", back((1, 1), (1, 1))))
-    assert replies(robot, ("RD", back((1, 1), (1, 1)))) == []
-    assert value(robot) == (2,)
-
-
 # Time-stamps
 
 
-def test_an_obsolete_cpa_is_ignored() -> None:
-    robot = agent(chain(), "RC")
-    replies(robot, ("RA", asks((2, 2))))
-    assert replies(robot, ("RB", cpa((1, 1), (1, 7), least=[0, 0, 0]))) == []
+def test_an_obsolete_cpa_is_ignored_and_an_obsolete_question_not_answered() -> None:
+    for name, old in (("RC", cpa((1, 1), (1, 7), least=[0, 0, 0])), ("RD", asks((1, 1), (1, 7)))):
+        robot = agent(chain(), name)
+        replies(robot, ("RA", asks((2, 2))))
+        assert replies(robot, ("RB", old)) == []
 
 
-def test_an_obsolete_question_is_not_answered() -> None:
-    robot = agent(chain(), "RD")
-    replies(robot, ("RA", asks((2, 2))))
-    assert replies(robot, ("RB", asks((1, 1), (1, 7)))) == []
-
-
-def test_a_stronger_cpa_makes_the_own_value_void() -> None:
-    robot = agent(chain(), "RC")
-    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
-    replies(robot, ("RA", asks((2, 2))))
-    assert robot.value is None
-    assert replies(robot, ("RD", back((1, 1), (2, 1), (2, 1)))) == []
-
-
-def test_a_late_question_for_the_present_cpa_is_answered() -> None:
+def test_a_late_question_for_the_present_cpa_is_answered_and_a_stronger_cpa_makes_the_own_value_void() -> None:
     robot = agent(chain(), "RC")
     replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
     assert replies(robot, ("RA", asks((1, 1)))) == [("RA", FBEstimate([1], [0, 0]))]
     assert value(robot) == (2,)
+    replies(robot, ("RA", asks((2, 2))))
+    assert robot.value is None
+    assert replies(robot, ("RD", back((1, 1), (2, 1), (2, 1)))) == []
 
 
 # The end
@@ -323,15 +295,10 @@ def test_the_news_of_the_best_solution_may_come_after_the_end() -> None:
     assert value(robot) == (2,)
 
 
-def test_a_robot_with_an_empty_domain_says_so_at_once() -> None:
+def test_a_robot_alone_solves_its_problem_in_silence_and_one_with_an_empty_domain_says_so_at_once() -> None:
+    robot = robot_of(AFB, team_of({"A": (1, 2)}, [priced("A", {(1,): 3, (2,): 1})]), "RA")
+    assert (started(robot), robot.assignment, robot.verdict) == ([], {"A": 2}, None)
     assert agent(team_of({"A": (1, 2), "B": ()}, []), "RB").verdict is Verdict.NO_SOLUTION
-
-
-def test_a_robot_alone_solves_its_problem_in_silence() -> None:
-    team = team_of({"A": (1, 2)}, [priced("A", {(1,): 3, (2,): 1})])
-    robot = AFB(LocalProblem(agent_problems(team)["RA"]), PriorityOrder(team.order))
-    robot.start()
-    assert (robot.assignment, robot.outbox, robot.verdict) == ({"A": 2}, [], None)
 
 
 def test_the_best_solution_and_a_bound_are_found_before_the_end() -> None:

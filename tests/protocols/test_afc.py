@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
-
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
@@ -14,12 +12,14 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.afc import AFC, FilteredDomain
 from robochoc.protocols.satisfaction.messages.afc import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
-from robochoc.protocols.satisfaction.sbt import SBT
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
+from tests.support.agents import robot_of
 from tests.support.brute_force import solutions
+from tests.support.cases import cases
 from tests.support.problems import random_team, team_of
 from tests.support.small_teams import differ
+from tests.support.spent import spent
 
 
 def square(values: int = 3) -> Team:
@@ -31,7 +31,7 @@ def square(values: int = 3) -> Team:
 
 def agent(team: Team, name: str) -> AFC:
     """The protocol object of one robot, started."""
-    afc = AFC(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
+    afc = robot_of(AFC, team, name)
     afc.start()
     return afc
 
@@ -64,11 +64,8 @@ def test_assign_cpa_counts_a_step_and_sends_the_cpa_to_the_next_robot_and_copies
     said = told(afc, CPA(values(1), 7))
     assert said == [("RC", CPA(values(1, 2), 8)), ("RD", FcCPA(values(1, 2), 8)), ("RE", FcCPA(values(1, 2), 8))]
     assert afc.assignment == {"B": 2}
-
-
-def test_a_robot_without_constraints_takes_part_in_the_way_of_the_cpa() -> None:
     afc = agent(team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C")]), "RB")
-    assert told(afc, CPA(values(1), 1)) == [("RC", CPA(((1,), ()), 2))]  # B shows nobody a variable
+    assert told(afc, CPA(values(1), 1)) == [("RC", CPA(((1,), ()), 2))], "B has no constraint, and shows no variable"
 
 
 def test_the_last_robot_concludes_that_a_solution_stands() -> None:
@@ -80,11 +77,13 @@ def test_the_last_robot_concludes_that_a_solution_stands() -> None:
 # receive_CPA
 
 
-def test_backtrack_cpa_makes_the_robot_take_its_next_value_at_a_later_step() -> None:
+def test_backtrack_cpa_makes_the_robot_take_its_next_value_at_a_later_step_without_a_check() -> None:
     afc = agent(square(4), "RC")
     told(afc, CPA(values(1, 2), 2))
+    before = afc.problem.checks
     said = told(afc, BacktrackCPA(values(1, 2, 3), 30))
     assert said == [("RD", CPA(values(1, 2, 4), 31)), ("RE", FcCPA(values(1, 2, 4), 31))]
+    assert afc.problem.checks == before
 
 
 def test_a_value_once_tried_is_tried_again_only_under_another_cpa() -> None:
@@ -103,9 +102,11 @@ def test_a_robot_that_has_tried_all_its_values_backtracks_to_the_robot_before() 
 
 
 def test_a_robot_whose_domain_the_cpa_empties_backtracks_to_the_last_robot_that_did_harm() -> None:
-    """A and B alone leave E no value: C and D are jumped over."""
+    """A and B alone leave E no value: C and D are jumped over. What arrives late is not answered."""
     afc = agent(square(2), "RE")
     assert told(afc, CPA(values(1, 2, 1, 1), 4)) == [("RB", BacktrackCPA(values(1, 2), 4))]
+    assert told(afc, FcCPA(values(1, 2), 2)) == []
+    assert told(afc, NotOk(values(2, 2), 1)) == []
 
 
 def test_the_first_robot_concludes_that_there_is_none_when_its_domain_is_exhausted() -> None:
@@ -113,6 +114,7 @@ def test_the_first_robot_concludes_that_there_is_none_when_its_domain_is_exhaust
     assert told(afc, BacktrackCPA(values(1), 5))[0] == ("RB", CPA(values(2), 6))
     assert told(afc, BacktrackCPA(values(2), 9)) == []
     assert afc.verdict is Verdict.NO_SOLUTION
+    assert told(afc, BacktrackCPA(values(2), 9)) == [], "nothing is said after the verdict"
 
 
 def test_who_gets_a_cpa_that_is_known_to_be_inconsistent_sends_it_back_without_a_check() -> None:
@@ -140,13 +142,6 @@ def test_a_not_ok_in_the_packet_of_the_cpa_is_heard_first() -> None:
     assert told(afc, CPA(values(1, 2, 3), 3), NotOk(values(1), 3)) == [("RA", BacktrackCPA(values(1), 3))]
 
 
-def test_who_has_backtracked_says_nothing_to_what_arrives_late() -> None:
-    afc = agent(square(2), "RE")
-    told(afc, CPA(values(1, 2, 1, 1), 4))
-    assert told(afc, FcCPA(values(1, 2), 2)) == []
-    assert told(afc, NotOk(values(2, 2), 1)) == []
-
-
 def test_a_new_cpa_lets_all_values_be_tried_though_the_last_one_was_never_brought_back() -> None:
     """Somebody below sent it back to A, past this robot."""
     afc = agent(square(4), "RB")
@@ -164,24 +159,18 @@ def test_forward_check_says_nothing_while_a_value_is_left() -> None:
 
 
 def test_forward_check_tells_all_robots_without_a_value_in_the_shortest_inconsistent_assignment() -> None:
-    afc = agent(square(2), "RE")
-    said = told(afc, FcCPA(values(1, 2, 1), 3))
+    said = told(agent(square(2), "RE"), FcCPA(values(1, 2, 1), 3))
     assert said == [("RC", NotOk(values(1, 2), 3)), ("RD", NotOk(values(1, 2), 3))]
 
 
-def test_forward_check_says_an_inconsistent_assignment_once() -> None:
+def test_forward_check_says_an_inconsistent_assignment_once_and_starts_anew_with_another() -> None:
     afc = agent(square(2), "RE")
     told(afc, FcCPA(values(1, 2), 2))
     before = afc.problem.checks
     assert told(afc, FcCPA(values(1, 2, 1), 3)) == []
     assert afc.problem.checks == before
-
-
-def test_forward_check_starts_anew_when_the_cpa_does_not_go_on_from_the_inconsistent_one() -> None:
-    afc = agent(square(2), "RE")
-    told(afc, FcCPA(values(1, 2), 2))
-    assert told(afc, FcCPA(values(2), 3)) == []
-    assert told(afc, FcCPA(values(2, 1), 4)) == [("RC", NotOk(values(2, 1), 4)), ("RD", NotOk(values(2, 1), 4))]
+    assert told(afc, FcCPA(values(2), 4)) == []
+    assert told(afc, FcCPA(values(2, 1), 5)) == [("RC", NotOk(values(2, 1), 5)), ("RD", NotOk(values(2, 1), 5))]
 
 
 def test_a_copy_of_an_earlier_step_is_ignored() -> None:
@@ -191,16 +180,11 @@ def test_a_copy_of_an_earlier_step_is_ignored() -> None:
     assert afc.view == values(2)
 
 
-def test_a_late_copy_does_not_take_the_value_of_a_robot_that_has_had_the_cpa_since() -> None:
+def test_a_copy_of_a_later_step_takes_the_own_value_and_a_late_copy_does_not() -> None:
     afc = agent(square(4), "RC")
     told(afc, CPA(values(1, 2), 2))
     assert told(afc, FcCPA(values(1), 1)) == []
     assert afc.assignment == {"C": 3}
-
-
-def test_a_copy_of_a_later_step_says_that_the_own_value_is_no_longer_in_the_cpa() -> None:
-    afc = agent(square(4), "RC")
-    told(afc, CPA(values(1, 2), 2))
     told(afc, FcCPA(values(2), 9))
     assert afc.assignment == {}
 
@@ -228,16 +212,11 @@ def test_a_not_ok_of_an_earlier_step_is_believed_when_the_view_goes_on_from_it()
     assert told(afc, CPA(values(1, 2, 3), 9)) == [("RA", BacktrackCPA(values(1), 9))]
 
 
-def test_a_not_ok_of_an_earlier_step_about_another_cpa_is_obsolete() -> None:
+def test_a_not_ok_about_another_cpa_is_obsolete_if_earlier_and_ahead_of_its_copy_if_later() -> None:
     afc = agent(square(4), "RE")
     told(afc, FcCPA(values(2), 8))
     told(afc, NotOk(values(1), 3))
     assert (afc.view, afc.sc, afc.consistent) == (values(2), 8, True)
-
-
-def test_a_not_ok_of_a_later_step_is_ahead_of_the_copy_of_that_step() -> None:
-    afc = agent(square(4), "RE")
-    told(afc, FcCPA(values(2), 8))
     told(afc, NotOk(values(3, 1), 11))
     before = afc.problem.checks
     assert told(afc, FcCPA(values(3), 10), FcCPA(values(3, 1), 11)) == []
@@ -256,19 +235,10 @@ def test_of_two_inconsistent_assignments_the_shorter_one_is_kept() -> None:
 # Ends
 
 
-def test_nothing_is_said_after_the_verdict() -> None:
-    afc = agent(square(1), "RA")
-    told(afc, BacktrackCPA(values(1), 1))
-    assert told(afc, BacktrackCPA(values(1), 1)) == []
-
-
-def test_a_robot_with_an_empty_domain_says_so_at_once() -> None:
+def test_a_robot_with_an_empty_domain_says_so_at_once_and_a_robot_alone_is_the_first_and_the_last() -> None:
     afc = agent(team_of({"A": (1, 2), "B": (), "C": (1,)}, []), "RB")
     assert afc.verdict is Verdict.NO_SOLUTION
     assert told(afc, CPA(values(1), 1)) == []
-
-
-def test_a_robot_alone_is_the_first_and_the_last() -> None:
     afc = agent(team_of({"A": (1, 2)}, []), "RA")
     assert (afc.verdict, afc.assignment) == (Verdict.SOLUTION, {"A": 1})
 
@@ -285,70 +255,53 @@ def test_an_n_ary_constraint_is_checked_once_the_cpa_names_all_its_other_robots(
     assert told(afc, CPA(values(2, 2), 5)) == [("RB", BacktrackCPA(values(2, 2), 5))]
 
 
-def test_a_longer_cpa_is_checked_only_for_what_is_new() -> None:
+def test_a_longer_cpa_is_checked_only_for_what_is_new_and_a_shorter_one_restores_values_without_a_check() -> None:
     afc = agent(square(4), "RD")
-    told(afc, FcCPA(values(1), 1))
-    assert afc.problem.checks == 4
-    told(afc, FcCPA(values(1, 2), 2))
-    assert afc.problem.checks == 4 + 3
-    told(afc, CPA(values(1, 2, 3), 3))
-    assert afc.problem.checks == 4 + 3 + 2
-
-
-def test_a_shorter_cpa_restores_values_without_a_check() -> None:
-    afc = agent(square(4), "RE")
-    told(afc, FcCPA(values(1, 2), 2))
-    before = afc.problem.checks
+    checks = 0
+    for cpa, more in ((FcCPA(values(1), 1), 4), (FcCPA(values(1, 2), 2), 3), (CPA(values(1, 2, 3), 3), 2)):
+        told(afc, cpa)
+        checks += more
+        assert afc.problem.checks == checks
     afc.domain.filter(values(1))
     assert [afc.domain.first(place) for place in range(4)] == [1, 1, 2, 3]
-    assert afc.problem.checks == before
+    assert afc.problem.checks == checks
 
 
-def test_a_cpa_that_comes_back_costs_no_check() -> None:
-    afc = agent(square(4), "RC")
-    told(afc, CPA(values(1, 2), 2))
-    before = afc.problem.checks
-    told(afc, BacktrackCPA(values(1, 2, 3), 3))
-    assert afc.problem.checks == before
+def test_filtering_step_by_step_finds_what_filtering_afresh_finds() -> None:
+    for seed in range(20):
+        chance = Random(f"filter {seed}")
+        team = random_team(chance)
+        order = PriorityOrder(team.order)
+        part = agent_problems(team)[order.names[-1]]
+        above = [LocalProblem(agent_problems(team)[name]).values for name in order.names[:-1]]
+        if not all(above):
+            continue
+        domain = FilteredDomain(LocalProblem(part), order)
+        for _ in range(50):
+            assignments = tuple(chance.choice(own[:2]) for own in above[: chance.randint(0, len(above))])
+            domain.filter(assignments)
+            fresh = LocalProblem(part)
+            view = dict(zip(order.names, assignments, strict=False))
+            conflicts = [fresh.conflict(index, view) for index in range(len(fresh.values))]
+            left = [index for index, conflict in enumerate(conflicts) if conflict is None]
+            assert [index for index in range(len(conflicts)) if domain.first(index) == index] == left
+            depths = [order.depth(conflict) + 1 for conflict in conflicts if conflict is not None]
+            assert domain.inconsistent() == (None if left else assignments[: max(depths, default=0)])
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_filtering_step_by_step_finds_what_filtering_afresh_finds(seed: int) -> None:
-    chance = Random(f"filter {seed}")
-    team = random_team(chance)
-    order = PriorityOrder(team.order)
-    part = agent_problems(team)[order.names[-1]]
-    above = [LocalProblem(agent_problems(team)[name]).values for name in order.names[:-1]]
-    if not all(above):
-        return
-    domain = FilteredDomain(LocalProblem(part), order)
-    for _ in range(50):
-        assignments = tuple(chance.choice(own[:2]) for own in above[: chance.randint(0, len(above))])
-        domain.filter(assignments)
-        fresh = LocalProblem(part)
-        view = dict(zip(order.names, assignments, strict=False))
-        conflicts = [fresh.conflict(index, view) for index in range(len(fresh.values))]
-        left = [index for index, conflict in enumerate(conflicts) if conflict is None]
-        assert [index for index in range(len(conflicts)) if domain.first(index) == index] == left
-        depths = [order.depth(conflict) + 1 for conflict in conflicts if conflict is not None]
-        assert domain.inconsistent() == (None if left else assignments[: max(depths, default=0)])
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_whatever_the_delays_it_is_the_first_solution_in_the_order_of_robots_and_values(seed: int) -> None:
-    team = random_team(Random(f"first {seed}"))
-    truth = next(solutions(team), None)
-    for schedule in (RandomChannels(seed), *(Concurrent(seed, delay) for delay in (0, 3, 20, 200))):
-        result = Simulation(team, AFC, schedule).run()
-        assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION)
-        if truth is not None:
-            assert {name: value for own in result.assignments.values() for name, value in own.items()} == truth
+def test_whatever_the_delays_it_is_the_first_solution_in_the_order_of_robots_and_values() -> None:
+    with cases() as each:
+        for seed in range(40):
+            team = random_team(Random(f"first {seed}"))
+            truth = next(solutions(team), None)
+            for schedule in (RandomChannels(seed), *(Concurrent(seed, delay) for delay in (0, 3, 20, 200))):
+                with each(f"{seed} {schedule}"):
+                    result = Simulation(team, AFC, schedule).run()
+                    assert result.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION)
+                    if truth is not None:
+                        assert {name: one for own in result.assignments.values() for name, one in own.items()} == truth
 
 
 def test_forward_checking_saves_steps_of_the_cpa() -> None:
-    steps = {"CPA": 0, "synchronous": 0}
-    for seed in range(40):
-        team = random_team(Random(seed))
-        steps["CPA"] += Simulation(team, AFC, Concurrent(seed)).run().metrics.messages.get("CPA", 0)
-        steps["synchronous"] += Simulation(team, SBT, Concurrent(seed)).run().metrics.messages.get("CPA", 0)
-    assert steps["CPA"] < steps["synchronous"]
+    teams = [random_team(Random(seed)) for seed in range(40)]
+    assert spent(teams, "afc").by_type["CPA"] < spent(teams, "sbt").by_type["CPA"]

@@ -2,40 +2,25 @@
 
 from __future__ import annotations
 
+from functools import partial
 from random import Random
 from typing import ClassVar
-
-import pytest
 
 from robochoc.communication.host import message_decoder
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, Value, encode
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.order import PriorityOrder
+from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.satisfaction.afc_ng import AFCng, first_difference
 from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import random_team, team_of
-from tests.support.small_teams import DIFFERENT, different
+from tests.support.small_teams import DIFFERENT, different, triangle
 
-
-def triangle(values: int = 2) -> Team:
-    """Three robots, each different from each; a fourth that only the third knows."""
-    return different("ABCD", "AB AC BC CD", values)
-
-
-def agent(team: Team, name: str) -> AFCng:
-    """The protocol object of one robot, started, with nothing left to say."""
-    afc = AFCng(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    afc.start()
-    afc.outbox.clear()
-    return afc
+agent = partial(started_robot, AFCng)
 
 
 def cpa(*assignments: tuple[int, int]) -> CPA:
@@ -44,32 +29,22 @@ def cpa(*assignments: tuple[int, int]) -> CPA:
 
 
 def test_the_first_robot_begins() -> None:
-    team = triangle()
-    first, second = (
-        AFCng(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order)) for name in ("RA", "RB")
-    )
-    first.start()
-    second.start()
-    assert [message for _, message in first.outbox] == [cpa((1, 1))] * 2
-    assert second.outbox == []
-    assert second.value is None
+    assert started(robot_of(AFCng, triangle(), "RA")) == [("RB", cpa((1, 1))), ("RC", cpa((1, 1)))]
+    second = robot_of(AFCng, triangle(), "RB")
+    assert (started(second), second.value) == ([], None)
 
 
-def test_the_predecessor_s_cpa_lets_a_robot_assign() -> None:
-    said = replies(agent(triangle(3), "RB"), ("RA", cpa((1, 1))))
-    assert said == [("RC", cpa((1, 1), (2, 1)))]
+def test_the_predecessor_s_cpa_lets_a_robot_assign_and_each_assignment_raises_the_own_counter() -> None:
+    afc = agent(triangle(3), "RB")
+    assert replies(afc, ("RA", cpa((1, 1)))) == [("RC", cpa((1, 1), (2, 1)))]
+    assert replies(afc, ("RA", cpa((2, 2)))) == [("RC", cpa((2, 2), (1, 2)))]
 
 
-def test_another_robot_s_cpa_only_checks_forward() -> None:
+def test_another_robot_s_cpa_only_checks_forward_and_values_that_are_known_already_are_not_checked_again() -> None:
     afc = agent(triangle(3), "RC")
     assert replies(afc, ("RA", cpa((1, 1)))) == []
     assert value(afc) is None
     assert list(afc.store) == [{"RA": (1,)}]
-
-
-def test_a_cpa_with_values_that_are_known_already_is_not_checked_again() -> None:
-    afc = agent(triangle(3), "RC")
-    replies(afc, ("RA", cpa((1, 1))))
     before = afc.problem.checks
     assert replies(afc, ("RA", cpa((1, 2)))) == []
     assert afc.problem.checks == before
@@ -79,17 +54,8 @@ def test_a_cpa_with_values_that_are_known_already_is_not_checked_again() -> None
 
 
 def test_a_cpa_goes_to_the_next_robot_and_to_those_that_share_a_constraint() -> None:
-    afc = AFCng(
-        LocalProblem(agent_problems(team := different("ABCDE", "AD AE BC", 2))["RA"]), PriorityOrder(team.order)
-    )
-    afc.start()
-    assert [receiver for receiver, _ in afc.outbox] == ["RB", "RD", "RE"]
-
-
-def test_each_assignment_raises_the_own_counter() -> None:
-    afc = agent(triangle(3), "RB")
-    replies(afc, ("RA", cpa((1, 1))))
-    assert replies(afc, ("RA", cpa((2, 2)))) == [("RC", cpa((2, 2), (1, 2)))]
+    said = started(robot_of(AFCng, different("ABCDE", "AD AE BC", 2), "RA"))
+    assert [receiver for receiver, _ in said] == ["RB", "RD", "RE"]
 
 
 def test_the_first_counter_that_differs_decides_which_cpa_is_stronger() -> None:
@@ -100,27 +66,14 @@ def test_the_first_counter_that_differs_decides_which_cpa_is_stronger() -> None:
     assert replies(afc, ("RB", cpa((2, 3), (1, 1)))) == [("RD", cpa((2, 3), (1, 1), (3, 2)))]
 
 
-def test_a_cpa_with_the_counters_of_the_view_does_not_erase_what_came_later() -> None:
+def test_only_a_stronger_cpa_takes_the_value_and_what_was_known_of_robots_below_its_sender_but_counters() -> None:
     afc = agent(triangle(3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 1))))
-    assert replies(afc, ("RA", cpa((1, 1)))) == []
-    assert afc.view == {"RA": (1,), "RB": (2,)}
-    assert value(afc) == (3,)
-
-
-def test_a_stronger_cpa_takes_the_value_and_what_was_known_of_robots_below_its_sender() -> None:
-    afc = agent(triangle(3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    replies(afc, ("RB", cpa((1, 1), (2, 4))))
+    assert replies(afc, ("RA", cpa((1, 1)))) == [], "it has the counters of the view"
+    assert (afc.view, value(afc)) == ({"RA": (1,), "RB": (2,)}, (3,))
     assert replies(afc, ("RA", cpa((3, 2)))) == []
-    assert afc.view == {"RA": (3,)}
-    assert value(afc) is None
+    assert (afc.view, value(afc), afc.counters) == ({"RA": (3,)}, None, [2, 4])
     assert list(afc.store) == [{"RA": (3,)}]
-
-
-def test_counters_of_robots_below_the_sender_are_kept() -> None:
-    afc = agent(triangle(3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 4))), ("RA", cpa((2, 2))))
-    assert afc.counters == [2, 4]
 
 
 def test_nogoods_that_agree_with_the_new_view_stay_and_are_not_checked_again() -> None:
@@ -181,27 +134,23 @@ def test_backtrack_forgets_the_cause_and_all_below_it_but_not_their_counters() -
     assert replies(afc, ("RC", cpa((1, 1), (2, 1), (1, 3)))) == []
 
 
-def test_a_compatible_nogood_about_the_value_makes_the_robot_take_another() -> None:
+def test_a_compatible_nogood_about_the_value_makes_the_robot_take_another_and_one_about_another_is_stored() -> None:
+    afc = agent(triangle(3), "RB")
+    replies(afc, ("RA", cpa((1, 1))))
+    assert replies(afc, ("RC", Nogood({"RA": (1,)}, (3,)))) == []
+    assert list(afc.store) == [{"RA": (1,)}] * 2
     afc = agent(triangle(3), "RB")
     replies(afc, ("RA", cpa((1, 1))))
     assert replies(afc, ("RC", Nogood({"RA": (1,)}, (2,)))) == [("RC", cpa((1, 1), (3, 2)))]
 
 
-def test_a_compatible_nogood_about_another_value_is_stored() -> None:
-    afc = agent(triangle(3), "RB")
-    replies(afc, ("RA", cpa((1, 1))))
-    assert replies(afc, ("RC", Nogood({"RA": (1,)}, (3,)))) == []
-    assert list(afc.store) == [{"RA": (1,)}] * 2
-
-
-@pytest.mark.parametrize("known", [cpa((2, 1)), None])
-def test_a_nogood_that_does_not_agree_with_the_view_is_ignored(known: CPA | None) -> None:
-    afc = agent(triangle(3), "RB")
-    if known:
-        replies(afc, ("RA", known))
-    before = list(afc.store)
-    assert replies(afc, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
-    assert list(afc.store) == before
+def test_a_nogood_that_does_not_agree_with_the_view_is_ignored() -> None:
+    for known in ([("RA", cpa((2, 1)))], []):
+        afc = agent(triangle(3), "RB")
+        replies(afc, *known)
+        before = list(afc.store)
+        assert replies(afc, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
+        assert list(afc.store) == before
 
 
 def test_the_better_of_two_nogoods_for_a_value_is_kept() -> None:
@@ -211,16 +160,16 @@ def test_the_better_of_two_nogoods_for_a_value_is_kept() -> None:
     assert list(afc.store) == [{"RA": (1,)}]
 
 
-def test_an_empty_nogood_ends_the_search_without_solution() -> None:
+def test_an_empty_nogood_or_domain_ends_the_search_without_solution() -> None:
     afc = agent(triangle(1), "RA")
     assert replies(afc, ("RB", Nogood({}, (1,)))) == []
     assert afc.verdict is Verdict.NO_SOLUTION
+    assert agent(team_of({"A": (1, 2), "B": (), "C": (1,)}, []), "RB").verdict is Verdict.NO_SOLUTION
 
 
-def test_a_robot_without_values_ends_the_search_at_the_start() -> None:
-    team = team_of({"A": (1, 2), "B": (), "C": (1,)}, [])
-    afc = agent(team, "RB")
-    assert afc.verdict is Verdict.NO_SOLUTION
+def test_a_robot_alone_solves_its_problem_in_silence() -> None:
+    afc = robot_of(AFCng, team_of({"A": (4, 5)}, []), "RA")
+    assert (started(afc), afc.assignment) == ([], {"A": 4})
 
 
 def test_the_last_robot_s_value_makes_a_solution_and_all_are_told() -> None:
@@ -236,13 +185,6 @@ def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
     packet = (("RD", Solved({"RA": (1,), "RB": (3,), "RC": (2,), "RD": (1,)})), ("RA", cpa((2, 2))))
     assert replies(afc, *packet, ("RC", Nogood({}, (3,)))) == []
     assert value(afc) == (3,)
-
-
-def test_a_robot_alone_solves_its_problem_in_silence() -> None:
-    afc = AFCng(LocalProblem(agent_problems(team := team_of({"A": (4, 5)}, []))["RA"]), PriorityOrder(team.order))
-    afc.start()
-    assert afc.assignment == {"A": 4}
-    assert afc.outbox == []
 
 
 class HoldsTheSolution(AFCng):

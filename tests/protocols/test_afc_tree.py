@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from random import Random
 
 import pytest
@@ -20,7 +21,7 @@ from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import violations
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.problems import random_team
 from tests.support.small_teams import different
 
@@ -30,17 +31,10 @@ def fork(values: int = 3) -> Team:
     return different("ABCDE", "AB AC CD CE AE", values)
 
 
-def created(team: Team, name: str) -> AFCTree:
-    part = agent_problems(team, tree=True)[name]
-    return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.known.links))
+created = partial(robot_of, AFCTree)
 
 
-def agent(team: Team, name: str) -> AFCTree:
-    """The protocol object of one robot, started, with nothing left to say."""
-    afc = created(team, name)
-    afc.start()
-    afc.outbox.clear()
-    return afc
+agent = partial(started_robot, AFCTree)
 
 
 def cpa(*assignments: tuple[int, int]) -> CPA:
@@ -50,24 +44,14 @@ def cpa(*assignments: tuple[int, int]) -> CPA:
 
 def test_every_root_begins() -> None:
     team = different("ABCD", "AC BD", 2)
-    said = {}
-    for name in team.order:
-        afc = created(team, name)
-        afc.start()
-        said[name] = afc.outbox
+    said = {name: started(created(team, name)) for name in team.order}
     assert said == {"RA": [("RC", cpa((1, 1)))], "RB": [("RD", cpa((1, 1)))], "RC": [], "RD": []}
 
 
 def test_a_cpa_goes_to_tree_children_and_to_those_below_that_share_a_constraint() -> None:
-    afc = created(fork(), "RA")
-    afc.start()
-    assert afc.outbox == [(name, cpa((1, 1))) for name in ("RB", "RC", "RE")]
-
-
-def test_a_tree_child_without_a_constraint_with_the_sender_gets_its_cpa() -> None:
-    afc = created(different("ABC", "AC BC", 2), "RA")
-    afc.start()
-    assert [receiver for receiver, _ in afc.outbox] == ["RB", "RC"]
+    assert started(created(fork(), "RA")) == [(name, cpa((1, 1))) for name in ("RB", "RC", "RE")]
+    said = started(created(different("ABC", "AC BC", 2), "RA"))
+    assert [receiver for receiver, _ in said] == ["RB", "RC"], "B is a child without a constraint"
 
 
 def test_a_cpa_holds_the_values_of_one_branch_only() -> None:
@@ -120,13 +104,13 @@ def test_a_robot_accepts_once_all_its_children_have() -> None:
     assert said == [("RA", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)}))]
 
 
-@pytest.mark.parametrize("counters", [[1, 1], [2, 2]])
-def test_an_accept_of_another_cpa_is_ignored(counters: list[int]) -> None:
-    afc = agent(fork(), "RC")
-    replies(afc, ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
-    replies(afc, ("RA", cpa((2, 2))))
-    replies(afc, ("RD", Accept([2, 1], {"RD": (2,)})))
-    assert replies(afc, ("RE", Accept(counters, {"RE": (3,)}))) == []
+def test_an_accept_of_another_cpa_is_ignored() -> None:
+    for counters in ([1, 1], [2, 2]):
+        afc = agent(fork(), "RC")
+        replies(afc, ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
+        replies(afc, ("RA", cpa((2, 2))))
+        replies(afc, ("RD", Accept([2, 1], {"RD": (2,)})))
+        assert replies(afc, ("RE", Accept(counters, {"RE": (3,)}))) == []
 
 
 def test_a_new_value_needs_new_accepts() -> None:
@@ -157,10 +141,7 @@ def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
 
 def test_a_robot_alone_is_a_part_of_its_own_and_solves_it_in_silence() -> None:
     afc = created(different("ABC", "AC", 2), "RB")
-    afc.start()
-    assert afc.assignment == {"B": 1}
-    assert afc.outbox == []
-    assert afc.over
+    assert (started(afc), afc.assignment, afc.over) == ([], {"B": 1}, True)
 
 
 def test_a_part_without_solution_ends_the_search_of_all() -> None:

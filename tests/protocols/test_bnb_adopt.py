@@ -54,10 +54,12 @@ def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
 def test_a_changed_value_voids_the_bounds_of_children_that_depend_on_it_and_the_threshold() -> None:
     adopt = informed(threshold=9)
     replies(adopt, ("RC", Cost(context(B=1, Z=1), 4, 7)), ("RD", Cost(context(B=1, A=1), 3, 3)))
-    replies(adopt, ("RZ", Value((2,), 2)))
+    said = replies(adopt, ("RZ", Value((2,), 2)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 0], [INFINITE, INFINITE])
     assert (adopt.bounds["RD"].lb, adopt.bounds["RD"].ub) == ([3, 0], [3, INFINITE])
     assert adopt.threshold == INFINITE
+    assert to("RA", said) == [Cost(context(A=1, Z=(2, 2)), 3, INFINITE, True)], "the threshold is asked for"
+    assert replies(adopt, ("RZ", Value((2,), 2))) == [], "once"
 
 
 def test_a_value_that_was_not_known_voids_no_threshold_but_the_own_value_is_chosen_anew() -> None:
@@ -75,23 +77,17 @@ def test_init_self_takes_the_value_with_the_least_lower_bound() -> None:
     assert to("RE", said) == [Value((2,), 2)]
 
 
-def test_a_value_is_kept_until_it_is_no_better_than_the_best_known() -> None:
+def test_a_value_is_kept_until_it_is_no_better_than_the_best_known_or_dearer_than_the_threshold() -> None:
     adopt = informed()
     replies(adopt, *both(Cost(context(B=1), 0, 5)))
     assert adopt.ub == 10
-    replies(adopt, *both(Cost(context(B=1), 3, 5)))
-    assert list(adopt.lower) == [6, 4]
-    assert value(adopt) == (1,)
-    replies(adopt, *both(Cost(context(B=1), 5, 5)))
-    assert value(adopt) == (2,)
-
-
-def test_a_value_is_kept_until_it_is_dearer_than_the_threshold() -> None:
+    for least, kept, own in ((3, [6, 4], 1), (5, [10, 4], 2)):
+        replies(adopt, *both(Cost(context(B=1), least, 5)))
+        assert (list(adopt.lower), value(adopt)) == (kept, (own,))
     adopt = informed(threshold=6)
-    replies(adopt, *both(Cost(context(B=1), 2, 5)))
-    assert value(adopt) == (1,)
-    replies(adopt, *both(Cost(context(B=1), 3, 5)))
-    assert value(adopt) == (2,)
+    for least, own in ((2, 1), (3, 2)):
+        replies(adopt, *both(Cost(context(B=1), least, 5)))
+        assert value(adopt) == (own,)
 
 
 def test_when_the_bounds_meet_the_value_is_the_one_that_is_known_to_cost_that() -> None:
@@ -119,13 +115,6 @@ def test_pseudo_children_get_no_threshold() -> None:
     assert [message.threshold for message in to("RC", said) if isinstance(message, Value)] == [6]
 
 
-def test_a_threshold_is_asked_for_once_after_it_was_dropped() -> None:
-    adopt = informed(threshold=9)
-    said = replies(adopt, ("RZ", Value((2,), 2)))
-    assert to("RA", said) == [Cost(context(A=1, Z=(2, 2)), 2, INFINITE, True)]
-    assert replies(adopt, ("RZ", Value((2,), 2))) == []
-
-
 def test_a_threshold_that_comes_with_the_change_is_not_asked_for() -> None:
     adopt = informed(threshold=9)
     said = replies(adopt, ("RA", Value((2,), 2, 7)))
@@ -133,29 +122,18 @@ def test_a_threshold_that_comes_with_the_change_is_not_asked_for() -> None:
     assert to("RA", said) == [Cost(context(A=(2, 2), Z=1), 1, INFINITE)]
 
 
-def test_a_child_that_asks_for_its_threshold_is_told_the_same_again() -> None:
-    adopt = informed(threshold=9)
-    said = replies(adopt, ("RC", Cost(context(B=1), 0, INFINITE, True)))
-    assert said == [("RC", Value((1,), 1, 9))]
+def test_a_child_that_asks_for_its_threshold_is_told_it_again_and_a_higher_one_though_the_value_is_the_same() -> None:
+    adopt = informed(threshold=5)
+    assert replies(adopt, ("RC", Cost(context(B=1), 0, INFINITE, True))) == [("RC", Value((1,), 1, 5))]
+    assert replies(adopt, ("RA", Value((1,), 1, 6))) == [("RC", Value((1,), 1, 6))]
 
 
-def test_a_higher_threshold_is_told_though_the_value_is_the_same() -> None:
-    adopt = informed()
-    replies(adopt, ("RA", Value((1,), 1, 5)), ("RC", Cost(context(B=1), 0, INFINITE, True)))
-    said = replies(adopt, ("RA", Value((1,), 1, 6)))
-    assert said == [("RC", Value((1,), 1, 6))]
-
-
-def test_nothing_else_is_told_twice() -> None:
+def test_nothing_else_is_told_twice_but_the_cost_with_a_new_id_of_the_same_value() -> None:
     adopt = informed()
     assert replies(adopt, ("RA", Value((1,), 1, 8)), ("RC", Cost(context(B=1), 0, INFINITE))) == []
-
-
-def test_the_same_value_with_a_new_id_voids_nothing_and_the_cost_is_told_again() -> None:
-    adopt = informed()
     replies(adopt, ("RC", Cost(context(B=1, A=1), 4, 7)))
     said = replies(adopt, ("RA", Value((1,), 3)))
-    assert adopt.bounds["RC"].lb == [4, 0]
+    assert adopt.bounds["RC"].lb == [4, 0], "it voids nothing"
     assert said == [("RA", Cost(context(A=(1, 3), Z=1), 4, INFINITE))]
 
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from random import Random
-
 import pytest
 
 from robochoc.generators.random_csp import random_csp
@@ -17,14 +13,10 @@ from robochoc.protocols.optimization.bnb_adopt_fdac import BnBADOPTFDAC
 from robochoc.protocols.optimization.messages.bnb_adopt_fdac import Cost, Domain, Moved, Value
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.protocols.optimization.settings.bnb_adopt_fdac import BnBADOPTFDACSettings
-from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.ace import AceProcess
 from tests.support.agents import replies, value
-from tests.support.cost_problems import minimum_withdrawal
-from tests.support.loose_problems import loosened, loosened_cost_team, minimum_cost
-from tests.support.problems import random_team
+from tests.support.cases import looped
 from tests.support.pseudo_trees import context, placed, priced, to
-from tests.support.random_options import random_options
+from tests.support.spent import spent
 
 TEAM = priced(
     "ZABCDE",
@@ -138,7 +130,7 @@ def test_a_robot_that_has_no_value_left_ends_the_search_of_all() -> None:
     assert robot.verdict is Verdict.NO_SOLUTION
 
 
-@pytest.mark.parametrize(
+@looped(
     ("sender", "message"),
     [
         ("RC", DOMAIN),
@@ -155,15 +147,11 @@ def test_what_cannot_be_is_refused(sender: str, message: Message) -> None:
         replies(middle(), (sender, message))
 
 
-@pytest.mark.parametrize("again", [("RA", DOMAIN), ("RC", Moved([0, 0]))])
-def test_nothing_is_moved_twice(again: tuple[str, Message]) -> None:
-    with pytest.raises(ValueError, match=again[0]):
-        replies(moved(), again)
-
-
-def test_a_value_that_a_robot_above_has_not_told_before_is_refused() -> None:
-    with pytest.raises(ValueError, match="RA has no such value"):
-        replies(moved(), ("RA", Value((9,), 1)))
+def test_nothing_is_moved_twice_and_a_value_that_a_robot_above_has_not_told_before_is_refused() -> None:
+    wrong: list[tuple[str, Message, str]] = [("RA", DOMAIN, "RA"), ("RC", Moved([0, 0]), "RC")]
+    for sender, message, why in (*wrong, ("RA", Value((9,), 1), "RA has no such value")):
+        with pytest.raises(ValueError, match=why):
+            replies(moved(), (sender, message))
 
 
 # The search
@@ -218,55 +206,15 @@ def test_the_end_is_bnb_adopt_s() -> None:
 # Against others, and against brute force
 
 
-@pytest.mark.parametrize("level", ["ac", "fdac"])
-def test_two_messages_for_each_pair_save_more_than_they_cost(level: str) -> None:
-    sent = dict.fromkeys(("bnb-adopt", "bnb-adopt-fdac"), 0)
-    for seed in range(4):
-        team = random_csp(8, 4, 0.4, 0, seed, connected=True, max_cost=20)
-        for protocol in sent:
-            settings = {"level": level} if protocol == "bnb-adopt-fdac" else {}
-            options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False, settings=settings)
-            sent[protocol] += sum(solve(team, options).metrics.messages.values())
-    assert sent["bnb-adopt-fdac"] < 0.8 * sent["bnb-adopt"]
+def test_two_messages_for_each_pair_save_more_than_they_cost() -> None:
+    teams = [random_csp(8, 4, 0.4, 0, seed, connected=True, max_cost=20) for seed in range(4)]
+    plain = spent(teams, "bnb-adopt").messages
+    for level in ("ac", "fdac"):
+        assert spent(teams, "bnb-adopt-fdac", level=level).messages < 0.8 * plain
 
 
 def test_on_a_tree_the_first_values_are_the_last_ones() -> None:
     for seed in range(4):
         team = random_csp(9, 4, 8 / 36, 0, seed, connected=True, max_cost=20)
-        options = Options(protocol="bnb-adopt-fdac", runtime=Runtime.SIMULATOR, cache=False)
-        messages = solve(team, options).metrics.messages
+        messages = spent([team], "bnb-adopt-fdac").by_type
         assert {messages[kind] for kind in ("Domain", "Moved", "Value", "Terminate")} == {8}
-
-
-@pytest.fixture
-def warm(warm_ace: None) -> Iterator[AceProcess]:
-    """A solver for complex robots that need not be started for each team."""
-    del warm_ace
-    with AceProcess() as ace:
-        yield ace
-
-
-@pytest.mark.parametrize("level", ["ac", "fdac"])
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))])
-def test_the_least_cost_is_found(level: str, batch: int, warm: AceProcess) -> None:
-    chance = Random(f"bnb-adopt-fdac {level} {batch}")
-    for _ in range(200 if batch else 10):
-        team = loosened_cost_team(chance)
-        cost = minimum_cost(team)
-        options = replace(random_options(team, "bnb-adopt-fdac", chance), settings={"level": level})
-        outcome = solve(team, options, solver=warm)
-        assert outcome.verdict is (Verdict.NO_SOLUTION if cost == INFINITE else Verdict.OPTIMAL), team
-        assert outcome.cost == (None if cost == INFINITE else cost), team
-
-
-@pytest.mark.parametrize("level", ["ac", "fdac"])
-@pytest.mark.parametrize("teams", [4, pytest.param(60, marks=pytest.mark.slow)])
-def test_as_few_as_possible_withdraw(level: str, teams: int) -> None:
-    chance = Random(f"withdraw bnb-adopt-fdac {level}")
-    for _ in range(teams):
-        team = loosened(random_team(chance), chance)
-        robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
-        team = replace(team, robots=robots)
-        options = random_options(team, "bnb-adopt-fdac", chance)
-        outcome = solve(team, replace(options, settings={"level": level}, withdraw=Withdrawal.MINIMUM))
-        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)

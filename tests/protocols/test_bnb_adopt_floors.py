@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from random import Random
-
 import pytest
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt_k import ADOPTk
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
-from robochoc.run import Options, Runtime, solve
-from robochoc.solver.ace import AceProcess
 from tests.support.agents import replies, value
-from tests.support.loose_problems import loosened_cost_team, minimum_cost
+from tests.support.cases import looped
 from tests.support.pseudo_trees import context, placed, priced
-from tests.support.random_options import random_options
+from tests.support.spent import spent
 
 TEAM = priced("ZABCD", {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [5, 3, 1, 2], "BC": [0] * 4, "BD": [0] * 4})
 """B stands below A and, further up, Z; C and D are its children."""
-SETTINGS = [("bnb-adopt", ""), ("adopt-k", "1"), ("adopt-k", "3"), ("adopt-k", "1000")]
 
 
 class WithFloors(BnBADOPT):
@@ -82,7 +74,7 @@ def test_shares_of_the_threshold_begin_at_the_floors() -> None:
     assert robot.t == {"RC": [4, 0], "RD": [1, 2]}
 
 
-@pytest.mark.parametrize(
+@looped(
     ("sender", "message"),
     [
         ("RZ", Domain([(1,)])),
@@ -97,35 +89,10 @@ def test_what_cannot_be_is_refused(sender: str, message: Domain | Floor) -> None
         replies(middle(), (sender, message))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@looped("seed", range(3))
 def test_two_messages_a_robot_save_more_than_they_cost(seed: int) -> None:
     team = random_csp(8, 4, 0.3, 0, seed, connected=True, max_cost=20)
-    sent = {}
-    for heuristic in ("none", "dp"):
-        options = Options(protocol="bnb-adopt", runtime=Runtime.SIMULATOR, cache=False)
-        outcome = solve(team, replace(options, settings={"heuristic": heuristic}))
-        messages = outcome.metrics.messages
-        assert messages.get("Domain", 0) == messages.get("Floor", 0) == (7 if heuristic == "dp" else 0)
-        sent[heuristic] = sum(messages.values())
-    assert sent["dp"] < sent["none"]
-
-
-@pytest.fixture
-def warm(warm_ace: None) -> Iterator[AceProcess]:
-    """A solver for complex robots that need not be started for each team."""
-    del warm_ace
-    with AceProcess() as ace:
-        yield ace
-
-
-@pytest.mark.parametrize(("protocol", "k"), SETTINGS)
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))])
-def test_the_least_cost_is_found_with_the_heuristic(protocol: str, k: str, batch: int, warm: AceProcess) -> None:
-    chance = Random(f"floors {protocol} {k} {batch}")
-    settings = {"heuristic": "dp", **({"k": k} if k else {})}
-    for _ in range(200 if batch else 5):
-        team = loosened_cost_team(chance)
-        cost = minimum_cost(team)
-        outcome = solve(team, replace(random_options(team, protocol, chance), settings=settings), solver=warm)
-        assert outcome.verdict is (Verdict.NO_SOLUTION if cost == INFINITE else Verdict.OPTIMAL), team
-        assert outcome.cost == (None if cost == INFINITE else cost), team
+    plain, ours = (spent([team], "bnb-adopt", heuristic=heuristic) for heuristic in ("none", "dp"))
+    assert not {"Domain", "Floor"} & {*plain.by_type}
+    assert ours.by_type["Domain"] == ours.by_type["Floor"] == 7
+    assert ours.messages < plain.messages

@@ -17,10 +17,11 @@ from robochoc.protocols.optimization.messages import adopt as adopt_messages
 from robochoc.protocols.optimization.messages import bnb_adopt as bnb_adopt_messages
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.run.incumbent import lower_bound
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
-from tests.support.pseudo_trees import context, placed, priced, root, to, unplaced
+from tests.support.pseudo_trees import context, middle, placed, priced, root, to
 
 
 class Family(NamedTuple):
@@ -30,17 +31,9 @@ class Family(NamedTuple):
     value: type[adopt_messages.Value | bnb_adopt_messages.Value]
     cost: type[adopt_messages.Cost | bnb_adopt_messages.Cost]
 
-    def middle(self) -> BoundingProtocol:
-        """B, after it has begun: below A and, further up, Z; C and D are its children."""
-        costs = {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4}
-        team = priced("ZABCD", costs)
-        robot = placed(self.protocol, team, "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"])
-        robot.outbox.clear()
-        return robot
-
     def informed(self) -> BoundingProtocol:
         """B, when it knows the values above, both 1."""
-        robot = self.middle()
+        robot = middle(self.protocol)
         replies(robot, ("RZ", self.value((1,), 1)), ("RA", self.value((1,), 1)))
         return robot
 
@@ -49,7 +42,7 @@ FAMILIES = [
     Family(adopt.ADOPT, adopt_messages.Value, adopt_messages.Cost),
     Family(bnb_adopt.BnBADOPT, bnb_adopt_messages.Value, bnb_adopt_messages.Cost),
 ]
-both = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.protocol.__name__)
+both = looped("family", FAMILIES)
 
 
 @both
@@ -64,23 +57,18 @@ def test_nothing_is_known_of_ub_before_all_neighbours_above_have_told_their_valu
 
 @both
 def test_one_decision_is_taken_for_all_that_has_come(family: Family) -> None:
-    _, value, cost = family
-    said = replies(family.middle(), ("RA", value((2,), 1)), ("RA", value((1,), 2)), ("RZ", value((2,), 1)))
+    protocol, value, cost = family
+    said = replies(middle(protocol), ("RA", value((2,), 1)), ("RA", value((1,), 2)), ("RZ", value((2,), 1)))
     assert to("RA", said) == [cost(context(A=(1, 2), Z=2), 2, INFINITE)]
 
 
 @both
-def test_a_cost_that_does_not_know_the_own_value_only_tells_of_others(family: Family) -> None:
-    robot = family.informed()
-    replies(robot, ("RC", family.cost(context(X=2), 4, 7)))
+def test_a_cost_without_the_own_value_only_tells_of_others_and_of_two_bounds_the_better_is_kept(family: Family) -> None:
+    robot, cost = family.informed(), family.cost
+    replies(robot, ("RC", cost(context(X=2), 4, 7)))
     assert robot.bounds["RC"].lb == [0, 0]
     assert robot.context == context(A=1, Z=1, X=2)
-
-
-@both
-def test_of_two_bounds_in_one_context_the_better_one_is_kept(family: Family) -> None:
-    robot = family.informed()
-    replies(robot, ("RC", family.cost(context(B=1), 4, 6)), ("RC", family.cost(context(B=1), 3, 7)))
+    replies(robot, ("RC", cost(context(B=1), 4, 6)), ("RC", cost(context(B=1), 3, 7)))
     assert (robot.bounds["RC"].lb, robot.bounds["RC"].ub) == ([4, 0], [6, INFINITE])
 
 
@@ -108,48 +96,37 @@ def test_a_root_whose_bounds_meet_ends_and_says_so(family: Family) -> None:
     assert replies(robot, ("RC", family.cost(context(B=1), 7, 7))) == []
 
 
-def alone(family: Family, costs: list[float]) -> BoundingProtocol:
-    """A robot that has no neighbours, when it has started."""
-    robot = unplaced(family.protocol, priced("AB", {"A": costs}), "RA")
-    robot.start()
-    return robot
-
-
 @both
-def test_a_robot_alone_takes_its_cheapest_value_in_silence(family: Family) -> None:
-    robot = alone(family, [3, 1])
+def test_a_robot_alone_takes_its_cheapest_value_in_silence_or_ends_the_search(family: Family) -> None:
+    robot = robot_of(family.protocol, priced("AB", {"A": [3, 1]}), "RA")
+    assert started(robot) == []
     assert robot.assignment == {"A": 2}
-    assert robot.outbox == []
     assert (robot.findings.place, robot.findings.bound) == (PseudoTreeNode(None), 1)
-
-
-@both
-def test_a_robot_alone_with_no_value_that_is_allowed_ends_the_search(family: Family) -> None:
-    assert alone(family, [INFINITE, INFINITE]).verdict is Verdict.NO_SOLUTION
+    none = started_robot(family.protocol, priced("AB", {"A": [INFINITE, INFINITE]}), "RA")
+    assert none.verdict is Verdict.NO_SOLUTION
 
 
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
-@pytest.mark.parametrize("longest", [0, 50, None])
-@pytest.mark.parametrize("protocol", [adopt.ADOPT, bnb_adopt.BnBADOPT])
+@looped(("longest", "family"), [(longest, family) for longest in (0, 50, None) for family in FAMILIES])
 def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_cost(
-    protocol: type[BoundingProtocol], longest: int | None, batch: int
+    longest: int | None, family: Family, batch: int
 ) -> None:
     ends: list[BoundingProtocol] = []
 
     def noted(robot: BoundingProtocol) -> None:
         ends.append(robot)
-        protocol.begin(robot)
+        family.protocol.begin(robot)
 
-    noting = type("Noting", (protocol,), {"begin": noted})  # a compiled class cannot be patched
+    noting = type("Noting", (family.protocol,), {"begin": noted})  # a compiled class cannot be patched
     chance = Random(f"quiet {longest} {batch}")
     for seed in range(10 if batch else 5):
         team = random_cost_team(chance)
         ends.clear()
         schedule = RandomChannels(seed) if longest is None else Concurrent(seed, longest)
         result = Simulation(team, noting, schedule).search()
-        if least_cost(team) == INFINITE:
+        if (least := least_cost(team)) == INFINITE:
             assert result.verdict is Verdict.NO_SOLUTION
         else:
-            assert all(robot.terminated for robot in ends)
             assert len(ends) == len(team.robots)
-            assert lower_bound(result.findings) == least_cost(team)
+            assert all(robot.terminated for robot in ends)
+            assert lower_bound(result.findings) == least

@@ -66,6 +66,14 @@ def root(protocol: type[P]) -> P:
     return robot
 
 
+def middle(protocol: type[P]) -> P:
+    """B, when it has begun: below A and, further up, Z; its children are C and D."""
+    costs = {"ZA": [0] * 4, "ZB": [0, 1, 2, 0], "AB": [0, 3, 1, 0], "BC": [0] * 4, "BD": [0] * 4}
+    robot = placed(protocol, priced("ZABCD", costs), "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"])
+    robot.outbox.clear()
+    return robot
+
+
 def context(**values: int | tuple[int, int]) -> Context:
     """Values of robots, for the first time or with their counters."""
     pairs = {name: entry if isinstance(entry, tuple) else (entry, 1) for name, entry in values.items()}
