@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,17 +26,15 @@ from robochoc.protocols.satisfaction.agile_order import (
 )
 from robochoc.protocols.satisfaction.messages.agile_abt import AddLink, Ok, Order
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, value
 from tests.support.examples import count, examples
 from tests.support.problems import random_team, team_of
 from tests.support.small_teams import differ, triangle
 
 
 def begun(team: Team, name: str) -> AgileABT:
-    """The protocol object of one robot, started; what it has said is in its outbox."""
-    agile = AgileABT(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
+    """The protocol object of one robot, started; its first messages are in its outbox."""
+    agile = robot_of(AgileABT, team, name)
     agile.start()
     return agile
 
@@ -112,15 +109,10 @@ def test_of_the_robots_that_may_come_next_the_one_with_the_fewest_values_left_do
 
 def test_update_explanations_forgets_what_rests_on_the_culprit_and_takes_one_value_from_it() -> None:
     before = {"B": Explanation({"A": (1,)}, 2), "C": Explanation({"B": (1,)}, 1), "D": Explanation({"A": (1,)}, 3)}
-    assert updated(before, "B", {"E": (4,)}, {}) == {
-        "B": Explanation({"A": (1,), "E": (4,)}, 1),
-        "D": Explanation({"A": (1,)}, 3),
-    }
-
-
-@pytest.mark.parametrize(("sizes", "left"), [({"A": 4}, 3), ({"A": 0}, 0), ({}, UNKNOWN)])
-def test_a_culprit_without_explanation_counts_its_whole_domain(sizes: dict[str, int], left: int) -> None:
-    assert updated({}, "A", {}, sizes) == {"A": Explanation({}, left)}
+    after = {"B": Explanation({"A": (1,), "E": (4,)}, 1), "D": Explanation({"A": (1,)}, 3)}
+    assert updated(before, "B", {"E": (4,)}, {}) == after
+    for sizes, left in (({"A": 4}, 3), ({"A": 0}, 0), ({}, UNKNOWN)):
+        assert updated({}, "A", {}, sizes) == {"A": Explanation({}, left)}, "it counts its whole domain"
 
 
 class Watched(AgileABT):
@@ -173,20 +165,13 @@ def test_start_takes_the_first_value_and_tells_it_with_its_explanation_to_those_
     assert begun(triangle(), "RB").outbox == [("RC", ok(1))]
 
 
-def test_an_ok_says_on_whom_the_nogoods_rest_and_how_many_values_are_left() -> None:
+def test_a_value_that_those_above_allow_is_kept_and_those_below_are_not_heeded() -> None:
+    """An `Ok` says on whom the nogoods rest, and how many values are left."""
     assert replies(agent(triangle(3), "RB"), ("RA", ok(1, 3, 3))) == [("RC", ok(2, 2, 3, RA=1))]
-
-
-def test_process_info_keeps_a_value_that_those_above_allow() -> None:
-    agile = agent(triangle(), "RB")
-    assert replies(agile, ("RA", ok(2))) == []
-    assert value(agile) == (1,)
-
-
-def test_those_below_are_not_heeded() -> None:
-    agile = agent(triangle(), "RB")
-    assert replies(agile, ("RC", ok(1))) == []
-    assert value(agile) == (1,)
+    for other in (("RA", ok(2)), ("RC", ok(1))):
+        agile = agent(triangle(), "RB")
+        assert replies(agile, other) == []
+        assert value(agile) == (1,)
 
 
 def test_the_lowest_robot_at_present_checks_an_n_ary_constraint() -> None:
@@ -209,6 +194,9 @@ def test_process_order_adopts_a_smaller_termination_vector_only() -> None:
     assert agile.present.names == ("RD", "RC", "RB", "RA")
     replies(agile, ("RC", order("CDBA", 1, 1, 9, 9)))
     assert agile.present.names == ("RC", "RD", "RB", "RA")
+    equal = [("RD", order("BDCA", 1, 1, 1, 1)), ("RC", order("BCDA", 1, 1, 1, 1))]
+    for packet in (equal, equal[::-1]):
+        assert agent(triangle(), "RA", *packet).present.names == ("RB", "RC", "RD", "RA"), "the first by its names"
 
 
 def test_an_order_of_robots_that_the_reader_does_not_know_is_told_by_their_places() -> None:
@@ -220,23 +208,13 @@ def test_an_order_of_robots_that_the_reader_does_not_know_is_told_by_their_place
     assert Order((-1, 0), (1,)).in_words(known) == "the order is now, by the places of the first one, 0 and 1"
 
 
-def test_of_equal_vectors_the_order_whose_names_come_first_is_stronger() -> None:
-    orders = [("RD", order("BDCA", 1, 1, 1, 1)), ("RC", order("BCDA", 1, 1, 1, 1))]
-    for packet in (orders, orders[::-1]):
-        assert agent(triangle(), "RA", *packet).present.names == ("RB", "RC", "RD", "RA")
-
-
 def test_an_order_tells_the_value_to_those_that_are_below_now_and_have_not_heard_it() -> None:
+    down, up, down_again = order("BACD", 1, 1, 1, 1), order("ABCD", 0, 1, 1, 1), order("BACD", 0, 0, 1, 1)
     agile = agent(triangle(3), "RB")
-    assert replies(agile, ("RA", order("BACD", 1, 1, 1, 1))) == [("RA", ok(1, 3, 3))]
-    assert replies(agile, ("RA", order("ABCD", 0, 1, 1, 1))) == []
-    assert replies(agile, ("RA", order("BACD", 0, 0, 1, 1))) == []
-
-
-def test_those_that_missed_a_value_while_they_were_above_are_told_it() -> None:
-    agile = agent(triangle(3), "RB", ("RA", order("BACD", 1, 1, 1, 1)), ("RA", ok(1, 3, 3)))
-    assert replies(agile, ("RA", order("ABCD", 0, 1, 1, 1))) == [("RC", ok(2, 2, 3, RA=1))]
-    assert replies(agile, ("RA", order("BACD", 0, 0, 1, 1))) == [("RA", ok(2, 3, 3))]
+    assert [replies(agile, ("RA", one)) for one in (down, up, down_again)] == [[("RA", ok(1, 3, 3))], [], []]
+    agile = agent(triangle(3), "RB", ("RA", down), ("RA", ok(1, 3, 3)))
+    assert replies(agile, ("RA", up)) == [("RC", ok(2, 2, 3, RA=1))]
+    assert replies(agile, ("RA", down_again)) == [("RA", ok(2, 3, 3))]
 
 
 def test_an_order_drops_nogoods_that_rest_on_robots_that_are_not_above() -> None:
@@ -297,14 +275,10 @@ def test_explanations_count_while_order_view_and_own_value_go_with_them() -> Non
     assert agile._held_explanations() == {}  # noqa: SLF001
 
 
-def test_an_empty_nogood_ends_the_search_without_solution() -> None:
+def test_an_empty_nogood_ends_the_search_without_solution_and_nothing_is_said_after_it() -> None:
     agile = agent(triangle(1), "RA")
     assert replies(agile, ("RB", Nogood({}, (1,)))) == []
     assert agile.verdict is Verdict.NO_SOLUTION
-
-
-def test_nothing_is_said_after_the_verdict() -> None:
-    agile = agent(triangle(1), "RA", ("RB", Nogood({}, (1,))))
     assert replies(agile, ("RB", AddLink()), ("RB", order("BACD", 1, 1, 1, 1))) == []
 
 
@@ -322,12 +296,9 @@ def test_resolve_conflict_accepts_a_coherent_nogood_and_takes_another_value() ->
     assert replies(agile, ("RC", Nogood({"RA": (2,)}, (1,)))) == [("RC", ok(3, 1, 3, RA=2))]
 
 
-def test_resolve_conflict_answers_an_obsolete_nogood_about_the_value_it_has_told() -> None:
+def test_resolve_conflict_answers_an_obsolete_nogood_about_the_value_it_has_told_and_not_about_one_replaced() -> None:
     agile = agent(triangle(), "RB", ("RA", ok(2)))
     assert replies(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", ok(1))]
-
-
-def test_resolve_conflict_ignores_a_nogood_about_a_value_that_it_has_replaced() -> None:
     agile = agent(triangle(), "RB", ("RA", ok(1)))
     assert replies(agile, ("RC", Nogood({}, (1,)))) == []
     assert value(agile) == (2,)
@@ -357,15 +328,11 @@ def test_check_add_link_asks_unknown_robots_of_the_left_side_and_believes_it() -
     assert replies(agile, ("RC", Nogood({"RA": (2,)}, (2,)))) == [("RC", ok(2, 1, RA=1))]
 
 
-def test_set_link_tells_the_value_to_the_new_listener_now_and_later() -> None:
+def test_set_link_tells_the_value_to_the_new_listener_now_and_later_once_it_is_below() -> None:
     agile = agent(triangle(), "RA")
     assert replies(agile, ("RD", AddLink())) == [("RD", ok(1))]
     assert replies(agile, ("RD", AddLink())) == [("RD", ok(1))]
-    said = replies(agile, ("RB", Nogood({}, (1,))))
-    assert said == [("RB", ok(2, 1)), ("RC", ok(2, 1)), ("RD", ok(2, 1))]
-
-
-def test_set_link_waits_until_the_listener_is_below() -> None:
+    assert replies(agile, ("RB", Nogood({}, (1,)))) == [(name, ok(2, 1)) for name in ("RB", "RC", "RD")]
     agile = agent(triangle(), "RB", ("RD", order("ADBC", 2, 2, 2, 2)))
     assert replies(agile, ("RD", AddLink())) == []
     assert replies(agile, ("RC", order("ABCD", 1, 2, 2, 2))) == [("RD", ok(1))]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 
 import pytest
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.assembly import Extras, assemble
 from robochoc.model.message import Message
-from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 from robochoc.protocols.asymmetric.acls import ACLS
 from robochoc.protocols.asymmetric.gca_mgm import GCAMGM
 from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM
@@ -20,25 +17,16 @@ from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
 from robochoc.protocols.asymmetric.messages.transfers import Transfer
 from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
 from robochoc.protocols.local_search.messages.mgm import Gain
-from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol
+from robochoc.protocols.shared.cycles import NO_GAIN
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import replies, robot_of, started, value
+from robochoc.solver.compiled import LexicographicCost
+from tests.support.agents import replies, started_robot, value
+from tests.support.asymmetric_problems import divided_pair as pair
+from tests.support.cases import looped
 from tests.support.examples import count
 
-TRANSFERS = pytest.mark.parametrize("protocol", [MCSMGM, GCAMGM])
-
-
-def part(costs: Mapping[tuple[int, int], int]) -> Constraint:
-    relation = Relation("R", 2, Semantics.SOFT, tuple(costs), tuple(costs.values()), 0)
-    return Constraint("C", relation, ("A", "B"), ("A", "B"))
-
-
-def pair() -> Team:
-    """A pays 1 for each 1 of its own, and B pays 5 for A's 2, where its own is 1."""
-    parts = {"RA": [part({(1, 1): 3, (1, 2): 1})], "RB": [part({(2, 1): 5, (1, 2): 2, (2, 2): 9})]}
-    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in "AB"}
-    return assemble("pair", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
+TRANSFERS = looped("protocol", [MCSMGM, GCAMGM])
 
 
 # ACLS
@@ -46,120 +34,89 @@ def pair() -> Team:
 
 def proposing(*chances: float) -> ACLS:
     """A, with the value 1, which has proposed 2, where B has 1."""
-    robot = robot_of(ACLS, pair(), "RA", 0.0, *chances)
-    started(robot)
+    robot = started_robot(ACLS, pair(), "RA", 0.0, *chances)
     assert replies(robot, ("RB", Value((1,)))) == [("RB", Proposal((2,)))]
     return robot
 
 
-def test_a_robot_proposes_a_value_that_improves_its_own_side() -> None:
+def test_a_robot_proposes_a_value_that_improves_its_own_side_or_says_that_none_does() -> None:
     assert proposing().proposal == 1
-
-
-def test_who_cannot_improve_its_own_side_says_so() -> None:
-    robot = robot_of(ACLS, pair(), "RB", 0.0)
-    started(robot)
+    robot = started_robot(ACLS, pair(), "RB", 0.0)
     assert replies(robot, ("RA", Value((1,)))) == [("RA", Proposal(None))]
+    assert replies(robot, ("RA", Proposal((2,)))) == [("RA", Sides((0, 0), (0, 5)))], "the own side: now, and with it"
 
 
-def test_neighbours_tell_their_own_side_now_and_with_the_proposal() -> None:
-    robot = robot_of(ACLS, pair(), "RB", 0.0)
-    started(robot)
-    replies(robot, ("RA", Value((1,))))
-    assert replies(robot, ("RA", Proposal((2,)))) == [("RA", Sides((0, 0), (0, 5)))]
-
-
-@pytest.mark.parametrize(
+@looped(
     ("now", "proposed", "lot", "moves"),
-    [(0, 2, 0.0, True), (0, 3, 0.0, True), (0, 4, 0.0, False), (0, 2, 0.5, False), (9, 11, 0.49, True)],
+    [
+        ((0, 0), (0, 2), 0.0, True),
+        ((0, 0), (0, 3), 0.0, True),
+        ((0, 0), (0, 4), 0.0, False),
+        ((0, 0), (0, 2), 0.5, False),
+        ((0, 9), (0, 11), 0.49, True),
+        ((0, 100), (1, 0), 0.0, False),  # it breaks more
+    ],
 )
 def test_a_proposal_that_is_cheap_enough_for_both_is_taken_with_a_probability(
-    now: int,
-    proposed: int,
+    now: LexicographicCost,
+    proposed: LexicographicCost,
     lot: float,
     moves: bool,  # noqa: FBT001
 ) -> None:
     robot = proposing(0.0, lot)
     replies(robot, ("RB", Proposal(None)))
-    replies(robot, ("RB", Sides((0, now), (0, proposed))))
+    replies(robot, ("RB", Sides(now, proposed)))
     assert value(robot) == ((2,) if moves else (1,))
 
 
-def test_a_proposal_that_breaks_more_is_not_taken() -> None:
-    robot = proposing()
-    replies(robot, ("RB", Proposal(None)))
-    replies(robot, ("RB", Sides((0, 100), (1, 0))))
-    assert value(robot) == (1,)
-
-
-@pytest.mark.parametrize("wrong", [{"coordination": 0.0}, {"coordination": 1.1}, {"probability": 0.0}])
+@looped("wrong", [{"coordination": 0.0}, {"coordination": 1.1}, {"probability": 0.0}])
 def test_settings_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="it must be more than 0 and at most 1"):
         ACLSSettings(**wrong)  # type: ignore[arg-type] # none of them is the number of cycles
 
 
-@pytest.mark.parametrize("protocol", [ACLS, MCSMGM, GCAMGM])
-@pytest.mark.parametrize("said", [Value(()), Value((1, 1)), Value((3,)), Gain(0, 1)])
-def test_what_is_no_value_of_the_neighbour_is_refused(protocol: type[CycleProtocol], said: Message) -> None:
-    robot = robot_of(protocol, pair(), "RA", 0.0)
-    started(robot)
-    with pytest.raises(ValueError, match="RB"):
-        replies(robot, ("RB", said))
-
-
-@pytest.mark.parametrize("said", [(), (1, 1), (3,)])
-def test_a_proposal_that_the_neighbour_cannot_take_is_refused(said: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match="RB"):
-        replies(proposing(), ("RB", Proposal(said)))
+def test_what_the_neighbour_cannot_have_or_take_is_refused() -> None:
+    wrong: tuple[tuple[int, ...], ...] = ((), (1, 1), (3,))
+    for protocol in (ACLS, MCSMGM, GCAMGM):
+        for said in (*map(Value, wrong), Gain(0, 1)):
+            with pytest.raises(ValueError, match="RB"):
+                replies(started_robot(protocol, pair(), "RA", 0.0), ("RB", said))
+    for proposed in wrong:
+        with pytest.raises(ValueError, match="RB"):
+            replies(proposing(), ("RB", Proposal(proposed)))
 
 
 # Transfers
 
 
-def moved(protocol: type[MCSMGM], gained: int) -> list[tuple[str, object]]:
+def moved(protocol: type[MCSMGM], gained: int) -> list[tuple[str, Message]]:
     """Return the messages of B = 1 when A has gone from 1 to 2, which costs B 5, after it announced that gain."""
-    robot = robot_of(protocol, pair(), "RB", 0.0)
-    started(robot)
-    replies(robot, ("RA", Value((1,))))
-    replies(robot, ("RA", Transfer(None)))
-    replies(robot, ("RA", Gain(0, gained)))
-    return list(replies(robot, ("RA", Value((2,)))))
+    robot = started_robot(protocol, pair(), "RB", 0.0)
+    for said in (Value((1,)), Transfer(None), Gain(0, gained)):
+        replies(robot, ("RA", said))
+    return replies(robot, ("RA", Value((2,))))
 
 
 @TRANSFERS
 def test_nothing_is_handed_over_before_somebody_has_moved(protocol: type[MCSMGM]) -> None:
-    robot = robot_of(protocol, pair(), "RB", 0.0)
-    started(robot)
-    assert replies(robot, ("RA", Value((2,)))) == [("RA", Transfer(None))]
+    assert replies(started_robot(protocol, pair(), "RB", 0.0), ("RA", Value((2,)))) == [("RA", Transfer(None))]
 
 
-@pytest.mark.parametrize(
-    ("protocol", "gained", "entry"),
-    [(MCSMGM, 4, (0, 5)), (MCSMGM, 5, None), (GCAMGM, 4, (0, 5)), (GCAMGM, 5, (0, 5))],
-)
-def test_who_loses_too_much_by_a_move_hands_over_its_entry(
-    protocol: type[MCSMGM], gained: int, entry: tuple[int, int] | None
-) -> None:
-    assert moved(protocol, gained) == [("RA", Transfer(entry))]
+def test_who_loses_too_much_by_a_move_hands_over_its_entry() -> None:
+    assert moved(MCSMGM, 4) == moved(GCAMGM, 4) == moved(GCAMGM, 5) == [("RA", Transfer((0, 5)))]
+    assert moved(MCSMGM, 5) == [("RA", Transfer(None))]
 
 
 @TRANSFERS
-def test_who_is_handed_an_entry_pays_it(protocol: type[MCSMGM]) -> None:
-    robot = robot_of(protocol, pair(), "RA", 0.0)
-    started(robot)
+def test_who_is_handed_an_entry_pays_it_and_what_is_no_gain_is_refused(protocol: type[MCSMGM]) -> None:
+    robot = started_robot(protocol, pair(), "RA", 0.0)
     replies(robot, ("RB", Value((1,))))
     assert replies(robot, ("RB", Transfer(None))) == [("RB", Gain(0, 3))]
     assert replies(robot, ("RB", Gain(0, 0))) == [("RB", Value((2,)))]
     replies(robot, ("RB", Value((1,))))
     assert replies(robot, ("RB", Transfer((0, 5)))) == [("RB", Gain(0, 2))]
-
-
-@TRANSFERS
-def test_what_is_no_gain_is_refused(protocol: type[MCSMGM]) -> None:
-    robot = robot_of(protocol, pair(), "RA", 0.0)
-    started(robot)
     with pytest.raises(ValueError, match="RA"):
-        replies(robot, ("RB", Value((1,))), ("RB", Transfer(None)), ("RB", Value((1,))))
+        replies(robot, ("RB", Value((1,))))
 
 
 @TRANSFERS

@@ -14,13 +14,12 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.inference.async_maxsum import AsyncMaxSum
 from robochoc.protocols.inference.messages.async_maxsum import Q, R
 from robochoc.protocols.inference.settings.async_maxsum import AsyncMaxSumSettings
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
-from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from robochoc.solver.agent_problem import RunParameters
+from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_tree
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, cost_of_assignment
@@ -34,12 +33,9 @@ def middle(**settings: float) -> AsyncMaxSum:
     """B between A, whose function it holds, and C, who holds the other one; without preferences."""
     pairs = {"F": ("A", "B"), "S": ("B", "C")}
     team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint(name, COSTS, pair, pair) for name, pair in pairs.items()])
-    robot = AsyncMaxSum(LocalProblem(agent_problems(team)["RB"]), PriorityOrder(team.order))
-    robot.chance = lambda: 0.0
+    robot = robot_of(AsyncMaxSum, team, "RB")
     robot.settings = AsyncMaxSumSettings(**{"preference": 0.0, "damping": 0.0, **settings})  # type: ignore[misc, arg-type]
-    robot.start()
-    assert robot.outbox == [("RC", TWO)]
-    robot.outbox.clear()
+    assert started(robot) == [("RC", TWO)]
     return robot
 
 
@@ -52,13 +48,9 @@ def final(result: RunResult) -> dict[str, int]:
     return {name: one for values in result.assignments.values() for name, one in values.items()}
 
 
-def test_r_goes_to_the_robots_above_as_soon_as_their_domains_are_known() -> None:
-    assert replies(middle(), ("RA", TWO)) == [("RA", R([[1, 4]], settled=True))]
-
-
-def test_each_arrival_is_answered_at_once_to_the_others() -> None:
+def test_r_goes_up_as_soon_as_domains_are_known_and_each_arrival_is_answered_at_once_to_the_others() -> None:
     robot = middle()
-    replies(robot, ("RA", TWO))
+    assert replies(robot, ("RA", TWO)) == [("RA", R([[1, 4]], settled=True))]
     assert replies(robot, ("RC", R([[0, 7]], settled=True))) == [
         ("RA", R([[3, 4]], settled=True)),
         ("RC", Q([[2, 0]], settled=True)),
@@ -148,7 +140,7 @@ def test_on_any_graph_it_falls_silent_and_what_is_proven_is_true(teams: int) -> 
     assert proofs
 
 
-@pytest.mark.parametrize(
+@looped(
     ("name", "given", "rule"),
     [
         ("damping", "1", "from 0 to below 1"),

@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import math
-from random import Random
 
 import pytest
 
-from robochoc.model.assembly import Extras, assemble
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Domain, ProblemKind, Team, Variable
+from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.asymmetric.atwb import ATWB
 from robochoc.protocols.asymmetric.messages.atwb import Side, SideRequest
 from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution
-from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
-from tests.support.asymmetric_bytes import watched_entries, what_is_not_needed_changed
-from tests.support.asymmetric_problems import priced_part, random_asymmetric_team, spent_on_asymmetric
-from tests.support.compiled import plain_python_only
-from tests.support.examples import count
-from tests.support.pkc_bytes import nothing_hidden, run
-
-NOBODY_WITHDRAWS = RunParameters()
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
+from tests.support.agents import replies, started_robot, value
+from tests.support.asymmetric_problems import priced_part, two_valued
 
 
 def chain() -> Team:
@@ -32,20 +22,12 @@ def chain() -> Team:
         "RA": [priced_part("AC", {(1, 1): 7, (2, 1): 5, (2, 2): 2})],
         "RB": [priced_part("BC", {(1, 1): 3, (2, 2): INFINITE})],
         "RC": [priced_part("AC", {(1, 1): 1, (1, 2): 2}), priced_part("BC", {(1, 1): 4})],
-        "RD": [],
     }
-    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in "ABCD"}
-    return assemble("chain", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
+    return two_valued("ABCD", parts)
 
 
-def agent(name: str, parameters: RunParameters = NOBODY_WITHDRAWS) -> ATWB:
-    """The protocol object of one robot, started, with nothing left to say."""
-    team = chain()
-    problems = agent_problems(team, parameters=parameters, shared_scopes=True)
-    robot = ATWB(LocalProblem(problems[name]), PriorityOrder(team.order))
-    robot.start()
-    robot.outbox.clear()
-    return robot
+def agent(name: str, parameters: RunParameters = DEFAULT_PARAMETERS) -> ATWB:
+    return started_robot(ATWB, chain(), name, parameters=parameters)
 
 
 def assigned(*assignments: tuple[int, int]) -> list[tuple[Value, int]]:
@@ -77,11 +59,14 @@ def test_robots_before_are_asked_for_their_sides_and_robots_after_for_bounds_at_
     ]
 
 
-def test_a_robot_before_tells_what_its_side_adds() -> None:
+def test_a_robot_before_tells_what_its_side_adds_to_a_value_that_can_be() -> None:
     robot = agent("RB")
     replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
     assert replies(robot, ("RC", SideRequest((1,), 5, 1))) == [("RC", Side(5, 3))]
     assert replies(robot, ("RC", SideRequest((2,), 6, 1))) == [("RC", Side(6, 0))]
+    for wrong in ((), (3,), (1, 1)):
+        with pytest.raises(ValueError, match="RC"):
+            replies(robot, ("RC", SideRequest(wrong, 5, 1)))
 
 
 def test_what_it_pays_in_any_case_is_in_the_cpa_already() -> None:
@@ -96,18 +81,12 @@ def test_of_robots_that_may_withdraw_nothing_is_expected() -> None:
     assert robot.least == {"RC": [0, 0, 0]}
 
 
-def test_what_its_side_forbids_is_infinite() -> None:
+def test_what_its_side_forbids_is_infinite_and_a_request_about_a_value_that_was_given_up_is_dropped() -> None:
     robot = agent("RB")
     replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
     replies(robot, ("RC", CPA(assigned((1, 1), (1, 1)), math.inf, [])))
     assert value(robot) == (2,)
     assert replies(robot, ("RC", SideRequest((2,), 5, 2))) == [("RC", Side(5, INFINITE))]
-
-
-def test_a_request_about_a_value_that_was_given_up_is_dropped() -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    replies(robot, ("RC", CPA(assigned((1, 1), (1, 1)), math.inf, [])))
     assert replies(robot, ("RC", SideRequest((1,), 5, 1))) == []
 
 
@@ -124,22 +103,14 @@ def test_the_next_value_is_taken_as_soon_as_the_sum_reaches_b() -> None:
     said = replies(robot, ("RA", Side(1, 7)))
     assert said[:2] == [("RA", SideRequest((2,), 2, 1)), ("RB", SideRequest((2,), 2, 1))]
     assert value(robot) == (2,)
-
-
-def test_so_it_is_by_both_sides_and_the_bounds_of_robots_after() -> None:
+    before = robot.cost
+    assert replies(robot, ("RB", Side(1, 5))) == [], "an answer about a value that was given up is dropped"
+    assert robot.cost == before
     robot = holder()
     replies(robot, ("RD", NewSolution([(1,), (1,), (2,), (1,)], 8)), ("RA", Side(1, 5)))
     assert value(robot) == (1,)
     replies(robot, ("RD", FBEstimate([1, 1, 1], [0, 0, 0, 2])))
-    assert value(robot) == (2,)
-
-
-def test_an_answer_about_a_value_that_was_given_up_is_dropped() -> None:
-    robot = holder()
-    replies(robot, ("RD", NewSolution([(1,), (1,), (2,), (1,)], 8)), ("RA", Side(1, 7)))
-    before = robot.cost
-    assert replies(robot, ("RB", Side(1, 5))) == []
-    assert robot.cost == before
+    assert value(robot) == (2,), "both sides and the bounds of robots after count"
 
 
 def test_a_side_is_asked_for_once() -> None:
@@ -164,40 +135,7 @@ def test_a_robot_that_shares_nothing_above_sends_the_cpa_on_at_once() -> None:
     assert replies(agent("RB"), ("RA", cpa((1, 1), least=[0, 0])))[0] == ("RC", cpa((1, 1), (1, 1), least=[0, 0, 0]))
 
 
-@pytest.mark.parametrize("message", [Side(1, 3), SideRequest((1,), 1, 1)])
-def test_what_nobody_asked_for_or_may_ask_is_refused(message: Side | SideRequest) -> None:
-    with pytest.raises(ValueError, match=r"has not asked for|is not below"):
-        replies(holder(), ("RD", message))
-
-
-@pytest.mark.parametrize("wrong", [(), (3,), (1, 1)])
-def test_a_request_with_a_value_that_cannot_be_is_refused(wrong: Value) -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
-    with pytest.raises(ValueError, match="RC"):
-        replies(robot, ("RC", SideRequest(wrong, 5, 1)))
-
-
-def test_it_needs_fewer_messages_and_checks_than_syncabb() -> None:
-    """The paper's point."""
-    ours, syncabb = spent_on_asymmetric("atwb"), spent_on_asymmetric("syncabb")
-    assert ours.messages < syncabb.messages / 3
-    assert ours.ncccs < syncabb.ncccs / 5
-
-
-@plain_python_only
-@count("teams", 8, 100)
-def test_what_a_robot_does_not_need_of_its_part_changes_no_message(teams: int) -> None:
-    """Towards robots after it: all but the least entry of each own value, and those that it was asked about."""
-    chance = Random("bytes atwb")
-    others = 0
-    for seed in range(teams):
-        team = random_asymmetric_team(chance, simple=True)
-        with pytest.MonkeyPatch.context() as patch:
-            asked = watched_entries(team, patch)
-            before = run(team, ATWB, seed)
-        nothing_hidden(ATWB, before.envelopes)
-        elsewhere = what_is_not_needed_changed(team, asked, chance)
-        others += elsewhere != team
-        assert [one[:3] for one in run(elsewhere, ATWB, seed).envelopes] == [one[:3] for one in before.envelopes]
-    assert others > teams // 2
+def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
+    for message in (Side(1, 3), SideRequest((1,), 1, 1)):
+        with pytest.raises(ValueError, match=r"has not asked for|is not below"):
+            replies(holder(), ("RD", message))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -26,12 +27,14 @@ from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.agents import robot_of, started
+from tests.support.agents import started_robot
 from tests.support.allocation_problems import Allocation, greedy, idle, optimum, random_allocation
 from tests.support.brute_force import least_cost
+from tests.support.cases import cases, looped
+from tests.support.cost_problems import with_costs
 from tests.support.examples import count
 from tests.support.limits import HANG_S
-from tests.support.problems import team_of
+from tests.support.problems import shuffled, team_of
 from tests.support.random_options import random_schedule
 
 BUNDLING = ("ssi", "cbba")
@@ -53,8 +56,7 @@ def run(allocation: Allocation, protocol: str, chance: Random, solver: AceProces
 
 
 def any_order(allocation: Allocation, chance: Random) -> Allocation:
-    order = tuple(chance.sample(allocation.team.order, len(allocation.team.order)))
-    return allocation._replace(team=with_order(allocation.team, order))
+    return allocation._replace(team=with_order(allocation.team, shuffled(chance, allocation.team)))
 
 
 @pytest.fixture
@@ -65,8 +67,8 @@ def warm(warm_ace: None) -> Iterator[AceProcess]:
         yield ace
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
-@count("runs", 60, 2000)
+@count("runs", 40, 2000)
+@looped("protocol", AUCTIONS)
 def test_the_outcome_is_that_of_the_sequential_greedy_algorithm(protocol: str, runs: int, warm: AceProcess) -> None:
     chance, found = Random(f"greedy {protocol}"), Counter[str]()
     for _ in range(runs):
@@ -82,8 +84,8 @@ def test_the_outcome_is_that_of_the_sequential_greedy_algorithm(protocol: str, r
     assert runs // 2 < found["optimal"] < runs
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
 @count("runs", 40, 200)
+@looped("protocol", AUCTIONS)
 def test_with_diminishing_marginal_gain_at_least_half_of_the_optimum_is_gained(
     protocol: str, runs: int, warm: AceProcess
 ) -> None:
@@ -100,23 +102,19 @@ def test_with_diminishing_marginal_gain_at_least_half_of_the_optimum_is_gained(
     assert 0.5 <= worst < 1
 
 
-@pytest.mark.parametrize("protocol", ["ssi", "cbba"])
-def test_with_loads_there_is_no_such_bound(protocol: str) -> None:
+def test_with_loads_there_is_no_such_bound() -> None:
     """A robot with room for 3 is sold a task of load 3 for 10, and not three of load 1 for 9 each."""
-    workers = [Worker(f"R{name}", name, name, dict(profit), 3) for name, profit in (("A", HEAVY), ("B", LIGHT))]
-    jobs = {1: Job("1", 3), 2: Job("2"), 3: Job("3"), 4: Job("4")}
-    variables, constraints = several(workers, jobs)
+    profits = (("A", {1: 10, 2: 9, 3: 9, 4: 9}), ("B", dict.fromkeys((1, 2, 3, 4), -1)))
+    workers = [Worker(f"R{name}", name, name, profit, 3) for name, profit in profits]
+    variables, constraints = several(workers, {1: Job("1", 3), 2: Job("2"), 3: Job("3"), 4: Job("4")})
     team = assemble("loads", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
-    costs = [solve(team, Options(protocol=name, runtime=Runtime.SIMULATOR)).cost for name in (protocol, "dpop")]
-    assert costs == [10, 27]
+    protocols = (*BUNDLING, "dpop")
+    costs = [solve(team, Options(protocol=name, runtime=Runtime.SIMULATOR)).cost for name in protocols]
+    assert costs == [10, 10, 27]
 
 
-HEAVY = {1: 10, 2: 9, 3: 9, 4: 9}
-LIGHT = {1: -1, 2: -1, 3: -1, 4: -1}
-
-
-@pytest.mark.parametrize("protocol", ["cbaa", "cbba"])
-@count("runs", 60, 1000)
+@count("runs", 40, 1000)
+@looped("protocol", ["cbaa", "cbba"])
 def test_in_rounds_it_ends_after_as_many_as_tasks_times_the_diameter(protocol: str, runs: int) -> None:
     """Choi et al., Theorem 1: rounds in which something is told, and one in which the last of it changes nothing."""
     chance, longest, wide = Random(f"rounds {protocol}"), 0, 0
@@ -154,108 +152,100 @@ def layers(near: Mapping[str, set[str]], start: str) -> list[set[str]]:
     return found
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
-@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
-def test_the_outcome_is_the_same_on_every_runtime(protocol: str, runtime: Runtime) -> None:
+@pytest.mark.parametrize(
+    ("protocols", "runtimes"),
+    [
+        (("cbba",), (Runtime.PROCESSES,)),
+        pytest.param(AUCTIONS, (Runtime.PROCESSES, Runtime.NETWORK), marks=pytest.mark.more),
+    ],
+    ids=("one", "all"),
+)
+def test_the_outcome_is_the_same_on_every_runtime(protocols: Sequence[str], runtimes: Sequence[Runtime]) -> None:
     team = tasks(4, 4, 3)
-    simulated, real = (
-        solve(team, Options(protocol=protocol, runtime=kind, timeout=HANG_S)) for kind in (Runtime.SIMULATOR, runtime)
-    )
-    assert (real.verdict, real.assignment) == (Verdict.SOLUTION, simulated.assignment)
-    assert real.verified
+    with cases() as each:
+        for protocol, runtime in itertools.product(protocols, runtimes):
+            with each(f"{protocol} {runtime}"):
+                simulated = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+                real = solve(team, Options(protocol=protocol, runtime=runtime, timeout=HANG_S))
+                assert (real.verdict, real.assignment) == (Verdict.SOLUTION, simulated.assignment)
+                assert real.verified
 
 
 # What is no task allocation
 
 NOT_BOTH = Relation("notBoth", 2, Semantics.CONFLICTS, ((1, 1),))
-OTHER_TEAMS: Sequence[tuple[str, Sequence[tuple[Relation, str]], str]] = (
-    ("a constraint over three robots", [(replace(NOT_BOTH, arity=3, tuples=((1, 1, 1),)), "ABC")], "not over one"),
-    ("soft", [(Relation("S", 2, Semantics.SOFT, ((1, 1),), (5,)), "AB")], "costs 5 for A = 1 and B = 1"),
-    ("no value is free", [(Relation("D", 2, Semantics.CONFLICTS, ((0, 0), (1, 1))), "AB")], "cannot leave all tasks"),
-    ("a chain", [(NOT_BOTH, "AB"), (NOT_BOTH, "BC")], "A = 1 and C = 1 do not exclude each other"),
+MUST = Relation("must", 1, Semantics.SUPPORTS, ((1,),))
+OTHER_TEAMS: Sequence[tuple[Sequence[tuple[Relation, str]], str]] = (
+    ([(replace(NOT_BOTH, arity=3, tuples=((1, 1, 1),)), "ABC")], "not over one"),
+    ([(Relation("S", 2, Semantics.SOFT, ((1, 1),), (5,)), "AB")], "costs 5 for A = 1 and B = 1"),
+    ([(Relation("D", 2, Semantics.CONFLICTS, ((0, 0), (1, 1))), "AB")], "cannot leave all tasks"),
+    ([(NOT_BOTH, "AB"), (NOT_BOTH, "BC")], "A = 1 and C = 1 do not exclude each other"),
 )
+
+
+def priced(team: Team) -> Team:
+    return replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
 
 
 def team_with(constraints: Sequence[tuple[Relation, str]]) -> Team:
     made = [Constraint(one.name, one, tuple(scope), tuple(scope)) for one, scope in constraints]
-    team = team_of(dict.fromkeys("ABC", (0, 1)), made)
-    return replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
+    return with_costs(team_of(dict.fromkeys("ABC", (0, 1)), made))
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
-@pytest.mark.parametrize(
-    ("constraints", "why"), [case[1:] for case in OTHER_TEAMS], ids=[case[0] for case in OTHER_TEAMS]
-)
-def test_other_teams_are_refused_with_the_reason(
-    protocol: str, constraints: Sequence[tuple[Relation, str]], why: str
-) -> None:
-    with pytest.raises(UnsupportedError, match="is no task allocation, and") as refused:
-        solve(team_with(constraints), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
-    assert why in str(refused.value)
-    assert "; these do: " in str(refused.value)
+def crews(able: int) -> Team:
+    """Return a team of `able` robots and a task that needs two."""
+    workers = [Worker(f"R{name}", name, name, {1: 9}) for name in "ABC"[:able]]
+    variables, constraints = several(workers, {1: Job("1", robots=2)})
+    return assemble("crews", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
-def test_a_robot_that_must_do_a_task_is_refused(protocol: str) -> None:
-    must = Relation("must", 1, Semantics.SUPPORTS, ((1,),))
-    team = team_with([(NOT_BOTH, "AB"), (must, "A")])
-    for runtime in (Runtime.SIMULATOR, Runtime.PROCESSES):
-        with pytest.raises(UnsupportedError, match="RA has no value without a task"):
-            solve(team, Options(protocol=protocol, runtime=runtime, timeout=HANG_S))
-
-
-@pytest.mark.parametrize("protocol", AUCTIONS)
-def test_a_robot_without_values_ends_it(protocol: str) -> None:
-    none = Relation("none", 1, Semantics.SUPPORTS, ())
-    outcome = solve(team_with([(NOT_BOTH, "AB"), (none, "A")]), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
-    assert outcome.verdict is Verdict.NO_SOLUTION
-
-
-@pytest.mark.parametrize("protocol", AUCTIONS)
-def test_a_task_for_several_robots_is_refused(protocol: str) -> None:
-    workers = [Worker(f"R{name}", name, name, {1: 9}) for name in "ABC"]
-    for able in (2, 3):
-        variables, constraints = several(workers[:able], {1: Job("1", robots=2)})
-        team = assemble("crews", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
-        with pytest.raises(UnsupportedError, match="is no task allocation"):
+@looped("protocol", AUCTIONS)
+def test_other_teams_are_refused_with_the_reason(protocol: str) -> None:
+    others = [(team_with(constraints), why) for constraints, why in OTHER_TEAMS] + [(crews(2), ""), (crews(3), "")]
+    for team, why in others:
+        with pytest.raises(UnsupportedError, match="is no task allocation, and") as refused:
             solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+        assert why in str(refused.value)
+        assert "; these do: " in str(refused.value)
+    with pytest.raises(UnsupportedError, match="RA has no value without a task"):
+        solve(team_with([(NOT_BOTH, "AB"), (MUST, "A")]), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
-def test_two_ways_to_do_a_task_are_one_task(protocol: str) -> None:
+def test_a_robot_that_must_do_a_task_is_refused_among_processes_too() -> None:
+    with pytest.raises(UnsupportedError, match="RA has no value without a task"):
+        solve(team_with([(NOT_BOTH, "AB"), (MUST, "A")]), Options(protocol="cbba", timeout=HANG_S))
+
+
+@looped("protocol", AUCTIONS)
+def test_two_ways_to_do_a_task_are_one_task_and_a_robot_without_values_ends_it(protocol: str) -> None:
     """A does it by 1 or 2, which costs less; B by 1."""
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR)
     either = Relation("either", 2, Semantics.CONFLICTS, ((1, 1), (2, 1)))
     price = Relation("price", 1, Semantics.SOFT, ((0,), (1,), (2,)), (9, 5, 2))
     wish = Relation("wish", 1, Semantics.SOFT, ((0,),), (6,))
     made = [Constraint("E", either, ("A", "B"), ("A", "B")), Constraint("P", price, ("A",), ("A",), None)]
-    team = team_of({"A": (0, 1, 2), "B": (0, 1)}, [*made, Constraint("W", wish, ("B",), ("B",), None)])
-    team = replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
-    outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    team = with_costs(team_of({"A": (0, 1, 2), "B": (0, 1)}, [*made, Constraint("W", wish, ("B",), ("B",), None)]))
+    outcome = solve(team, options)
     assert outcome.assignment == {"A": 2, "B": 0}
     assert outcome.cost == least_cost(team) == 8
+    none = Relation("none", 1, Semantics.SUPPORTS, ())
+    assert solve(team_with([(NOT_BOTH, "AB"), (none, "A")]), options).verdict is Verdict.NO_SOLUTION
 
 
-@pytest.mark.parametrize("protocol", AUCTIONS)
-def test_a_lie_is_refused(protocol: str) -> None:
+def test_a_lie_is_refused() -> None:
     """A task that the sender does not share, a winner that cannot have won, a bid that nobody makes."""
     team = normalized(tasks(3, 3, 1))
     first, second, third = team.order
     lies: dict[str, list[Message]] = {
         "ssi": [Won([(0, 9)], 1), Won([(7, 1)], 1), Bid(-1)],
-        "cbaa": [
-            WinningBids([((0, 9), second, 1)]),
-            WinningBids([((0, 1), "X", 1)]),
-            WinningBids([((0, 1), third, 0)]),
-        ],
+        "cbaa": [WinningBids([one]) for one in (((0, 9), second, 1), ((0, 1), "X", 1), ((0, 1), third, 0))],
         "cbba": [
-            Bundles([((0, 9), second, 1)], [0, 1, 0]),
-            Bundles([((0, 1), "X", 1)], [0, 1, 0]),
-            Bundles([((0, 2), third, -1)], [0, 1, 0]),
-            Bundles([((0, 3), "", 1)], [0, 1, 0]),
+            Bundles([one], [0, 1, 0])
+            for one in (((0, 9), second, 1), ((0, 1), "X", 1), ((0, 2), third, -1), ((0, 3), "", 1))
         ],
     }
-    for lie in lies[protocol]:
-        robot = robot_of(protocol_named(protocol), team, first)
-        started(robot)
-        with pytest.raises(ValueError, match=r"task|bids"):
-            robot.receive(second, lie)
+    for protocol, told in lies.items():
+        for lie in told:
+            robot = started_robot(protocol_named(protocol), team, first)
+            with pytest.raises(ValueError, match=r"task|bids"):
+                robot.receive(second, lie)

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-
-import pytest
+from functools import partial
 
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.order import PriorityOrder
+from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.satisfaction.awc import AWC, Kept, NogoodList
 from robochoc.protocols.satisfaction.messages.awc import AddLink, Nogood, Ok
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, started_robot, value
+from tests.support.cases import looped
 from tests.support.complex_problems import complex_team
 from tests.support.problems import team_of
 from tests.support.small_teams import differ, triangle
 
-
-def agent(team: Team, name: str) -> AWC:
-    """The protocol object of one robot, started, with nothing left to say."""
-    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
-    awc.start()
-    awc.outbox.clear()
-    return awc
+agent = partial(started_robot, AWC)
 
 
 def nogood(assignments: Mapping[str, Value]) -> Nogood:
@@ -33,20 +24,13 @@ def nogood(assignments: Mapping[str, Value]) -> Nogood:
 
 
 def test_start_takes_the_first_value_and_tells_it_with_priority_0_to_all_neighbours() -> None:
-    team = triangle()
-    awc = AWC(LocalProblem(agent_problems(team, shared_scopes=True)["RB"]), PriorityOrder(team.order))
-    awc.start()
-    assert awc.outbox == [("RA", Ok((1,), 0)), ("RC", Ok((1,), 0))]
+    assert started(robot_of(AWC, triangle(), "RB")) == [("RA", Ok((1,), 0)), ("RC", Ok((1,), 0))]
 
 
-def test_of_equal_priorities_the_first_in_the_order_is_the_higher() -> None:
-    assert replies(agent(triangle(), "RB"), ("RC", Ok((1,), 0))) == []
-    assert replies(agent(triangle(), "RB"), ("RA", Ok((1,), 0))) == [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
-
-
-def test_a_larger_priority_is_higher_whatever_the_order() -> None:
-    awc = agent(triangle(), "RB")
-    assert replies(awc, ("RC", Ok((1,), 1))) == [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
+def test_a_larger_priority_is_higher_and_of_equals_the_first_in_the_order() -> None:
+    second = [("RA", Ok((2,), 0)), ("RC", Ok((2,), 0))]
+    for other, priority, said in (("RC", 0, []), ("RA", 0, second), ("RC", 1, second)):
+        assert replies(agent(triangle(), "RB"), (other, Ok((1,), priority))) == said
 
 
 def test_a_value_that_higher_robots_allow_is_kept_whatever_lower_ones_say() -> None:
@@ -75,18 +59,12 @@ def test_a_nogood_with_lower_robots_counts_as_a_conflict() -> None:
 
 
 def test_backtrack_tells_the_nogood_to_all_robots_in_it_and_goes_above_all_neighbours() -> None:
+    """It takes the value with the fewest conflicts with all neighbours."""
     awc = agent(triangle(), "RC")
     said = replies(awc, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 5)), ("RD", Ok((1,), 7)))
     learnt = Nogood({"RA": ((1,), 3), "RB": ((2,), 5)})
-    assert said[:2] == [("RA", learnt), ("RB", learnt)]
-    assert awc.priority == 8
-
-
-def test_backtrack_takes_the_value_with_fewest_conflicts_with_all_neighbours() -> None:
-    awc = agent(triangle(), "RC")
-    said = replies(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)), ("RD", Ok((1,), 0)))
-    assert value(awc) == (2,)
-    assert said[2:] == [(name, Ok((2,), 1)) for name in ("RA", "RB", "RD")]
+    assert said == [("RA", learnt), ("RB", learnt), *((name, Ok((2,), 8)) for name in ("RA", "RB", "RD"))]
+    assert (awc.priority, value(awc)) == (8, (2,))
 
 
 def test_a_nogood_that_has_been_sent_before_is_not_sent_again_and_changes_nothing() -> None:
@@ -98,45 +76,29 @@ def test_a_nogood_that_has_been_sent_before_is_not_sent_again_and_changes_nothin
     assert awc.priority == 3
 
 
-def test_an_empty_nogood_ends_the_search_without_solution() -> None:
+def test_an_empty_nogood_or_domain_ends_the_search_without_solution_and_nothing_is_said_after_it() -> None:
     awc = agent(triangle(1), "RA")
     assert replies(awc, ("RB", nogood({"RA": (1,)}))) == []
     assert awc.verdict is Verdict.NO_SOLUTION
-
-
-def test_an_empty_domain_is_an_empty_nogood() -> None:
+    assert replies(awc, ("RB", AddLink()), ("RB", Ok((1,), 9))) == []
     never = Relation("R", 1, Semantics.SUPPORTS, ())
     team = team_of({"A": (1,), "B": (1,)}, [differ("A", "B"), Constraint("C", never, ("A",), ("A",))])
-    awc = agent(team, "RA")
-    assert awc.verdict is Verdict.NO_SOLUTION
+    assert agent(team, "RA").verdict is Verdict.NO_SOLUTION
 
 
-def test_nothing_is_said_after_the_verdict() -> None:
-    awc = agent(triangle(1), "RA")
-    replies(awc, ("RB", nogood({"RA": (1,)})))
-    assert replies(awc, ("RB", AddLink()), ("RB", Ok((1,), 9))) == []
-
-
-def test_the_lowest_robot_of_a_nogood_keeps_to_it() -> None:
+def test_the_lowest_robot_of_a_nogood_keeps_to_it_for_good() -> None:
     awc = agent(triangle(3), "RB")
     assert replies(awc, ("RA", Ok((2,), 0)), ("RA", nogood({"RA": (2,), "RB": (1,)}))) != []
     assert value(awc) == (3,)
+    for other, own in ((3, 1), (2, 3)):
+        replies(awc, ("RA", Ok((other,), 0)))
+        assert value(awc) == (own,)
 
 
 def test_a_robot_that_is_not_the_lowest_of_a_nogood_keeps_to_it_only_once_it_is() -> None:
     awc = agent(triangle(3), "RA")
     assert replies(awc, ("RB", Ok((2,), 0)), ("RB", nogood({"RA": (1,), "RB": (2,)}))) == []
     assert replies(awc, ("RB", Ok((2,), 1))) == [("RB", Ok((3,), 0)), ("RC", Ok((3,), 0))]
-
-
-def test_nogoods_are_kept_for_good() -> None:
-    awc = agent(triangle(3), "RB")
-    replies(awc, ("RA", Ok((2,), 0)), ("RA", nogood({"RA": (2,), "RB": (1,)})))
-    assert value(awc) == (3,)
-    replies(awc, ("RA", Ok((3,), 0)))
-    assert value(awc) == (1,)
-    replies(awc, ("RA", Ok((2,), 0)))
-    assert value(awc) == (3,)
 
 
 def test_a_nogood_with_a_robot_that_is_no_neighbour_makes_it_one_and_is_believed() -> None:
@@ -153,17 +115,11 @@ def test_what_a_nogood_says_of_a_neighbour_is_not_believed() -> None:
     assert awc.view == {}
 
 
-def test_add_link_tells_the_value_to_the_new_neighbour_now_and_later() -> None:
+def test_add_link_tells_the_value_to_the_new_neighbour_now_and_later_once() -> None:
     awc = agent(triangle(), "RA")
     assert replies(awc, ("RD", AddLink())) == [("RD", Ok((1,), 0))]
-    assert ("RD", Ok((2,), 0)) in replies(awc, ("RB", nogood({"RA": (1,)})))
-
-
-def test_add_link_twice_is_one_link() -> None:
-    awc = agent(triangle(), "RA")
-    replies(awc, ("RD", AddLink()), ("RD", AddLink()))
-    said = replies(awc, ("RB", nogood({"RA": (1,)})))
-    assert [receiver for receiver, _ in said].count("RD") == 1
+    replies(awc, ("RD", AddLink()))
+    assert replies(awc, ("RB", nogood({"RA": (1,)}))).count(("RD", Ok((2,), 0))) == 1
 
 
 def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None:
@@ -195,27 +151,21 @@ def test_a_nogood_that_names_a_part_of_a_value_rules_out_all_that_look_alike() -
     assert value(awc) == (2, 2)
 
 
-@pytest.mark.parametrize(("said", "expected"), [((1, 9), True), ((2, 1), False), (None, False), ((None, 1), False)])
-def test_a_nogood_stands_when_all_that_it_names_is_known_to_be_so(said: Value | None, expected: bool) -> None:  # noqa: FBT001
+@looped(("said", "stands"), [((1, 9), True), ((2, 1), False), (None, False), ((None, 1), False)])
+def test_a_nogood_stands_when_all_that_it_names_is_known_to_be_so(said: Value | None, stands: bool) -> None:  # noqa: FBT001
     nogoods = NogoodList()
     nogoods.add("RB", {"RA": (1, None), "RB": (1,)})
     view = {} if said is None else {"RA": said}
-    assert (nogoods.standing(view) == [Kept({"RA": (1, None)}, (1,))]) is expected
+    assert (nogoods.standing(view) == [Kept({"RA": (1, None)}, (1,))]) is stands
 
 
-def test_a_nogood_that_does_not_stand_waits_until_its_robot_says_so() -> None:
+def test_a_nogood_is_kept_once_and_waits_until_its_robot_says_so() -> None:
     nogoods = NogoodList()
-    nogoods.add("RC", {"RA": (1,), "RB": (2,), "RC": (1,)})
+    for _ in range(2):
+        nogoods.add("RC", {"RA": (1,), "RB": (2,), "RC": (1,)})
     view = {"RA": (2,), "RB": (2,)}
     assert nogoods.standing(view) == []
     nogoods.update("RB", (2,))
     assert nogoods.standing({**view, "RA": (1,)}) == [], "it waits for RA alone, which has not said so"
     nogoods.update("RA", (1,))
     assert len(nogoods.standing({**view, "RA": (1,)})) == 1
-
-
-def test_a_nogood_is_kept_once() -> None:
-    nogoods = NogoodList()
-    for _ in range(2):
-        nogoods.add("RB", {"RA": (1,), "RB": (1,)})
-    assert len(nogoods.standing({"RA": (1,)})) == 1

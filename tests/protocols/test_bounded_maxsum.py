@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping
 from random import Random
 from typing import NamedTuple
@@ -20,15 +21,14 @@ from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.protocols.shared.messages.cycles import Value as ValueMessage
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import exact_costs
-from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
-from tests.support.agents import replies
+from tests.support.agents import replies, started_robot
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team, random_tree, with_costs
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, cost_of_assignment
-from tests.support.problems import team_of
+from tests.support.problems import shuffled, team_of
 
 COSTS = Relation("C", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (3, 1, 4, 6))
 HARD = Relation("H", 2, Semantics.CONFLICTS, ((2, 1), (2, 2)))
@@ -40,17 +40,18 @@ def pair(relation: Relation = COSTS) -> Team:
 
 
 def robot(team: Team, name: str) -> BoundedMaxSum:
-    found = BoundedMaxSum(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    found.start()
-    found.outbox.clear()
-    return found
+    return started_robot(BoundedMaxSum, team, name)
 
 
 class Run(NamedTuple):
     verdict: Verdict
     values: dict[str, int]
-    roots: list[BoundedMaxSum]
+    messages: Mapping[str, int]
     robots: Mapping[str, BoundedMaxSum]
+
+    @property
+    def roots(self) -> list[BoundedMaxSum]:
+        return [robot for robot in self.robots.values() if robot.optimum is not None]
 
     @property
     def bound(self) -> float:
@@ -71,7 +72,7 @@ def run(team: Team, chance: Random) -> Run:
 
     result = Simulation(team, Watched, any_schedule(chance)).search()
     values = {name: one for given in result.assignments.values() for name, one in given.items()}
-    return Run(result.verdict, values, [one for one in robots.values() if one.optimum is not None], robots)
+    return Run(result.verdict, values, result.metrics.messages, robots)
 
 
 def soft_team(chance: Random, size: int) -> Team:
@@ -86,25 +87,16 @@ def soft_team(chance: Random, size: int) -> Team:
     return team_of(domains, constraints)
 
 
-def test_the_weight_of_a_dependency_is_the_largest_difference_that_a_value_makes_and_the_lighter_one_may_be_cut() -> (
-    None
-):
-    """By A's value: 1 or 5. By B's: 2 or 2, so B is what is cut, and A keeps the least of each value."""
-    assert replies(robot(pair(), "RB"), ("RA", TWO))[0] == ("RA", Dependency(2, [1, 4]))
+def test_the_weight_of_a_dependency_is_the_largest_difference_that_a_value_makes() -> None:
+    """Of the costs by A's value: 1 or 5. By B's: 2 or 2, so B may be cut, and A keeps the least of each value.
 
-
-def test_what_is_always_forbidden_makes_no_difference_and_what_sometimes_is_an_infinite_one() -> None:
-    """A's 2 is out whatever B does."""
-    assert replies(robot(pair(HARD), "RB"), ("RA", TWO))[0] == ("RA", Dependency(0, [0, INFINITE]))
+    What is always forbidden, such as A's 2, makes no difference, and what sometimes is an infinite one.
+    """
     equal = Relation("E", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
-    assert replies(robot(pair(equal), "RB"), ("RA", TWO))[0] == ("RA", Dependency(INFINITE, []))
-
-
-def test_where_no_function_is_nothing_weighs() -> None:
-    team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("F", COSTS, ("A", "B"), ("A", "B"))])
-    alone = robot(team, "RC")
-    assert alone.optimum == 0
-    assert alone.assignment == {"C": 1}
+    for relation, weight, least in ((COSTS, 2, [1, 4]), (HARD, 0, [0, INFINITE]), (equal, INFINITE, [])):
+        assert replies(robot(pair(relation), "RB"), ("RA", TWO))[0] == ("RA", Dependency(weight, least))
+    alone = robot(team_of({"C": (1, 2)}, []), "RC")
+    assert (alone.optimum, alone.assignment) == (0, {"C": 1})
 
 
 def test_costs_go_up_the_tree_and_values_down() -> None:
@@ -123,17 +115,6 @@ def test_costs_go_up_the_tree_and_values_down() -> None:
             assert heard["RA"] == [Branch([1, 4], 0, 6)]
     assert high.optimum == 1
     assert (high.assignment, low.assignment) == ({"A": 1}, {"B": 2})
-
-
-def test_a_robot_that_holds_the_function_below_says_what_to_take() -> None:
-    chance = Random("take")
-    kinds: set[str] = set()
-    for _ in range(10):
-        team = random_tree(chance)
-        team = with_order(team, chance.sample(team.order, len(team.order)))
-        result = Simulation(team, BoundedMaxSum, any_schedule(chance)).search()
-        kinds |= result.metrics.messages.keys()
-    assert {Assign.__name__, ValueMessage.__name__} <= kinds
 
 
 @count("teams", 25, 600)
@@ -196,16 +177,21 @@ def test_with_hard_constraints_the_bound_holds_and_what_is_proven_is_true(teams:
 
 @count("trees", 25, 600)
 def test_on_a_tree_nothing_is_cut_and_the_result_is_the_optimum(trees: int) -> None:
+    """A robot that holds the function below says what to take; others get a value."""
     chance = Random("trees")
+    kinds = Counter[str]()
     for _ in range(trees):
         team = random_tree(chance)
-        team = with_order(team, chance.sample(team.order, len(team.order)))
+        team = with_order(team, shuffled(chance, team))
         told = run(team, chance)
+        kinds.update(told.messages)
         least = least_cost(team)
         assert (told.verdict is Verdict.NO_SOLUTION) is (least == INFINITE)
         if least < INFINITE:
             assert (told.cut, told.bound) == (0, least)
             assert cost_of_assignment(team, told.values) == (0, least)
+    assert kinds[Assign.__name__]
+    assert kinds[ValueMessage.__name__]
 
 
 @count("teams", 20, 300)
@@ -235,10 +221,9 @@ def test_a_run_says_optimal_where_the_result_meets_the_bound(teams: int) -> None
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(ValueError, match="weighs nan"):
-        replies(robot(pair(), "RA"), ("RB", Dependency(float("nan"), [])))
-    with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
-        replies(robot(pair(), "RA"), ("RB", Dependency(1, [1, 2, 3])))
+    for wrong, why in ((Dependency(float("nan"), []), "weighs nan"), (Dependency(1, [1, 2, 3]), "has not 1 rows of 2")):
+        with pytest.raises(ValueError, match=why):
+            replies(robot(pair(), "RA"), ("RB", wrong))
 
 
 def test_costs_that_floats_do_not_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

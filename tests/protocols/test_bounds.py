@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from random import Random
 
@@ -18,39 +19,14 @@ from robochoc.run.recording import journal_header, objective_to_record
 from robochoc.run.registry import protocol_named
 from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.encrypted_problems import affordable
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
-BOUNDING = (
-    "syncabb",
-    "atwb",
-    "asym-pt-fb",
-    "syncbb",
-    "afb",
-    "adopt",
-    "adopt-k",
-    "bnb-adopt",
-    "bnb-adopt-fdac",
-    "sfb",
-    "dpop",
-    "ncbb",
-    "pt-fb",
-    "hs-cai",
-    "mb-dpop",
-    "rmb-dpop",
-    "p-dpop",
-    "p2-dpop",
-    "p32-dpop",
-    "s-dpop",
-    "o-dpop",
-    "count-dpop",
-    "list-dpop",
-)
-INCOMPLETE = tuple(
-    name for name in ANY_TEAM if protocol_named(name).traits.costs and not protocol_named(name).traits.complete
-)
-UNPROVEN = tuple(name for name in INCOMPLETE if name != "bounded-maxsum")  # which has tests of its own
+MINIMISING = tuple(name for name in ANY_TEAM if protocol_named(name).traits.costs)
+BOUNDING = tuple(name for name in MINIMISING if protocol_named(name).traits.complete)
+UNPROVEN = tuple(name for name in MINIMISING if name not in {*BOUNDING, "bounded-maxsum"})  # which has tests of its own
 
 
 def _events(team: Team, options: Options) -> tuple[list[AnyEvent], Verdict]:
@@ -92,7 +68,7 @@ def _options(protocol: str, seed: int, runtime: Runtime = Runtime.SIMULATOR) -> 
     )
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [12, pytest.param(400, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("protocol", BOUNDING)
 def test_that_the_optimum_is_between_the_bound_and_the_best_so_far(protocol: str, count: int) -> None:
     chance, early = Random(f"bounds {protocol} {count}"), 0
@@ -103,27 +79,27 @@ def test_that_the_optimum_is_between_the_bound_and_the_best_so_far(protocol: str
     assert early or "dpop" in protocol  # which knows nothing until it knows all
 
 
-@pytest.mark.parametrize("protocol", UNPROVEN)
+@looped("protocol", UNPROVEN)
 def test_that_nothing_is_told_by_protocols_that_prove_nothing(protocol: str) -> None:
     chance = Random(protocol)
-    for seed in range(5):
+    settings = {"cycles": "10"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, bounds=True, settings=settings)
+    for seed in range(3):
         team = random_cost_team(chance, n_ary=False)
-        events, _ = _events(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed, bounds=True))
+        events, _ = _events(team, replace(options, seed=seed))
         assert not any(isinstance(event, Bounded) for event in events)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("protocol", BOUNDING)
+@looped("protocol", BOUNDING)
 def test_that_it_holds_among_processes(protocol: str) -> None:
     chance = Random(f"processes {protocol}")
     for seed in range(4):
-        _held(
-            affordable(protocol, partial(random_cost_team, chance)),
-            Options(protocol=protocol, seed=seed, bounds=True, cache=False),
-        )
+        team = affordable(protocol, partial(random_cost_team, chance))
+        _held(team, Options(protocol=protocol, seed=seed, bounds=True, cache=False))
 
 
-@pytest.mark.parametrize("protocol", BOUNDING)
+@looped("protocol", BOUNDING)
 def test_that_a_journal_has_bounds_where_they_are_asked_for_and_is_the_same_otherwise(protocol: str) -> None:
     chance = Random(5)
     team = affordable(protocol, partial(random_cost_team, chance))

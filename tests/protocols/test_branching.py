@@ -36,9 +36,14 @@ TEAM = priced(
 """B below A has the children C and D; E is below C and linked with B; F is below D and linked with A, not with B."""
 
 
+def placed_fork() -> NCBB:
+    """B, with its place in the tree."""
+    return placed(NCBB, TEAM, "RB", "RA", children=["RC", "RD"], pseudo_children=["RE"])
+
+
 def fork() -> NCBB:
     """B, which searches with A = 1 and no bound: its values cost 0 and 6 themselves."""
-    robot = placed(NCBB, TEAM, "RB", "RA", children=["RC", "RD"], pseudo_children=["RE"])
+    robot = placed_fork()
     replies(robot, ("RC", Members({"RB": ["RC", "RE"]})), ("RD", Members({"RB": ["RD"], "RA": ["RF"]})))
     replies(robot, ("RA", Greedy((1,))), ("RC", Result(9, {"RC": (1,), "RE": (1,)})))
     replies(robot, ("RD", Result(9, {"RD": (1,), "RF": (1,)})), ("RA", Request((1,))))
@@ -52,17 +57,13 @@ def searching(bound: float = INFINITE) -> NCBB:
 
 
 def test_a_robot_tells_its_parent_who_of_its_subtree_is_linked_with_whom_above() -> None:
-    robot = placed(NCBB, TEAM, "RB", "RA", children=["RC", "RD"], pseudo_children=["RE"])
+    for wrong in ({}, {"RB": ["RE"]}, {"RB": ["RC", "RF"]}):
+        with pytest.raises(ValueError, match="links that cannot be"):
+            replies(placed_fork(), ("RC", Members(wrong)))
+    robot = placed_fork()
     assert replies(robot, ("RC", Members({"RB": ["RC", "RE"]}))) == []
     said = replies(robot, ("RD", Members({"RB": ["RD"], "RA": ["RF"]})))
     assert said == [("RA", Members({"RA": ["RB", "RF"]}))]
-
-
-@pytest.mark.parametrize("linked", [{}, {"RB": ["RE"]}, {"RB": ["RC", "RF"]}])
-def test_links_that_cannot_be_are_refused(linked: dict[str, list[str]]) -> None:
-    robot = placed(NCBB, TEAM, "RB", "RA", children=["RC", "RD"], pseudo_children=["RE"])
-    with pytest.raises(ValueError, match="links that cannot be"):
-        replies(robot, ("RC", Members(linked)))
 
 
 def test_all_linked_robots_of_a_subtree_are_asked_and_no_others() -> None:
@@ -93,16 +94,14 @@ def test_subtrees_are_at_different_values_at_the_same_time() -> None:
     assert (robot.branches["RC"].index, robot.branches["RD"].index) == (1, 0)
 
 
-def test_what_a_subtree_costs_lowers_the_bounds_of_the_others() -> None:
-    robot = searching(bound=20)
-    replies(robot, ("RC", Report(2)), ("RE", Report(3)), ("RC", Result(11, {"RC": (1,), "RE": (2,)})))
-    assert replies(robot, ("RD", Report(4))) == [("RD", Search(9))]
-
-
-def test_a_value_is_out_in_all_subtrees_when_one_has_nothing_below_the_bound() -> None:
-    robot = searching(bound=20)
-    replies(robot, ("RC", Report(2)), ("RE", Report(3)), ("RC", Result(INFINITE, {})))
-    assert replies(robot, ("RD", Report(4))) == [("RD", Request((2,)))]
+def test_what_a_subtree_costs_lowers_the_bounds_of_the_others_and_may_rule_a_value_out_in_all() -> None:
+    for result, said in (
+        (Result(11, {"RC": (1,), "RE": (2,)}), [("RD", Search(9))]),
+        (Result(INFINITE, {}), [("RD", Request((2,)))]),
+    ):
+        robot = searching(bound=20)
+        replies(robot, ("RC", Report(2)), ("RE", Report(3)), ("RC", result))
+        assert replies(robot, ("RD", Report(4))) == said
 
 
 def test_the_cheapest_value_with_its_assignment_is_returned_when_all_subtrees_are_done() -> None:
@@ -128,15 +127,12 @@ def test_results_that_nobody_asked_for_are_refused() -> None:
         replies(robot, ("RC", Result(3, {"RD": (1,)})))
 
 
-def test_final_values_go_down_each_subtree() -> None:
+def test_final_values_go_down_each_subtree_and_must_have_those_of_all_robots() -> None:
     said = replies(fork(), ("RA", Terminate({f"R{name}": (2,) for name in "BCDEF"})))
     assert said == [("RC", Terminate({"RC": (2,), "RE": (2,)})), ("RD", Terminate({"RD": (2,), "RF": (2,)}))]
-
-
-@pytest.mark.parametrize("names", ["CDEF", "BCDE"])
-def test_final_values_that_lack_a_robot_are_refused(names: str) -> None:
-    with pytest.raises(ValueError, match="do not get their final values"):
-        replies(fork(), ("RA", Terminate({f"R{name}": (2,) for name in names})))
+    for names in ("CDEF", "BCDE"):
+        with pytest.raises(ValueError, match="do not get their final values"):
+            replies(fork(), ("RA", Terminate({f"R{name}": (2,) for name in names})))
 
 
 def test_a_robot_alone_is_done_at_once() -> None:
@@ -157,24 +153,19 @@ def leaf() -> NCBB:
 
 
 def test_a_bound_is_the_cost_with_robots_from_the_asker_up() -> None:
+    """Robots below the asker are left out, as their values are old. Only those above may ask."""
     assert replies(leaf(), ("RX", Request((2,)))) == [("RX", Report(1))]
-
-
-def test_robots_below_the_asker_are_left_out_as_their_values_are_old() -> None:
     robot = leaf()
     replies(robot, ("RX", Request((1,))), ("RY", Request((1,))))
     assert replies(robot, ("RX", Request((2,)))) == [("RX", Report(1))]
+    with pytest.raises(ValueError, match="is not above"):
+        replies(robot, ("RZ", Request((1,))))
 
 
 def test_a_leaf_answers_its_parent_with_the_cost_and_its_value() -> None:
     robot = leaf()
     assert to("RY", replies(robot, ("RX", Request((2,))), ("RY", Request((1,))))) == [Result(1, {"RZ": (2,)})]
     assert to("RY", replies(robot, ("RY", Request((2,))))) == [Result(3, {"RZ": (1,)})]
-
-
-def test_only_those_above_may_ask() -> None:
-    with pytest.raises(ValueError, match="is not above"):
-        replies(leaf(), ("RZ", Request((1,))))
 
 
 def test_a_constraint_is_checked_when_the_last_of_the_others_asks() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
 from robochoc.model.allocation import Job, Worker, assignment, several
@@ -12,6 +14,7 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.protocols.auctions.cbba import CBBA, NOBODY, Standing
 from robochoc.protocols.auctions.messages.cbba import Bundles
 from tests.support.agents import replies, robot_of, started
+from tests.support.cases import cases
 
 TASK = (0, 1)
 """The only task, as each robot names it."""
@@ -29,127 +32,76 @@ def allocation(parts: object) -> Team:
     return normalized(team)
 
 
-def after(
-    known: Standing, told: Standing, mine: dict[str, int] | None = None, theirs: dict[str, int] | None = None
-) -> Standing:
-    """What I knows of the task after K's message, without bidding anew: K says `told`, and I knew `known`.
-
-    `mine` and `theirs` say how new each robot's information was (s_i and s_k).
-    """
-    robot = robot_of(CBBA, team_of_four(), "I")
-    robot.know(0, known)
-    robot.s.update(mine or {})
-    robot.receive("K", Bundles([(TASK, *told)], stamps_of("IKMN", {"K": 5, **(theirs or {})})))
-    return robot.standings[0]
-
-
-def stamps_of(robots: str, numbers: dict[str, int]) -> list[int]:
+def stamps_of(robots: str, numbers: Mapping[str, int]) -> list[int]:
     """The numbers of `robots`, which stand in priority order; 0: nothing was heard of it."""
     return [numbers.get(name, 0) for name in robots]
 
 
-OLD, NEW = {"M": 1, "N": 1}, {"M": 2, "N": 2}
-I4, K3, K5, M5, M9, N7 = (
-    Standing(who, bid) for who, bid in (("I", 4), ("K", 3), ("K", 5), ("M", 5), ("M", 9), ("N", 7))
-)
+OLD, NEW, M_NEWER, N_NEWER = {"M": 1, "N": 1}, {"M": 2, "N": 2}, {"M": 2, "N": 1}, {"M": 1, "N": 2}
+NONE: dict[str, int] = {}
+I3, I4, M3, M5, M9, N7 = (Standing(*one) for one in (("I", 3), ("I", 4), ("M", 3), ("M", 5), ("M", 9), ("N", 7)))
+K3, K4, K5, K6 = (Standing("K", bid) for bid in (3, 4, 5, 6))
+TABLE = [
+    # K says of the task | I says | how new I's information is | how new K's is | I's afterwards | the table's rule
+    (K5, I4, NONE, NONE, K5, "receiver: update for a higher bid"),
+    (K3, I4, NONE, NONE, I4, "receiver: update for a higher bid"),
+    (K4, I4, NONE, NONE, I4, "receiver: leave an equal bid of lower priority"),
+    (K3, K5, NONE, NONE, K3, "sender: update"),
+    (K5, M9, OLD, NEW, K5, "another: update for newer information"),
+    (K6, M5, NEW, OLD, K6, "another: update for a higher bid"),
+    (K5, M9, NEW, OLD, M9, "another: leave otherwise"),
+    (K3, NOBODY, NONE, NONE, K3, "nobody: update"),
+    (I3, I4, NONE, NONE, I4, "receiver: leave"),
+    (I4, K5, NONE, NONE, NOBODY, "sender: reset"),
+    (I4, M5, OLD, NEW, NOBODY, "another: reset for newer information"),
+    (I4, M5, NEW, NEW, M5, "another: leave otherwise"),
+    (I4, NOBODY, NONE, NONE, NOBODY, "nobody: leave"),
+    (M5, I4, OLD, NEW, M5, "receiver: update for newer information with a higher bid"),
+    (M5, I4, NEW, NEW, I4, "receiver: leave without newer information"),
+    (M3, I4, OLD, NEW, I4, "receiver: leave without a higher bid"),
+    (M9, K5, OLD, NEW, M9, "sender: update for newer information"),
+    (M9, K5, NEW, NEW, NOBODY, "sender: reset otherwise"),
+    (M9, M5, OLD, NEW, M9, "the same: update for newer information"),
+    (M5, M9, OLD, NEW, M5, "the same: update for newer information"),
+    (M9, M5, NEW, NEW, M5, "the same: leave otherwise"),
+    (M5, N7, OLD, NEW, M5, "yet another: update for newer information of both"),
+    (M9, N7, N_NEWER, M_NEWER, M9, "yet another: update for newer information with a higher bid"),
+    (M5, N7, N_NEWER, M_NEWER, N7, "yet another: leave without a higher bid"),
+    (M9, N7, M_NEWER, N_NEWER, NOBODY, "yet another: reset where each knows the other better"),
+    (M9, N7, OLD, N_NEWER, N7, "yet another: leave otherwise"),
+    (M9, N7, NEW, OLD, N7, "yet another: leave otherwise"),
+    (M5, NOBODY, OLD, NEW, M5, "nobody: update for newer information"),
+    (M5, NOBODY, NEW, NEW, NOBODY, "nobody: leave otherwise"),
+    (NOBODY, I4, NONE, NONE, I4, "receiver: leave"),
+    (NOBODY, K5, NONE, NONE, NOBODY, "sender: update"),
+    (NOBODY, M5, OLD, NEW, NOBODY, "another: update for newer information"),
+    (NOBODY, M5, NEW, NEW, M5, "another: leave otherwise"),
+    (NOBODY, NOBODY, NONE, NONE, NOBODY, "nobody: leave"),
+    *(
+        (same, same, *stamps, same, "both say the same")
+        for same in (I4, K5, M9, NOBODY)
+        for stamps in ((OLD, NEW), (NEW, OLD), (NEW, NEW))
+    ),
+]
 
 
-def test_sender_sender_receiver_receiver_updates_for_a_higher_bid() -> None:
-    assert after(I4, K5) == K5
-    assert after(I4, K3) == I4
+def test_each_row_of_table_1() -> None:
+    """Of what I knows of the task after K's message, without bidding anew."""
+    with cases() as each:
+        for number, (said, known, mine, theirs, expected, rule) in enumerate(TABLE):
+            with each(f"{number}: K says {said.winner or 'nobody'}, I {known.winner or 'nobody'}, {rule}"):
+                robot = robot_of(CBBA, team_of_four(), "I")
+                robot.know(0, known)
+                robot.s.update(mine)
+                robot.receive("K", Bundles([(TASK, *said)], stamps_of("IKMN", {"K": 5, **theirs})))
+                assert robot.standings[0] == expected
 
 
-def test_sender_sender_receiver_receiver_leaves_an_equal_bid_of_lower_priority() -> None:
-    assert after(I4, Standing("K", 4)) == I4
-
-
-def test_sender_sender_receiver_sender_updates() -> None:
-    assert after(K5, K3) == K3
-
-
-def test_sender_sender_receiver_another_updates_for_newer_information_or_a_higher_bid() -> None:
-    assert after(M9, K5, OLD, NEW) == K5
-    assert after(M5, Standing("K", 6), NEW, OLD) == Standing("K", 6)
-    assert after(M9, K5, NEW, OLD) == M9
-
-
-def test_sender_sender_receiver_nobody_updates() -> None:
-    assert after(NOBODY, K3) == K3
-
-
-def test_sender_receiver_receiver_receiver_leaves() -> None:
-    assert after(I4, Standing("I", 3)) == I4
-
-
-def test_sender_receiver_receiver_sender_resets() -> None:
-    assert after(K5, I4) == NOBODY
-
-
-def test_sender_receiver_receiver_another_resets_for_newer_information() -> None:
-    assert after(M5, I4, OLD, NEW) == NOBODY
-    assert after(M5, I4, NEW, NEW) == M5
-
-
-def test_sender_receiver_receiver_nobody_leaves() -> None:
-    assert after(NOBODY, I4) == NOBODY
-
-
-def test_sender_another_receiver_receiver_updates_for_newer_information_with_a_higher_bid() -> None:
-    assert after(I4, M5, OLD, NEW) == M5
-    assert after(I4, M5, NEW, NEW) == I4
-    assert after(I4, Standing("M", 3), OLD, NEW) == I4
-
-
-def test_sender_another_receiver_sender_updates_for_newer_information_and_resets_otherwise() -> None:
-    assert after(K5, M9, OLD, NEW) == M9
-    assert after(K5, M9, NEW, NEW) == NOBODY
-
-
-def test_sender_another_receiver_the_same_updates_for_newer_information() -> None:
-    assert after(M5, M9, OLD, NEW) == M9
-    assert after(M9, M5, OLD, NEW) == M5
-    assert after(M5, M9, NEW, NEW) == M5
-
-
-def test_sender_another_receiver_yet_another_updates_for_newer_information_of_both() -> None:
-    assert after(N7, M5, OLD, NEW) == M5
-
-
-def test_sender_another_receiver_yet_another_updates_for_newer_information_with_a_higher_bid() -> None:
-    assert after(N7, M9, {"M": 1, "N": 2}, {"M": 2, "N": 1}) == M9
-    assert after(N7, M5, {"M": 1, "N": 2}, {"M": 2, "N": 1}) == N7
-
-
-def test_sender_another_receiver_yet_another_resets_where_each_knows_the_other_better() -> None:
-    assert after(N7, M9, {"M": 2, "N": 1}, {"M": 1, "N": 2}) == NOBODY
-    assert after(N7, M9, {"M": 1, "N": 1}, {"M": 1, "N": 2}) == N7
-    assert after(N7, M9, NEW, OLD) == N7
-
-
-def test_sender_another_receiver_nobody_updates_for_newer_information() -> None:
-    assert after(NOBODY, M5, OLD, NEW) == M5
-    assert after(NOBODY, M5, NEW, NEW) == NOBODY
-
-
-def test_sender_nobody_receiver_receiver_leaves() -> None:
-    assert after(I4, NOBODY) == I4
-
-
-def test_sender_nobody_receiver_sender_updates() -> None:
-    assert after(K5, NOBODY) == NOBODY
-
-
-def test_sender_nobody_receiver_another_updates_for_newer_information() -> None:
-    assert after(M5, NOBODY, OLD, NEW) == NOBODY
-    assert after(M5, NOBODY, NEW, NEW) == M5
-
-
-def test_sender_nobody_receiver_nobody_leaves() -> None:
-    assert after(NOBODY, NOBODY) == NOBODY
-
-
-def test_information_is_as_new_as_the_newest_that_was_heard() -> None:
+def test_information_is_as_new_as_the_newest_that_was_heard_of_each_robot() -> None:
     robot = robot_of(CBBA, team_of_four(), "I")
+    for stamps in ([], [0, 1, 0], [0, 1, 0, 0, 0]):
+        with pytest.raises(ValueError, match="K does not say how new its information of each robot is"):
+            robot.receive("K", Bundles([(TASK, *K3)], stamps))
     robot.s.update({"M": 4, "N": 1})
     robot.receive("K", Bundles([(TASK, *NOBODY)], [9, 1, 3, 2]))
     assert robot.s == {"I": 0, "K": 1, "M": 4, "N": 2}
@@ -164,19 +116,6 @@ def test_what_is_not_said_again_is_as_the_sender_said_it_before() -> None:
     assert robot.standings[0] == M9
     robot.receive("K", Bundles([], [0, 2, 3, 2]))
     assert robot.standings[0] == M5
-
-
-def test_what_both_ends_say_is_changed_by_no_row_of_the_table() -> None:
-    for same in (I4, K5, M9, NOBODY):
-        for mine, theirs in ((OLD, NEW), (NEW, OLD), (NEW, NEW)):
-            assert after(same, same, mine, theirs) == same
-
-
-@pytest.mark.parametrize("stamps", [[], [0, 1, 0], [0, 1, 0, 0, 0]])
-def test_a_message_that_does_not_number_all_robots_is_refused(stamps: list[int]) -> None:
-    robot = robot_of(CBBA, team_of_four(), "I")
-    with pytest.raises(ValueError, match="K does not say how new its information of each robot is"):
-        robot.receive("K", Bundles([(TASK, *K3)], stamps))
 
 
 # Bundles
@@ -194,18 +133,12 @@ def bundles(*standings: tuple[str, int] | None, **stamps: int) -> Bundles:
     return Bundles(said, stamps_of("IK", stamps))
 
 
-def test_a_bundle_is_built_from_the_best_task_on() -> None:
+def test_a_bundle_is_built_from_the_best_task_on_and_what_follows_a_lost_task_may_be_added_again() -> None:
     robot = robot_of(CBBA, two_robots(I=(3, 9, 5), K=(1, 1, 1)), "I")
     assert started(robot) == [("K", bundles(("I", 3), ("I", 9), ("I", 5), I=1))]
     assert robot.bundle == [1, 2, 0]
-
-
-def test_what_was_added_after_a_task_that_is_lost_is_released_and_may_be_added_again() -> None:
-    robot = robot_of(CBBA, two_robots(I=(3, 9, 5), K=(1, 1, 1)), "I")
-    started(robot)
-    assert replies(robot, ("K", bundles(("", 0), ("K", 10), ("", 0), K=1))) == [
-        ("K", bundles(None, ("K", 10), None, K=1, I=2))
-    ]
+    lost = bundles(None, ("K", 10), None, K=1, I=2)
+    assert replies(robot, ("K", bundles(("", 0), ("K", 10), ("", 0), K=1))) == [("K", lost)]
     assert robot.bundle == [2, 0]
 
 
@@ -215,21 +148,14 @@ def test_a_task_where_the_bid_would_not_be_the_highest_is_left_out() -> None:
     assert replies(robot) == [("K", bundles(("I", 3), ("K", 10), ("K", 6), K=1, I=1))]
 
 
-def test_who_says_something_wrong_of_this_robot_is_told_again() -> None:
+def test_who_says_something_wrong_of_this_robot_is_told_again_unless_that_is_under_way() -> None:
     """K has reset the task that I has: nothing is new to I, and K must know."""
     robot = robot_of(CBBA, team_of_four(I=4), "I")
     (first, *_) = started(robot)
     assert first == ("K", Bundles([(TASK, "I", 4)], [1, 0, 0, 0]))
-    assert replies(robot, ("K", Bundles([(TASK, *NOBODY)], [1, 1, 0, 0]))) == [
-        ("K", Bundles([(TASK, "I", 4)], [2, 1, 0, 0]))
-    ]
-
-
-def test_nobody_is_told_twice_what_is_under_way() -> None:
-    """K had not heard of I's message when it sent its own."""
-    robot = robot_of(CBBA, team_of_four(I=4), "I")
-    started(robot)
-    assert replies(robot, ("K", Bundles([(TASK, "K", 1)], [0, 1, 0, 0]))) == []
+    assert replies(robot, ("K", Bundles([(TASK, "K", 1)], [0, 1, 0, 0]))) == [], "K had not heard of I's message yet"
+    told = Bundles([(TASK, "I", 4)], [2, 2, 0, 0])
+    assert replies(robot, ("K", Bundles([(TASK, *NOBODY)], [1, 2, 0, 0]))) == [("K", told)]
 
 
 def test_a_task_that_is_worth_nothing_is_not_bid_for() -> None:
@@ -240,10 +166,9 @@ def test_a_task_that_is_worth_nothing_is_not_bid_for() -> None:
         assert robot.problem.solution(robot.value) == {"VI": 0}
 
 
-@pytest.mark.parametrize("together", [5, -5])
-def test_a_bid_is_never_higher_than_the_last_one_of_the_bundle(together: int) -> None:
+def test_a_bid_is_never_higher_than_the_last_one_of_the_bundle() -> None:
     """With a synergy of 5 the second task gains 11, more than the first one's 9, and the bid is 9."""
-    workers = [Worker(name, name, name, {1: 9, 2: 6}, together={(1, 2): together}) for name in "IK"]
-    team = allocation(several(workers, {1: Job("1"), 2: Job("2")}))
-    second = 9 if together > 0 else 1
-    assert started(robot_of(CBBA, team, "I")) == [("K", bundles(("I", 9), ("I", second), I=1))]
+    for together, second in ((5, 9), (-5, 1)):
+        workers = [Worker(name, name, name, {1: 9, 2: 6}, together={(1, 2): together}) for name in "IK"]
+        team = allocation(several(workers, {1: Job("1"), 2: Job("2")}))
+        assert started(robot_of(CBBA, team, "I")) == [("K", bundles(("I", 9), ("I", second), I=1))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from random import Random
 
@@ -9,10 +10,9 @@ import pytest
 
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
-from robochoc.model.assembly import Extras, assemble
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
+from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.cocoa import CoCoA, State
 from robochoc.protocols.local_search.messages.cocoa import (
     Costs,
@@ -23,8 +23,10 @@ from robochoc.protocols.local_search.messages.cocoa import (
     SetValue,
 )
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import replies, robot_of, started, value
+from tests.support.agents import replies, robot_of, started, started_robot, value
+from tests.support.asymmetric_problems import divided_pair as divided
 from tests.support.asymmetric_problems import random_asymmetric_team
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, domains_of
@@ -40,9 +42,7 @@ def chain(*, names: str = "ABC") -> Team:
 
 
 def idle(name: str, *chances: float, team: Team | None = None) -> CoCoA:
-    robot = robot_of(CoCoA, team or chain(), name, *chances)
-    started(robot)
-    return robot
+    return started_robot(CoCoA, team or chain(), name, *chances)
 
 
 def active(*chances: float) -> CoCoA:
@@ -59,12 +59,9 @@ def test_who_has_the_highest_priority_among_its_neighbours_begins_and_asks_them(
     assert started(robot_of(CoCoA, chain(), "RC")) == []
 
 
-def test_a_neighbour_answers_with_the_least_cost_of_each_value() -> None:
-    assert replies(idle("RB"), ("RA", Inquiry(TWO, {}))) == [("RA", Costs([(0, 1), (0, 2)]))]
-
-
-def test_an_answer_counts_what_is_known_of_others() -> None:
+def test_a_neighbour_answers_with_the_least_cost_of_each_value_and_counts_what_is_known_of_others() -> None:
     """B's 1 would cost 4 with C's 1, and its 2 would cost 2."""
+    assert replies(idle("RB"), ("RA", Inquiry(TWO, {}))) == [("RA", Costs([(0, 1), (0, 2)]))]
     asked = ("RA", Inquiry(TWO, {"RC": (1,), "RZ": (9,)}))
     assert replies(idle("RB"), asked) == [("RA", Costs([(0, 3), (0, 6)]))]
 
@@ -76,38 +73,22 @@ def test_who_is_done_answers_for_its_value() -> None:
     assert replies(robot, ("RC", Inquiry(TWO, {}))) == [("RC", Costs([(0, 8), (0, 5)]))]
 
 
-@pytest.mark.parametrize("news", [SetValue((1,)), Hold()])
-def test_an_idle_robot_becomes_active_when_a_neighbour_has_chosen_or_waits(news: SetValue | Hold) -> None:
-    robot = idle("RB")
-    said = replies(robot, ("RA", news))
-    assert robot.state is State.ACTIVE
-    assert ("RC", Inquiry(TWO, {"RA": (1,)} if isinstance(news, SetValue) else {})) in said
-
-
-def test_an_idle_robot_stays_idle_while_a_neighbour_only_asks() -> None:
-    robot = idle("RB")
-    replies(robot, ("RA", Inquiry(TWO, {})))
-    assert robot.state is State.IDLE
-
-
-def test_who_is_done_is_not_asked() -> None:
-    robot = idle("RB")
-    assert replies(robot, ("RA", SetValue((1,)))) == [("RC", Inquiry(TWO, {"RA": (1,)}))]
+def test_an_idle_robot_becomes_active_when_a_neighbour_has_chosen_or_waits_and_asks_those_that_have_not() -> None:
+    both = [("RA", Inquiry(TWO, {})), ("RC", Inquiry(TWO, {}))]
+    for news, asked in ((SetValue((1,)), [("RC", Inquiry(TWO, {"RA": (1,)}))]), (Hold(), both)):
+        robot = idle("RB")
+        replies(robot, ("RA", Inquiry(TWO, {})))
+        assert robot.state is State.IDLE, "a neighbour only asks"
+        assert replies(robot, ("RA", news)) == asked
+        assert robot.state is State.ACTIVE
 
 
 def test_when_all_have_answered_the_value_with_the_least_sum_is_taken_and_told() -> None:
     """1 costs 4 with A's 1, and 2 costs 1; C would charge 3 more for 2."""
-    assert replies(active(), ("RC", Costs([(0, 0), (0, 2)]))) == [("RC", SetValue((2,)))]
-    assert replies(active(), ("RC", Costs([(0, 0), (0, 4)]))) == [("RC", SetValue((1,)))]
-
-
-def test_a_broken_constraint_weighs_more_than_any_cost() -> None:
-    assert replies(active(), ("RC", Costs([(0, 99), (1, 0)]))) == [("RC", SetValue((1,)))]
-
-
-def test_too_many_equally_good_values_are_a_reason_to_wait() -> None:
+    for first, second, taken in (((0, 0), (0, 2), 2), ((0, 0), (0, 4), 1), ((0, 99), (1, 0), 1)):
+        assert replies(active(), ("RC", Costs([first, second]))) == [("RC", SetValue((taken,)))]
     robot = active()
-    assert replies(robot, ("RC", Costs([(0, 0), (0, 3)]))) == [("RC", Hold())]
+    assert replies(robot, ("RC", Costs([(0, 0), (0, 3)]))) == [("RC", Hold())], "too many are equally good"
     assert (robot.state, value(robot)) == (State.HOLD, None)
 
 
@@ -161,7 +142,7 @@ def test_an_n_ary_constraint_counts_once_when_all_but_two_have_values() -> None:
     assert replies(robot, asked) == [("RC", Costs([(0, 1), (0, 1)]))]
 
 
-@pytest.mark.parametrize(
+@looped(
     ("sender", "message"),
     [("RC", Costs([(0, 0)])), ("RA", Costs([(0, 0), (0, 0)])), ("RZ", Hold()), ("RZ", SetValue((1,)))],
 )
@@ -178,30 +159,7 @@ def test_nobody_answers_twice() -> None:
         replies(robot, ("RA", Costs([(0, 0), (0, 0)])))
 
 
-def test_a_robot_alone_takes_its_cheapest_value() -> None:
-    prices = Relation("P", 1, Semantics.SOFT, ((1,), (2,), (3,)), (4, 0, 2))
-    robot = idle("RA", team=team_of({"A": (1, 2, 3)}, [Constraint("P", prices, ("A",), ("A",))]))
-    assert robot.assignment == {"A": 2}
-
-
-def test_a_robot_with_an_empty_domain_ends_the_search() -> None:
-    team = team_of({"A": (1,), "B": ()}, [Constraint("C", SOFT, ("A", "B"), ("A", "B"))])
-    assert idle("RB", team=team).verdict is Verdict.NO_SOLUTION
-
-
 # Asymmetric costs
-
-
-def divided() -> Team:
-    """A pays 3 for (1, 1) and 1 for (1, 2), and B for A's 2 with its own 1 pays 5, for (1, 2) 2, for (2, 2) 9."""
-
-    def part(costs: dict[tuple[int, int], int]) -> list[Constraint]:
-        table = Relation("P", 2, Semantics.SOFT, tuple(costs), tuple(costs.values()), 0)
-        return [Constraint("C", table, ("A", "B"), ("A", "B"))]
-
-    parts = {"RA": part({(1, 1): 3, (1, 2): 1}), "RB": part({(2, 1): 5, (1, 2): 2, (2, 2): 9})}
-    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in "AB"}
-    return assemble("pair", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
 
 
 def asking() -> CoCoA:
@@ -217,18 +175,16 @@ def test_a_neighbour_with_a_part_tells_its_own_side_at_least_and_with_which_valu
 
 def test_the_asker_adds_its_own_side_at_the_values_that_it_is_told() -> None:
     """By B's side alone the first value would be better: (1, 1) costs A 3, and (2, 1) nothing."""
-    assert replies(asking(), ("RB", CostsAt([(0, 0), (0, 2)], [(1,), (1,)]))) == [("RB", SetValue((2,)))]
-    assert replies(asking(), ("RB", CostsAt([(0, 0), (0, 4)], [(1,), (1,)]))) == [("RB", SetValue((1,)))]
-    assert replies(asking(), ("RB", CostsAt([(0, 0), (0, 2)], [(2,), (1,)]))) == [("RB", SetValue((1,)))]
+    for dearer, with_first, taken in ((2, 1, 2), (4, 1, 1), (2, 2, 1)):
+        told = CostsAt([(0, 0), (0, dearer)], [(with_first,), (1,)])
+        assert replies(asking(), ("RB", told)) == [("RB", SetValue((taken,)))]
 
 
 def test_who_is_done_tells_what_its_side_charges_with_its_value() -> None:
-    robot = asking()
-    replies(robot, ("RB", CostsAt([(0, 9), (0, 0)], [(1,), (1,)])))
-    assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", FinalSide([(0, 0), (0, 0)]))]
-    robot = asking()
-    replies(robot, ("RB", CostsAt([(0, 0), (0, 9)], [(1,), (1,)])))
-    assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", FinalSide([(0, 3), (0, 1)]))]
+    for costs, side in (([(0, 9), (0, 0)], [(0, 0), (0, 0)]), ([(0, 0), (0, 9)], [(0, 3), (0, 1)])):
+        robot = asking()
+        replies(robot, ("RB", CostsAt(costs, [(1,), (1,)])))
+        assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", FinalSide(side))]
 
 
 def test_a_neighbour_with_a_part_that_is_done_is_asked_and_its_side_counts() -> None:
@@ -251,7 +207,7 @@ def test_who_has_answered_before_it_took_its_value_is_asked_again_at_once() -> N
     assert value(robot) == (1,)
 
 
-@pytest.mark.parametrize(
+@looped(
     "wrong",
     [
         CostsAt([(0, 0)], [(1,), (1,)]),
@@ -266,52 +222,49 @@ def test_sides_that_cannot_be_are_refused(wrong: CostsAt | FinalSide) -> None:
         replies(asking(), ("RB", wrong))
 
 
+def kinds_sent(team: Team, chance: Random, seed: int) -> dict[str, list[str]]:
+    """Return the types of the messages that each robot sends in a run, at the end of which all have a value."""
+    events: list[AnyEvent] = []
+    simulation = Simulation(
+        team, CoCoA, any_schedule(chance), observer=events.append, parameters=RunParameters(seed)
+    ).search()
+    assert simulation.verdict is Verdict.SOLUTION
+    assert all(simulation.assignments.values())
+    decided = [event.robot for event in events if isinstance(event, Decided)]
+    assert sorted(decided) == sorted(team.order), "each takes one value"
+    sent = [event for event in events if isinstance(event, Sent)]
+    return {name: [event.type for event in sent if event.sender == name] for name in team.order}
+
+
+def bounds(team: Team) -> Iterator[tuple[str, int, int]]:
+    """Yield for each robot its neighbours, and how often it may become active."""
+    domains = domains_of(team)
+    for robot in team.robots:
+        neighbours = len(robot_of(CoCoA, team, robot.name).problem.neighbours)
+        yield robot.name, neighbours, neighbours + len(domains[robot.variables[0].name])
+
+
 @count("teams", 10, 1000)
 def test_with_asymmetric_costs_it_ends_with_at_most_one_question_more_for_each_neighbour(teams: int) -> None:
     chance = Random("divided cocoa")
     told = 0
     for seed in range(teams):
         team = random_asymmetric_team(chance, simple=True)
-        if not all(domains_of(team).values()):
-            continue
-        events: list[AnyEvent] = []
-        run = Simulation(
-            team, CoCoA, any_schedule(chance), observer=events.append, parameters=RunParameters(seed)
-        ).search()
-        assert run.verdict is Verdict.SOLUTION
-        assert all(run.assignments.values())
-        for robot in team.robots:
-            neighbours = len(robot_of(CoCoA, team, robot.name).problem.neighbours)
-            activations = neighbours + len(domains_of(team)[robot.variables[0].name])
-            sent = [event.type for event in events if isinstance(event, Sent) and event.sender == robot.name]
-            assert sent.count("Inquiry") <= neighbours * (activations + 1)
-        told += sum(isinstance(event, Sent) and event.type == "FinalSide" for event in events)
+        if all(domains_of(team).values()):
+            sent = kinds_sent(team, chance, seed)
+            for name, neighbours, activations in bounds(team):
+                assert sent[name].count("Inquiry") <= neighbours * (activations + 1)
+                told += sent[name].count("FinalSide")
     assert told
 
 
-@count("teams", 100, 3000)
+@count("teams", 60, 3000)
 def test_it_always_ends_and_each_robot_takes_one_value(teams: int) -> None:
     chance = Random("cocoa")
     for seed in range(teams):
         team = chance.choice((random_cost_team, random_hard_team))(chance)
-        if not all(domains_of(team).values()):
-            continue
-        events: list[AnyEvent] = []
-        run = Simulation(
-            team, CoCoA, any_schedule(chance), observer=events.append, parameters=RunParameters(seed)
-        ).search()
-        assert run.verdict is Verdict.SOLUTION
-        assert all(run.assignments.values())
-        decided = [event.robot for event in events if isinstance(event, Decided)]
-        assert sorted(decided) == sorted(team.order)
-        assert_few_messages(team, events)
-
-
-def assert_few_messages(team: Team, events: list[AnyEvent]) -> None:
-    domains = domains_of(team)
-    for robot in team.robots:
-        kinds = [event.type for event in events if isinstance(event, Sent) and event.sender == robot.name]
-        neighbours = len(robot_of(CoCoA, team, robot.name).problem.neighbours)
-        activations = neighbours + len(domains[robot.variables[0].name])
-        assert len(kinds) - kinds.count("Costs") <= 2 * neighbours * activations
-        assert kinds.count("Inquiry") <= neighbours * activations
+        if all(domains_of(team).values()):
+            sent = kinds_sent(team, chance, seed)
+            for name, neighbours, activations in bounds(team):
+                assert len(sent[name]) - sent[name].count("Costs") <= 2 * neighbours * activations
+                assert sent[name].count("Inquiry") <= neighbours * activations

@@ -13,7 +13,6 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.compapo import CompAPO
 from robochoc.protocols.satisfaction.mediation import Mediation, allows
 from robochoc.protocols.satisfaction.messages.compapo import (
@@ -28,9 +27,8 @@ from robochoc.protocols.satisfaction.messages.compapo import (
     Wait,
 )
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.examples import count
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import graph_team, triangle
@@ -42,11 +40,19 @@ UNEQUAL = bytes([0b0110])
 
 def agent(team: Team, name: str) -> CompAPO:
     """The protocol object of one robot, which knows its neighbours' domains, with nothing left to say."""
-    robot = CompAPO(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
+    robot = robot_of(CompAPO, team, name)
     robot.start()
     for neighbour in robot.linked:
         robot.receive(neighbour, Init(tuple((one,) for one in team[neighbour].variables[0].domain)))
     robot.outbox.clear()
+    return robot
+
+
+def session() -> CompAPO:
+    """RA, whose session with RB of a pair begins."""
+    robot = agent(graph_team(["AB"]), "RA")
+    robot.repairs = 9
+    replies(robot)
     return robot
 
 
@@ -62,28 +68,17 @@ def mediator() -> CompAPO:
     return robot
 
 
-def test_start_tells_the_domain_to_those_with_a_constraint() -> None:
-    team = triangle()
-    robot = CompAPO(LocalProblem(agent_problems(team, shared_scopes=True)["RC"]), PriorityOrder(team.order))
-    robot.start()
-    assert robot.outbox == [(name, Init(TWO)) for name in ("RA", "RB", "RD")]
-
-
-def test_nothing_is_done_before_all_domains_are_known() -> None:
-    team = triangle()
-    robot = CompAPO(LocalProblem(agent_problems(team, shared_scopes=True)["RA"]), PriorityOrder(team.order))
-    robot.start()
-    robot.outbox.clear()
+def test_start_tells_the_domain_to_those_with_a_constraint_and_nothing_is_done_before_all_are_known() -> None:
+    said = started(robot_of(CompAPO, triangle(), "RC"))
+    assert said == [(name, Init(TWO)) for name in ("RA", "RB", "RD")]
+    robot = robot_of(CompAPO, triangle(), "RA")
+    started(robot)
     assert replies(robot, ("RB", Init(TWO)), ("RB", Evaluate(1, 9, tables=False))) == []
     assert replies(robot, ("RC", Init(TWO))) == [("RB", Evaluation(1, 0, 0, ()))]
 
 
-def test_check_agent_view_repairs_a_conflict_by_the_own_value() -> None:
-    robot = agent(triangle(), "RA")
-    assert replies(robot) == [("RB", Ok((2,), 1)), ("RC", Ok((2,), 1))]
-
-
-def test_only_the_highest_robot_of_a_conflict_acts() -> None:
+def test_check_agent_view_repairs_a_conflict_by_the_own_value_if_it_is_the_highest_of_it() -> None:
+    assert replies(agent(triangle(), "RA")) == [("RB", Ok((2,), 1)), ("RC", Ok((2,), 1))]
     robot = agent(triangle(), "RB")
     assert replies(robot, ("RC", Ok((2,), 1))) == []
     assert value(robot) == (1,)
@@ -102,12 +97,9 @@ def test_a_robot_repairs_no_more_often_than_its_good_list_has_robots() -> None:
     assert replies(robot, ("RB", Ok((1,), 2))) == [("RB", Evaluate(1, 2, tables=True))]
 
 
-def test_mediate_asks_all_of_the_good_list() -> None:
-    assert mediator().holder == "RA"
-
-
 def test_a_session_also_holds_the_robots_around_the_good_list() -> None:
     robot = mediator()
+    assert robot.holder == "RA"
     tables = (table("RA", "RC"), table("RB", "RC"), table("RD", "RC"))
     assert replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB"))))) == []
     assert replies(robot, ("RC", Evaluation(1, 1, 1, tables))) == [("RD", Evaluate(1, 3, tables=False))]
@@ -145,9 +137,7 @@ def test_robots_outside_that_are_in_conflict_with_the_solution_join_the_good_lis
 
 
 def test_a_session_whose_conflict_is_gone_changes_nothing() -> None:
-    robot = agent(graph_team(["AB"]), "RA")
-    robot.repairs = 9
-    replies(robot)
+    robot = session()
     assert replies(robot, ("RB", Evaluation(1, 1, 1, (table("RA", "RB"),)))) == [("RB", Release({}))]
     assert robot.holder is None
 
@@ -189,7 +179,7 @@ def test_a_mediator_that_is_refused_releases_all_and_asks_again_when_the_other_i
     assert replies(robot, ("RB", Free())) == again
 
 
-@pytest.mark.parametrize(
+@looped(
     "message",
     [
         Evaluation(1, 0, 0, ()),
@@ -203,19 +193,16 @@ def test_a_mediator_that_is_refused_releases_all_and_asks_again_when_the_other_i
     ],
 )
 def test_what_cannot_be_is_refused(message: Message) -> None:
-    robot = agent(graph_team(["AB"]), "RA")
-    robot.repairs = 9
-    replies(robot)
+    robot = session()
     with pytest.raises(ValueError, match=r"."):
         replies(robot, ("RB", message))
 
 
-@pytest.mark.parametrize(
-    ("sizes", "allowed"), [((2, 2), b"\x00\x00"), ((2, 2), b""), ((2,), b"\x00"), ((0, 2), b""), ((2**40, 2), b"\x01")]
-)
-def test_a_table_says_what_it_holds(sizes: tuple[int, ...], allowed: bytes) -> None:
-    with pytest.raises(ValueError, match="a table"):
-        Table(("RA", "RB"), sizes, allowed)
+def test_a_table_says_what_it_holds() -> None:
+    wrong = (((2, 2), b"\x00\x00"), ((2, 2), b""), ((2,), b"\x00"), ((0, 2), b""), ((2**40, 2), b"\x01"))
+    for sizes, allowed in wrong:
+        with pytest.raises(ValueError, match="a table"):
+            Table(("RA", "RB"), sizes, allowed)
 
 
 def random_tables(chance: Random, names: str) -> list[Table]:

@@ -25,6 +25,7 @@ from robochoc.run.options import Withdrawal
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from tests.support.agents import replies
 from tests.support.brute_force import priced_solutions
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.dpop_robots import FEW, products
@@ -80,19 +81,12 @@ def test_costs_are_followed_by_numbers() -> None:
     ]
 
 
-def test_numbers_of_equal_least_cost_are_added() -> None:
-    robot = root()
-    replies(robot, ("RB", UTIL(1, bytes([4, 4]))))
-    assert replies(robot, ("RB", Counts(1, bytes([2, 3])))) == [("RB", VALUE([0]))]
-    assert robot.count == 5
-    assert robot.findings.count == "5"
-    assert robot.findings.bound == 4
-
-
-def test_numbers_of_dearer_values_are_not() -> None:
-    robot = root()
-    replies(robot, ("RB", UTIL(1, bytes([5, 4]))), ("RB", Counts(1, bytes([2, 3]))))
-    assert robot.count == 3
+def test_numbers_of_equal_least_cost_are_added_and_those_of_dearer_values_are_not() -> None:
+    for costs, place, number in (([4, 4], 0, 5), ([5, 4], 1, 3)):
+        robot = root()
+        replies(robot, ("RB", UTIL(1, bytes(costs))))
+        assert replies(robot, ("RB", Counts(1, bytes([2, 3])))) == [("RB", VALUE([place]))]
+        assert (robot.count, robot.findings.count, robot.findings.bound) == (number, str(number), 4)
 
 
 def test_numbers_of_children_are_multiplied() -> None:
@@ -112,7 +106,7 @@ def test_without_any_solution_there_are_none() -> None:
     assert robot.count == 0
 
 
-@pytest.mark.parametrize(
+@looped(
     ("message", "why"),
     [
         (Counts(1, bytes([1])), None),
@@ -138,12 +132,9 @@ def test_numbers_before_their_costs_are_refused() -> None:
         replies(root(), ("RB", Counts(1, bytes([1, 1]))))
 
 
-def test_numbers_that_could_be_too_long_end_the_run() -> None:
+def test_numbers_that_could_be_too_long_end_the_run_and_they_are_part_of_the_memory_need() -> None:
     with pytest.raises(TooLargeError, match="1,048,576 bits"):
         root(MOST_BITS)
-
-
-def test_numbers_are_part_of_the_memory_need() -> None:
     robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B")
     equip(robot, {"memory": "100000"})
     with pytest.raises(TooLargeError, match="needs"):
@@ -188,15 +179,12 @@ def test_the_number_is_written_whatever_its_length() -> None:
     assert "0,000 optima of cost 7" in outcome_report(free_team(1), outcome)
 
 
-def test_processes_report_it_too() -> None:
+def test_processes_report_it_too_and_nobody_is_told_without_asking() -> None:
     assert solve(free_team(2), Options(protocol="count-dpop", count=True)).count == 9
+    assert solve(free_team(2), replace(IN_SIMULATOR, count=False)).count is None
 
 
-def test_nobody_is_told_without_asking() -> None:
-    assert solve(free_team(2), Options(protocol="count-dpop", runtime=Runtime.SIMULATOR)).count is None
-
-
-@pytest.mark.parametrize(
+@looped(
     ("options", "why"),
     [
         (Options(protocol="dpop", count=True), "--count is for --protocol central, or count-dpop"),
@@ -209,7 +197,7 @@ def test_counting_is_refused_where_nobody_counts(options: Options, why: str) -> 
         solve(free_team(2), options)
 
 
-@pytest.mark.parametrize("count", ["", "-1", "x", "1 "])
-def test_a_number_that_is_none_is_a_lie(count: str) -> None:
-    assert fault_of_findings(Findings(count=count), ()) == "it tells of a number that is none"
+def test_a_number_that_is_none_is_a_lie() -> None:
+    for told in ("", "-1", "x", "1 "):
+        assert fault_of_findings(Findings(count=told), ()) == "it tells of a number that is none"
     assert not fault_of_findings(Findings(count="1f"), ())

@@ -9,8 +9,6 @@ import pytest
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
-from robochoc.model.message import Message
-from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.local_search.d_gibbs import DGibbs
 from robochoc.protocols.local_search.messages.d_gibbs import Difference, Finish, Value
@@ -19,11 +17,11 @@ from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.run.incumbent import costs_by_cycle
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.support.agents import replies, value
+from tests.support.agents import replies, sent, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, cost_of_assignment, domains_of, played
-from tests.support.problems import team_of
 from tests.support.pseudo_trees import priced, unplaced
 
 PRICES = {"AB": [0, 5, 5, 0], "BC": [0, 3, 3, 0]}
@@ -41,42 +39,30 @@ def robot(name: str, *chances: float, cycles: int = 100, temperature: float = 1.
     return made
 
 
-def said(made: DGibbs) -> list[tuple[str, Message]]:
-    told = list(made.outbox)
-    made.outbox.clear()
-    return told
-
-
 def test_the_first_value_is_drawn_and_told_to_those_above() -> None:
-    assert said(robot("B", 0.9)) == [("RA", Value((2,), True))]
-    assert said(robot("A", 0.9)) == []
+    assert sent(robot("B", 0.9)) == [("RA", Value((2,), True))]
+    assert sent(robot("A", 0.9)) == []
 
 
-def test_the_root_draws_when_those_below_have_told_their_values() -> None:
+def test_a_robot_draws_when_those_above_have_drawn_and_those_below_have_told_their_values() -> None:
     made = robot("A", 0.9)
     assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), True))]
-
-
-def test_others_draw_when_those_above_have_drawn_and_those_below_have_told_their_values() -> None:
     made = robot("B")
-    said(made)
+    sent(made)
     assert replies(made, ("RC", Value((1,), True))) == []
     drawn = Value((1,), False)
     assert replies(made, ("RA", Value((1,), False))) == [("RA", drawn), ("RC", drawn)]
 
 
-@pytest.mark.parametrize(("lot", "drawn"), [(0.0, 1), (0.992, 1), (0.994, 2)])
-def test_a_value_is_drawn_by_what_it_costs_with_the_neighbours_values(lot: float, drawn: int) -> None:
-    """1 costs nothing and 2 costs 5: 1 is drawn with the probability 1 / (1 + e^-5), which is 0.9933."""
-    made = robot("A", 0.0, lot)
-    replies(made, ("RB", Value((1,), True)))
-    assert value(made) == (drawn,)
+def test_a_value_is_drawn_by_what_it_costs_with_the_neighbours_values() -> None:
+    """1 costs nothing and 2 costs 5: 1 is drawn with the probability 1 / (1 + e^-5), which is 0.9933.
 
-
-def test_where_it_is_hot_all_values_are_alike() -> None:
-    made = robot("A", 0.0, 0.51, temperature=1e9)
-    replies(made, ("RB", Value((1,), True)))
-    assert value(made) == (2,)
+    Where it is hot, all values are alike.
+    """
+    for lot, temperature, drawn in ((0.0, 1, 1), (0.992, 1, 1), (0.994, 1, 2), (0.51, 1e9, 2)):
+        made = robot("A", 0.0, lot, temperature=temperature)
+        replies(made, ("RB", Value((1,), True)))
+        assert value(made) == (drawn,)
 
 
 def test_what_breaks_a_hard_constraint_is_drawn_seldom() -> None:
@@ -91,7 +77,7 @@ def test_what_breaks_a_hard_constraint_is_drawn_seldom() -> None:
 
 def test_a_leaf_tells_at_once_by_how_much_the_cost_has_changed() -> None:
     made = robot("C", 0.9)
-    said(made)
+    sent(made)
     assert replies(made, ("RB", Value((1,), False)))[-1] == ("RB", Difference(0, -3))
 
 
@@ -101,30 +87,24 @@ def test_others_add_up_what_their_children_tell() -> None:
     assert replies(made, ("RC", Value((1,), False)), ("RC", Difference(0, 2))) == [("RA", Difference(0, -6))]
 
 
-@pytest.mark.parametrize(("change", "kept"), [(-4, True), (5, False)])
-def test_the_root_tells_with_the_next_value_whether_the_sample_was_the_best(change: int, kept: bool) -> None:  # noqa: FBT001
-    made = robot("A")
-    replies(made, ("RB", Value((1,), True)))
-    told = replies(made, ("RB", Value((1,), True)), ("RB", Difference(0, change)))
-    assert told == [("RB", Value((1,), kept))]
+def test_the_root_tells_with_the_next_value_whether_the_sample_was_the_best() -> None:
+    """The next sample waits for the values of all below."""
+    for change, kept in ((-4, True), (5, False)):
+        made = robot("A")
+        replies(made, ("RB", Value((1,), True)))
+        assert replies(made, ("RB", Difference(0, change))) == []
+        assert made.cycle == 1
+        assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), kept))]
 
 
-def test_the_next_sample_waits_for_the_values_of_all_below() -> None:
-    made = robot("A")
-    replies(made, ("RB", Value((1,), True)))
-    assert replies(made, ("RB", Difference(0, 0))) == []
-    assert made.cycle == 1
-    assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), False))]
-
-
-@pytest.mark.parametrize(("kept", "best"), [(True, 2), (False, 1)])
-def test_at_the_end_all_take_their_values_of_the_best_sample(kept: bool, best: int) -> None:  # noqa: FBT001
-    made = robot("B", 0.0, 0.999, cycles=1)
-    replies(made, ("RC", Value((1,), True)), ("RA", Value((2,), True)))
-    assert value(made) == (2,)
-    replies(made, ("RC", Value((1,), True)), ("RC", Difference(0, 0)))
-    assert replies(made, ("RA", Finish(kept))) == [("RC", Finish(kept))]
-    assert value(made) == (best,)
+def test_at_the_end_all_take_their_values_of_the_best_sample() -> None:
+    for kept, best in ((True, 2), (False, 1)):
+        made = robot("B", 0.0, 0.999, cycles=1)
+        replies(made, ("RC", Value((1,), True)), ("RA", Value((2,), True)))
+        assert value(made) == (2,)
+        replies(made, ("RC", Value((1,), True)), ("RC", Difference(0, 0)))
+        assert replies(made, ("RA", Finish(kept))) == [("RC", Finish(kept))]
+        assert value(made) == (best,)
 
 
 def test_what_cannot_be_is_refused() -> None:
@@ -133,18 +113,6 @@ def test_what_cannot_be_is_refused() -> None:
         replies(made, ("RA", Difference(0, 0)))
     with pytest.raises(ValueError, match="RC is not the parent of RB"):
         replies(made, ("RC", Finish(True)))
-
-
-def test_a_robot_alone_takes_its_cheapest_value() -> None:
-    made = unplaced(DGibbs, priced("A", {"A": [4, 0]}), "RA")
-    made.start()
-    assert made.assignment == {"A": 2}
-
-
-def test_a_robot_with_an_empty_domain_ends_the_search() -> None:
-    made = unplaced(DGibbs, team_of({"A": ()}, []), "RA")
-    made.start()
-    assert made.verdict is Verdict.NO_SOLUTION
 
 
 @count("teams", 15, 250)
@@ -186,7 +154,7 @@ def test_a_cycle_takes_two_messages_for_each_link_and_one_for_each_child(teams: 
         assert (kinds.count("Difference"), kinds.count("Finish")) == (7 * children, children)
 
 
-@pytest.mark.parametrize("setting", ["temperature=0", "cooling=0", "cooling=1.1", "hard=-1", "temperature=inf"])
+@looped("setting", ["temperature=0", "cooling=0", "cooling=1.1", "hard=-1", "temperature=inf"])
 def test_settings_that_cannot_be_are_refused(setting: str) -> None:
     name, number = setting.split("=")
     with pytest.raises(SettingsError, match="it must be"):

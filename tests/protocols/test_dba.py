@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 from random import Random
 
-import pytest
-
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -17,7 +15,8 @@ from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.verification.checker import violations
-from tests.support.agents import replies, robot_of, started, value
+from tests.support.agents import replies, started_robot, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule
@@ -33,9 +32,7 @@ def path(*names: str, relation: Relation = DIFFERENT, values: int = 2) -> Team:
 
 def middle(*chances: float, relation: Relation = DIFFERENT, values: int = 2) -> DBA:
     """B between A and C, with the value 1."""
-    it = robot_of(DBA, path("A", "B", "C", relation=relation, values=values), "RB", 0.0, *chances)
-    started(it)
-    return it
+    return started_robot(DBA, path("A", "B", "C", relation=relation, values=values), "RB", 0.0, *chances)
 
 
 def hears(it: DBA, left: int, right: int) -> Improve:
@@ -48,13 +45,9 @@ def is_told(it: DBA, left: Improve, right: Improve) -> None:
     replies(it, ("RA", left), ("RC", right))
 
 
-def test_the_largest_reduction_of_weights_is_told() -> None:
-    assert hears(middle(), 1, 1) == Improve(2, 2, 0)
-    assert hears(middle(), 1, 2) == Improve(0, 1, 0)
-    assert hears(middle(), 2, 2) == Improve(0, 0, 0)
-
-
-def test_who_misses_a_value_tells_that_something_may_be_violated() -> None:
+def test_the_largest_reduction_of_weights_is_told_and_that_something_may_be_violated_where_a_value_is_missed() -> None:
+    for left, right, told in ((1, 1, Improve(2, 2, 0)), (1, 2, Improve(0, 1, 0)), (2, 2, Improve(0, 0, 0))):
+        assert hears(middle(), left, right) == told
     robot = middle()
     robot.miss("RC")
     (_, said), _ = replies(robot, ("RA", Value((2,))))
@@ -66,17 +59,14 @@ def test_who_misses_a_reduction_stays_and_counts_from_0_and_does_not_give_up_for
     class Short(DBA):
         settings = DBASettings(cycles=1)
 
-    robot = robot_of(Short, path("A", "B", "C"), "RB", 0.0)
-    started(robot)
+    robot = started_robot(Short, path("A", "B", "C"), "RB", 0.0)
     hears(robot, 1, 1)
     robot.miss("RA")
     replies(robot, ("RC", Improve(0, 1, 0)))
     assert (value(robot), robot.counter, robot.verdict) == ((1,), 0, None)
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "moves"), [(1, 1, True), (1, 2, True), (2, 1, False), (3, 0, False), (0, 3, False)]
-)
+@looped(("left", "right", "moves"), [(1, 1, True), (1, 2, True), (2, 1, False), (3, 0, False), (0, 3, False)])
 def test_who_reduces_most_moves_and_of_equals_the_first(left: int, right: int, moves: bool) -> None:  # noqa: FBT001
     it = middle()
     hears(it, 1, 1)

@@ -6,13 +6,22 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
-from typing import NamedTuple
 
-from robochoc.generators.random_csp import random_csp
+from robochoc.model.assembly import Extras, assemble
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Relation, Semantics, Team
-from robochoc.run import Options, Runtime, solve
+from robochoc.model.problem import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    Domain,
+    ProblemKind,
+    Relation,
+    Semantics,
+    Team,
+    Variable,
+)
+from robochoc.run import Options, solve
 from robochoc.run.registry import protocol_named
 from tests.support.cost_problems import MAX_COST, random_cost_team, soft_table, softened
 from tests.support.loose_problems import loosened, minimum_cost, several_variables_team
@@ -112,19 +121,16 @@ def priced_part(scope: str, costs: Mapping[tuple[int, int], float]) -> Constrain
     return Constraint(scope, relation, tuple(scope), tuple(scope))
 
 
-class Spent(NamedTuple):
-    """The sums over some runs."""
+def two_valued(names: str, parts: Mapping[str, Sequence[Constraint]]) -> Team:
+    """Return robots RA, RB, ... for the letters of `names`, of the values 1 and 2, with their parts of constraints."""
+    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in names}
+    return assemble("asymmetric", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
 
-    messages: int
-    ncccs: int
 
-
-def spent_on_asymmetric(protocol: str) -> Spent:
-    """Return what `protocol` needs for three connected problems of six robots, always the same ones."""
-    messages = ncccs = 0
-    for seed in range(3):
-        team = random_csp(6, 3, 0.6, 0, seed, connected=True, max_cost=20, asymmetric=True)
-        metrics = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False)).metrics
-        messages += sum(metrics.messages.values())
-        ncccs += metrics.ncccs
-    return Spent(messages, ncccs)
+def divided_pair() -> Team:
+    """A pays 3 for (1, 1) and 1 for (1, 2); B pays 2 for (1, 2), 5 for (2, 1) and 9 for (2, 2)."""
+    parts = {
+        "RA": [priced_part("AB", {(1, 1): 3, (1, 2): 1})],
+        "RB": [priced_part("AB", {(2, 1): 5, (1, 2): 2, (2, 2): 9})],
+    }
+    return two_valued("AB", parts)
