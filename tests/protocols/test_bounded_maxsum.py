@@ -93,8 +93,12 @@ def test_the_weight_of_a_dependency_is_the_largest_difference_that_a_value_makes
     What is always forbidden, such as A's 2, makes no difference, and what sometimes is an infinite one.
     """
     equal = Relation("E", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
-    for relation, weight, least in ((COSTS, 2, [1, 4]), (HARD, 0, [0, INFINITE]), (equal, INFINITE, [])):
-        assert replies(robot(pair(relation), "RB"), ("RA", TWO))[0] == ("RA", Dependency(weight, least))
+    for relation, told in (
+        (COSTS, Dependency(2, [1, 4])),
+        (HARD, Dependency(0, [0, INFINITE])),
+        (equal, Dependency(INFINITE, [])),
+    ):
+        assert replies(robot(pair(relation), "RB"), ("RA", TWO))[0] == ("RA", told)
     alone = robot(team_of({"C": (1, 2)}, []), "RC")
     assert (alone.optimum, alone.assignment) == (0, {"C": 1})
 

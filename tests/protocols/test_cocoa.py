@@ -78,9 +78,9 @@ def test_an_idle_robot_becomes_active_when_a_neighbour_has_chosen_or_waits_and_a
     for news, asked in ((SetValue((1,)), [("RC", Inquiry(TWO, {"RA": (1,)}))]), (Hold(), both)):
         robot = idle("RB")
         replies(robot, ("RA", Inquiry(TWO, {})))
-        assert robot.state is State.IDLE, "a neighbour only asks"
+        states = [robot.state]
         assert replies(robot, ("RA", news)) == asked
-        assert robot.state is State.ACTIVE
+        assert [*states, robot.state] == [State.IDLE, State.ACTIVE]
 
 
 def test_when_all_have_answered_the_value_with_the_least_sum_is_taken_and_told() -> None:
@@ -181,10 +181,13 @@ def test_the_asker_adds_its_own_side_at_the_values_that_it_is_told() -> None:
 
 
 def test_who_is_done_tells_what_its_side_charges_with_its_value() -> None:
-    for costs, side in (([(0, 9), (0, 0)], [(0, 0), (0, 0)]), ([(0, 0), (0, 9)], [(0, 3), (0, 1)])):
+    for told, side in (
+        (CostsAt([(0, 9), (0, 0)], [(1,), (1,)]), FinalSide([(0, 0), (0, 0)])),
+        (CostsAt([(0, 0), (0, 9)], [(1,), (1,)]), FinalSide([(0, 3), (0, 1)])),
+    ):
         robot = asking()
-        replies(robot, ("RB", CostsAt(costs, [(1,), (1,)])))
-        assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", FinalSide(side))]
+        replies(robot, ("RB", told))
+        assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", side)]
 
 
 def test_a_neighbour_with_a_part_that_is_done_is_asked_and_its_side_counts() -> None:

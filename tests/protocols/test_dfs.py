@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import partial
 from random import Random
 from typing import ClassVar
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.run_result import RunResult
-from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.graphs import grid
 from robochoc.generators.random_csp import random_on
@@ -26,11 +27,11 @@ from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import Back, Token, TreeMessage, Wave
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.examples import count, examples
 from tests.support.limits import HANG_S
+from tests.support.local_search_runs import any_schedule
 from tests.support.problems import team_of
 
 
@@ -130,33 +131,24 @@ def above(places: Mapping[str, PseudoTreeNode], name: str) -> Iterator[str]:
         parent = places[parent].parent
 
 
-def played(team: Team, schedule: Schedule) -> tuple[RunResult, dict[str, Greeter]]:
+def played(team: Team, chance: Random) -> tuple[RunResult, dict[str, Greeter]]:
     Greeter.made.clear()
-    return Simulation(team, Greeter, schedule).search(), dict(Greeter.made)
-
-
-def schedule_of(chance: Random) -> Schedule:
-    seed = chance.getrandbits(32)
-    return RandomChannels(seed) if chance.random() < 0.5 else Concurrent(seed, chance.choice((0, 3, 20, 200)))
+    return Simulation(team, Greeter, any_schedule(chance)).search(), dict(Greeter.made)
 
 
 @given(chance=st.randoms(use_true_random=False))
 @examples(100)
 def test_every_schedule_builds_the_tree_of_a_depth_first_search(chance: Random) -> None:
-    """The root has the most neighbours of its part, a token goes to the neighbour with the most; ties by priority."""
+    """The root has the most neighbours of its part, a token goes to the neighbour with the most; ties by priority.
+
+    Neighbours stand one above the other: all robots of an n-ary constraint on one branch, as any two of them do. A
+    token passes twice between a robot and its parent, and a wave along each edge both ways.
+    """
     team = random_graph(chance)
-    result, _ = played(team, schedule_of(chance))
+    result, robots = played(team, chance)
     assert result.verdict is Verdict.SOLUTION
-    assert {name: found.place for name, found in result.findings.items()} == expected(team)
-
-
-@given(chance=st.randoms(use_true_random=False))
-@examples(60)
-def test_neighbours_stand_one_above_the_other(chance: Random) -> None:
-    """All robots of an n-ary constraint stand on one branch, as any two of them do."""
-    team = random_graph(chance)
-    result, robots = played(team, schedule_of(chance))
     places = {name: found.place for name, found in result.findings.items() if found.place is not None}
+    assert places == expected(team)
     met = neighbours_of(team)
     for name, robot in robots.items():
         ancestors = set(above(places, name))
@@ -167,21 +159,10 @@ def test_neighbours_stand_one_above_the_other(chance: Random) -> None:
         assert set(robot.children) == {other for other, place in places.items() if place.parent == name}
         for names in (robot.pseudo_parents, robot.children, robot.pseudo_children):
             assert list(names) == sorted(names, key=team.order.index)
-
-
-@given(chance=st.randoms(use_true_random=False))
-@examples(60)
-def test_a_token_passes_twice_between_a_robot_and_its_parent_and_a_wave_along_each_edge_both_ways(
-    chance: Random,
-) -> None:
-    team = random_graph(chance)
-    result, robots = played(team, schedule_of(chance))
-    joined = sum(robot.parent is not None for robot in robots.values())
-    edges = sum(map(len, neighbours_of(team).values()))
-    messages = result.metrics.messages
-    assert messages.get("Token", 0) == messages.get("Back", 0) == joined
-    assert messages.get("Wave", 0) >= edges
-    assert messages.get("Hello", 0) == edges
+    joined, edges = sum(robot.parent is not None for robot in robots.values()), sum(map(len, met.values()))
+    messages = Counter(result.metrics.messages)
+    assert (messages["Token"], messages["Back"], messages["Hello"]) == (joined, joined, edges)
+    assert messages["Wave"] >= edges
 
 
 @given(chance=st.randoms(use_true_random=False))
@@ -217,7 +198,7 @@ def test_the_token_names_who_is_in_the_tree_while_a_neighbour_has_not_heard_so(c
             heard[name].add(event.receiver)
             parents[event.receiver] = name
 
-    Simulation(team, Greeter, schedule_of(chance), observer=look).search()
+    Simulation(team, Greeter, any_schedule(chance), observer=look).search()
 
 
 def test_on_a_path_the_token_names_one_robot_at_most() -> None:
@@ -240,7 +221,7 @@ def test_each_begins_once_and_what_comes_early_is_kept_for_then(teams: int) -> N
     early = 0
     for _ in range(teams):
         team = random_graph(chance)
-        _, robots = played(team, schedule_of(chance))
+        _, robots = played(team, chance)
         met = neighbours_of(team)
         for name, robot in robots.items():
             assert robot.begun == 1
@@ -251,21 +232,14 @@ def test_each_begins_once_and_what_comes_early_is_kept_for_then(teams: int) -> N
 
 
 def test_unconnected_parts_have_a_root_each() -> None:
-    result, _ = played(graph("ABCDEF", "AB BC DE"), RandomChannels(0))
+    result, _ = played(graph("ABCDEF", "AB BC DE"), Random(0))
     places = {name: found.place for name, found in result.findings.items()}
-    assert places == {
-        "RA": PseudoTreeNode("RB"),
-        "RB": PseudoTreeNode(None),
-        "RC": PseudoTreeNode("RB"),
-        "RD": PseudoTreeNode(None),
-        "RE": PseudoTreeNode("RD"),
-        "RF": PseudoTreeNode(None),
-    }
+    parents = {"RA": "RB", "RB": None, "RC": "RB", "RD": None, "RE": "RD", "RF": None}
+    assert places == {name: PseudoTreeNode(parent) for name, parent in parents.items()}
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_processes_build_the_same_tree(seed: int) -> None:
-    team = random_graph(Random(f"processes {seed}"))
+def test_processes_build_the_same_tree() -> None:
+    team = random_graph(Random("processes 1"))
     outcome = solve(team, Options(protocol="adopt", runtime=Runtime.PROCESSES, timeout=HANG_S))
     assert outcome.tree == expected(team)
 
@@ -276,62 +250,44 @@ TEAM = graph("ABCDE", "AB BC BD CD DE")
 """B and D have three neighbours, C has two; A and E are leaves."""
 
 
-def robot(name: str, team: Team = TEAM) -> Greeter:
-    return Greeter(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
-
-
-def started(name: str) -> Greeter:
-    """The protocol object of one robot, started, with nothing left to say."""
-    greeter = robot(name)
-    greeter.start()
-    greeter.outbox.clear()
-    return greeter
+agent = partial(started_robot, Greeter, TEAM)
 
 
 def test_every_robot_stands_for_election() -> None:
-    greeter = robot("RC")
-    greeter.start()
-    assert greeter.outbox == [("RB", Wave(2, "RC")), ("RD", Wave(2, "RC"))]
+    greeter = robot_of(Greeter, TEAM, "RC")
+    assert started(greeter) == [("RB", Wave(2, "RC")), ("RD", Wave(2, "RC"))]
     assert greeter.findings == Findings()
 
 
 def test_a_robot_alone_is_its_own_tree_and_says_nothing() -> None:
-    greeter = robot("RA", graph("AB", ""))
-    greeter.start()
-    assert greeter.outbox == []
+    greeter = robot_of(Greeter, graph("AB", ""), "RA")
+    assert started(greeter) == []
     assert (greeter.begun, greeter.decided) == (1, 1)
     assert greeter.findings.place == PseudoTreeNode(None)
 
 
 def test_a_robot_without_values_ends_the_search() -> None:
-    team = team_of({"A": (), "B": (1,)}, [])
-    greeter = robot("RA", team)
-    greeter.start()
+    greeter = started_robot(Greeter, team_of({"A": (), "B": (1,)}, []), "RA")
     assert greeter.verdict is Verdict.NO_SOLUTION
     assert replies(greeter, ("RB", Wave(1, "RB"))) == []
     assert greeter.begun == 0
 
 
-def test_a_stronger_candidate_s_wave_goes_on() -> None:
-    assert replies(started("RC"), ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
-
-
-@pytest.mark.parametrize("weaker", [Wave(1, "RA"), Wave(3, "RD")])
-def test_a_weaker_candidate_s_wave_ends(weaker: Wave) -> None:
+def test_a_stronger_candidate_s_wave_goes_on_and_a_weaker_one_s_ends() -> None:
     """Of equals, the one that is lower in the order is weaker."""
-    greeter = started("RC")
-    replies(greeter, ("RB", Wave(3, "RB")))
-    assert replies(greeter, ("RD", weaker)) == []
+    for weaker in (Wave(1, "RA"), Wave(3, "RD")):
+        greeter = agent("RC")
+        assert replies(greeter, ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
+        assert replies(greeter, ("RD", weaker)) == []
 
 
 def test_back_from_all_neighbours_a_wave_goes_back_to_who_told_it_first() -> None:
-    greeter = started("RC")
-    said = replies(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")), ("RD", Wave(3, "RB")))
+    said = replies(agent("RC"), ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")), ("RD", Wave(3, "RB")))
     assert said == [("RD", Wave(3, "RB")), ("RB", Wave(3, "RB"))]
 
 
 def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_the_token() -> None:
-    greeter = started("RB")
+    greeter = agent("RB")
     others = (("RA", Wave(1, "RA")), ("RC", Wave(2, "RC")), ("RD", Wave(3, "RD")))
     assert replies(greeter, *others) == []
     own = Wave(3, "RB")
@@ -340,7 +296,7 @@ def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_th
 
 
 def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
-    greeter = started("RC")
+    greeter = agent("RC")
     replies(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
     said = replies(greeter, ("RD", Token({"RB": 1, "RD": 1})))
     assert said[0] == ("RD", Back({"RC": 1}))
@@ -348,7 +304,7 @@ def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
 
 
 def test_a_robot_begins_when_all_below_it_have_their_places() -> None:
-    greeter = started("RD")
+    greeter = agent("RD")
     waves = (("RB", Wave(3, "RB")), ("RC", Wave(2, "RC")), ("RE", Wave(1, "RE")))
     replies(greeter, *waves)
     assert replies(greeter, ("RB", Token({"RB": 2})), ("RC", Hello())) == [("RC", Token({"RB": 1, "RD": 1}))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given
@@ -14,18 +15,21 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
 from robochoc.model.message import Envelope
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from tests.support import golden
+from tests.support.cases import cases, looped
 from tests.support.examples import examples
 from tests.support.problems import team_of, teams
 from tests.support.steps import steps_of
 
+IN_SIMULATOR = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 
-@pytest.mark.parametrize(
+
+@looped(
     ("n", "model", "messages", "ncccs", "checks"),
     [
         (4, "planar", {"AddLink": 6, "Nogood": 77, "Ok": 573}, 77, 875),
@@ -34,58 +38,63 @@ from tests.support.steps import steps_of
     ],
 )
 def test_counts_of_queens_are_exact(n: int, model: str, messages: dict[str, int], ncccs: int, checks: int) -> None:
-    spent = solve(queens3d(n, model), Options(protocol="abt", runtime=Runtime.SIMULATOR)).metrics
-    assert (spent.messages, spent.ncccs, spent.checks) == (messages, ncccs, checks)
+    metrics = solve(queens3d(n, model), IN_SIMULATOR).metrics
+    assert (metrics.messages, metrics.ncccs, metrics.checks) == (messages, ncccs, checks)
 
 
-@pytest.mark.parametrize("file", golden.files())
-def test_journals_are_as_they_were(file: str) -> None:
-    assert golden.content(file) == (golden.FOLDER / file).read_bytes()
+@pytest.mark.parametrize("protocol", sorted(folder.name for folder in golden.FOLDER.iterdir()))
+def test_journals_are_as_they_were(protocol: str) -> None:
+    ours = [file for file in golden.files() if file.startswith(f"{protocol}/")]
+    assert {f"{protocol}/{path.name}" for path in (golden.FOLDER / protocol).iterdir()} == {*ours}
+    with cases() as each:
+        for file in ours:
+            with each(file):
+                assert golden.content(file) == (golden.FOLDER / file).read_bytes()
+
+
+def test_each_protocol_has_golden_journals() -> None:
+    assert {file.partition("/")[0] for file in golden.files()} == {folder.name for folder in golden.FOLDER.iterdir()}
 
 
 @given(team=teams, seed=st.integers(0, 2**32), schedule=st.sampled_from(list(ScheduleName)))
 @examples(50)
 def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
     delay = seed % 30 if schedule is ScheduleName.CONCURRENT else 0
-    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, seed=seed, schedule=schedule, delay=delay)
-    once, again = (recorded(team, options) for _ in range(2))
-    assert once == again
+    once, again = (recorded(team, replace(IN_SIMULATOR, seed=seed, schedule=schedule, delay=delay)) for _ in range(2))
+    assert once.events == again.events
 
 
 @given(team=teams, seed=st.integers(0, 2**32))
 @examples(50)
 def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
-    recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=seed))
-    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL)
-    spent = solve(team, options, observer=recorder).metrics
-    read = metrics_of(read_journal(recorder.content()).events)
-    assert replace(read, wall_s=spent.wall_s) == spent
+    once = recorded(team, replace(IN_SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL))
+    assert replace(once.read, wall_s=once.metrics.wall_s) == once.metrics
 
 
-def recorded(team: Team, options: Options) -> list[bytes]:
+class Recorded(NamedTuple):
+    """A run, its journal line by line, and the metrics that the journal says."""
+
+    metrics: Metrics
+    events: list[bytes]
+    read: Metrics
+
+
+def recorded(team: Team, options: Options) -> Recorded:
     recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=options.seed))
-    solve(team, options, observer=recorder)
-    return [*lines_of(read_journal(recorder.content()))]
+    metrics = solve(team, options, observer=recorder).metrics
+    journal = read_journal(recorder.content())
+    return Recorded(metrics, [*lines_of(journal)], metrics_of(journal.events))
 
 
-def test_other_seeds_are_other_runs() -> None:
-    counts = {
-        sum(solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR, seed=seed)).metrics.messages.values())
-        for seed in range(5)
-    }
-    assert len(counts) > 1
+def test_other_seeds_are_other_runs_and_delays_go_into_the_clock() -> None:
+    runs = [solve(queens3d(4), replace(IN_SIMULATOR, seed=seed)).metrics for seed in range(5)]
+    assert len({sum(metrics.messages.values()) for metrics in runs}) > 1
+    assert solve(queens3d(4), replace(IN_SIMULATOR, delay=1000)).metrics.ncccs > 10 * runs[0].ncccs
 
 
-def test_delays_go_into_the_clock() -> None:
-    quick, slow = (
-        solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR, delay=delay)).metrics.ncccs
-        for delay in (0, 1000)
-    )
-    assert slow > 10 * quick
-
-
+@pytest.mark.usefixtures("a_second_a_look")
 def test_a_timeout_is_an_unknown() -> None:
-    outcome = solve(queens3d(8), Options(protocol="abt", runtime=Runtime.SIMULATOR, timeout=0.05))
+    outcome = solve(queens3d(8), replace(IN_SIMULATOR, timeout=0.05))
     assert outcome.verdict is Verdict.UNKNOWN
     assert not outcome.assignment
     assert not outcome.verified
@@ -95,8 +104,7 @@ def test_a_timeout_holds_where_a_packet_takes_long() -> None:
     """The first one alone takes half an hour, and proves then that there is no solution."""
     never = Relation("R", 2, Semantics.SUPPORTS, ((-1, -1),))
     team = team_of({"X": range(20_000), "Y": range(20_000)}, [Constraint("C", never, ("X", "Y"), ("X", "Y"))])
-    outcome = solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, timeout=0.3))
-    assert outcome.verdict is Verdict.UNKNOWN
+    assert solve(team, replace(IN_SIMULATOR, timeout=0.3)).verdict is Verdict.UNKNOWN
 
 
 @given(
@@ -139,12 +147,9 @@ def test_a_cycle_takes_no_longer_than_those_before() -> None:
 
 def test_one_by_one_abt_needs_more() -> None:
     team = random_csp(12, 5, 0.5, 0.4, 1, connected=True)
-    found = [
-        solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, schedule=name))
-        for name in list(ScheduleName)[:2]
-    ]
-    assert found[0].verdict is found[1].verdict
-    assert found[1].metrics.ncccs > found[0].metrics.ncccs
+    one, other = (solve(team, replace(IN_SIMULATOR, schedule=name)) for name in list(ScheduleName)[:2])
+    assert one.verdict is other.verdict
+    assert other.metrics.ncccs > one.metrics.ncccs
 
 
 def delivered(schedule: Schedule, sends: list[tuple[str, str, int]]) -> list[Envelope]:
