@@ -207,10 +207,7 @@ def test_an_unknown_field_has_its_line_and_the_nearest_name(tmp_path: Path) -> N
         ("latency_ms = 5\n\nlos = 0.1\n", 3),
         ("latency_ms = 5\nbursts = { begin = 0.1, end = 0.5, los = 1 }\n", 2),
         ("latency_ms = 5\n[bursts]\nbegin = 0.1\nend = 0.5\nlos = 1\n", 5),
-        (
-            'latency_ms = 5\n[[links]]\nbetween = ["A", "B"]\nloss = 1\n[[links]]\nlos = 1\nbetween = ["A", "C"]\n',
-            6,
-        ),
+        ('latency_ms = 5\n[[links]]\nbetween = ["A", "B"]\nloss = 1\n[[links]]\nlos = 1\nbetween = ["A", "C"]\n', 6),
     ]:
         path = tmp_path / "bad.toml"
         path.write_text(text)

@@ -66,10 +66,7 @@ def test_a_result_that_no_robochoc_wrote_is_one_line(
 
 def test_text_that_is_not_utf_8_is_said_to_be_so(four: Path, tmp_path: Path) -> None:
     for words, content in [
-        (
-            ("journal", "show", "{file}"),
-            b'{"event":"Journal","team":"\xff","protocol":"abt","runtime":"s","seed":0}\n',
-        ),
+        (("journal", "show", "{file}"), b'{"event":"Journal","team":"\xff","protocol":"abt","runtime":"s","seed":0}\n'),
         (("solve", "{team}", "--runtime", "simulator", "--channel", "{file}"), b"latency_ms = 1 # \xff"),
         (("solve", "{team}", "--order", "{file}"), b"Robot1.1\xff"),
     ]:
@@ -128,10 +125,7 @@ def test_nothing_is_done_by_half_where_a_path_is_wrong(four: Path, tmp_path: Pat
     for command in [["solve", "--runtime", "simulator"], ["compile"]]:
         status, said = line(*command, four, tmp_path / "missing", tmp_path / "empty")
         assert status == 1
-        assert [part.split(":")[0] for part in said.splitlines()] == [
-            f"{tmp_path}/missing",
-            f"{tmp_path}/empty",
-        ]
+        assert [part.split(":")[0] for part in said.splitlines()] == [f"{tmp_path}/missing", f"{tmp_path}/empty"]
 
 
 def test_nothing_that_is_read_is_written_over(four: Path, tmp_path: Path) -> None:

@@ -171,13 +171,7 @@ def test_a_diagram_has_the_messages_and_decisions_in_their_order(file: Path) -> 
     assert all(trace.robots[int(number)] == name for number, name in named)
     arrows = [match.groups() for line in lines if (match := ARROW.fullmatch(line))]
     assert [(int(a), sign, int(b), int(number), kind) for a, sign, b, number, kind in arrows] == [
-        (
-            of.sender[one],
-            "-x" if of.taken[one] == NOT_YET else "->>",
-            of.receiver[one],
-            one,
-            trace.kinds[of.kind[one]],
-        )
+        (of.sender[one], "-x" if of.taken[one] == NOT_YET else "->>", of.receiver[one], one, trace.kinds[of.kind[one]])
         for one in range(61)
     ]
     notes = [match.groups() for line in lines if (match := NOTE.fullmatch(line))]

@@ -41,11 +41,7 @@ class WarmPrograms:
         with theirs:
             command = [sys.executable, "-m", _MODULE, str(theirs.fileno())]
             self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                cwd=ROOT,
-                pass_fds=[theirs.fileno()],
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, cwd=ROOT, pass_fds=[theirs.fileno()]
             )
 
     def start(

@@ -103,10 +103,7 @@ def test_other_problems_and_rules_of_withdrawal_are_other_questions() -> None:
             },
             {"protocol": "dynabt", "schedule": "random"},
         ),
-        (
-            {"family": "queens3d", "parameters": {"n": 3}},
-            {"protocol": "abt", "withdraw": "minimum", "verify": True},
-        ),
+        ({"family": "queens3d", "parameters": {"n": 3}}, {"protocol": "abt", "withdraw": "minimum", "verify": True}),
     ],
 )
 def test_the_commands_repeat_the_run(

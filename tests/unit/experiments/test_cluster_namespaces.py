@@ -17,10 +17,7 @@ from tests.support.program import robochoc_within
 from tests.support.studies import SMALL, comparable
 
 WHY_NOT = why_not()
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT or "there are namespaces"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT or "there are namespaces")]
 PORT = 8786
 """Nobody else is in the scheduler's namespace."""
 

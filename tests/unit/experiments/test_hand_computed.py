@@ -60,10 +60,7 @@ def account(rows: list[dict[str, Any]]) -> Account:
 
 def test_medians() -> None:
     """Of runs that limits have ended: what they had. A median is open if it would be higher without the limits."""
-    assert summary.medians(study(), "messages", "size") == (
-        ["size", "a", "b"],
-        [["0", "6", "6"], ["1", "3", "0"]],
-    )
+    assert summary.medians(study(), "messages", "size") == (["size", "a", "b"], [["0", "6", "6"], ["1", "3", "0"]])
     assert summary.medians(study(), "cost", "size") == (["size", "a", "b"], [["0", "3", "3"], ["1", "5", "4"]])
     assert summary.medians(study(), "messages", "team")[1][4:6] == [
         ["team5", ">= 50", "8"],

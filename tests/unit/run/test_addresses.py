@@ -24,18 +24,7 @@ def test_a_host_and_perhaps_a_port() -> None:
 
 
 def test_anything_else_is_told_what_was_expected() -> None:
-    for text in [
-        "",
-        ":7447",
-        "host:0",
-        "host:65535",
-        "host:x",
-        "a b:1",
-        "tcp/host:1",
-        "host:7447:1",
-        "-h:1",
-        "h-:1",
-    ]:
+    for text in ["", ":7447", "host:0", "host:65535", "host:x", "a b:1", "tcp/host:1", "host:7447:1", "-h:1", "h-:1"]:
         with pytest.raises(AddressError, match="HOST:PORT"):
             Address.parse(text)
 

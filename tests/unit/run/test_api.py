@@ -122,13 +122,7 @@ def test_the_library_comes_when_it_is_asked_for() -> None:
 
 
 def test_protocols_as_the_paper_calls_them() -> None:
-    for word, name in [
-        ("ABT", "abt"),
-        ("abt", "abt"),
-        ("AFCng", "afc-ng"),
-        ("afc-ng", "afc-ng"),
-        ("MaxSum", "maxsum"),
-    ]:
+    for word, name in [("ABT", "abt"), ("abt", "abt"), ("AFCng", "afc-ng"), ("afc-ng", "afc-ng"), ("MaxSum", "maxsum")]:
         assert protocol_called(word) == name
 
 

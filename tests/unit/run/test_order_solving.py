@@ -11,9 +11,7 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import Order, with_priorities
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import (
-    Team,
-)
+from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.central import CentralAnswer, CentralSolver

@@ -72,11 +72,7 @@ def test_who_was_lost_counts_values_that_are_still_to_come(tmp_path: Path) -> No
         ('objective="maximize"', "", "another objective"),
         ('scale="0.1"', 'scale="0.01"', "finer costs"),
         ('nbValues="3">0..2', ">0..7", "y has new values"),
-        (
-            '<domain name="E" nbValues="3">0..2',
-            '<domain name="E" type="symbolic">u v',
-            "'u' is new to the team",
-        ),
+        ('<domain name="E" nbValues="3">0..2', '<domain name="E" type="symbolic">u v', "'u' is new to the team"),
     ],
 )
 def test_who_reads_costs_otherwise_stays_away(old: str, new: str, why: str, tmp_path: Path) -> None:

@@ -57,18 +57,10 @@ def journal(path: Path) -> None:
 @pytest.mark.parametrize("has_unnamed", [1, 0])
 @pytest.mark.parametrize(
     "write",
-    [
-        pending,
-        journal,
-        lambda path: write_atomically(path, bytes(2 * ROOM)),
-        lambda path: write_team(pair(), path),
-    ],
+    [pending, journal, lambda path: write_atomically(path, bytes(2 * ROOM)), lambda path: write_team(pair(), path)],
 )
 def test_an_error_of_a_full_disk_names_the_file(
-    write: Callable[[Path], None],
-    has_unnamed: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    write: Callable[[Path], None], has_unnamed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not has_unnamed:
         monkeypatch.setattr(files, "_unnamed", lambda *_: None)
