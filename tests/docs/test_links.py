@@ -1,7 +1,8 @@
-"""Links of the pages, as files of the repository: what they name is there, and so is the heading."""
+"""What pages name is there: links and their headings, files, and names of the program, so that a rename is noticed."""
 
 from __future__ import annotations
 
+import importlib
 import re
 import tomllib
 from pathlib import Path
@@ -17,22 +18,28 @@ PAGES = sorted(
 )
 GENERATED = re.compile(r"docs/reference/protocols/[a-z-]+\.md")
 """Pages that only the site has: docs/site/hooks.py."""
+FILE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.(?:py|toml|xsd|md)|(?:robochoc|tests|benchmarks)/[a-z_/]+/)`")
+
+
+def without_blocks(page: Path) -> str:
+    """Return the text of a page without its fenced blocks."""
+    return re.sub(r"^ *```.*?^ *```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
 
 
 def links_of(page: Path) -> list[str]:
     """Return the targets of a page's links, those in code left out."""
-    text = re.sub(r"^ *```.*?^ *```$|`[^`\n]*`", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
-    return re.findall(r"\]\(([^)\s]+)\)", text)
+    return re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", "", without_blocks(page)))
 
 
 def anchors_of(page: Path) -> set[str]:
     """Return the anchors of a page's headings, as MkDocs and code hosts make them."""
-    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    text = without_blocks(page)
     plain = (re.sub(r"[`*]|\]\([^)]*\)|\[", "", heading) for heading in re.findall(r"^#+ +(.*)$", text, re.MULTILINE))
     return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", heading.strip().lower())) for heading in plain}
 
 
 def test_links_lead_to_what_is_there() -> None:
+    assert sum(len(links_of(page)) for page in PAGES) > 100
     with cases() as each:
         for page in PAGES:
             with each(page):
@@ -47,8 +54,26 @@ def test_links_lead_to_what_is_there() -> None:
                     assert not anchor or anchor in anchors_of(there), f"{link}: no such heading"
 
 
-def test_there_are_links() -> None:
-    assert sum(len(links_of(page)) for page in PAGES) > 100
+def test_files_and_names_of_the_program_are_there() -> None:
+    inside = [path for place in ("robochoc", "docs/examples") for path in (ROOT / place).iterdir() if path.is_dir()]
+    folders = [ROOT, ROOT / "robochoc", *inside]
+    with cases() as each:
+        for page in (page for page in PAGES if page.is_relative_to(ROOT / "docs")):
+            with each(page):
+                text = without_blocks(page)
+                for name in FILE.findall(text):
+                    assert any((folder / name).exists() for folder in folders), name
+                for name in re.findall(r"(?:`|^::: )(robochoc(?:\.\w+)+)", text, re.MULTILINE):
+                    assert_importable(name)
+
+
+def assert_importable(name: str) -> None:
+    """Import a module, or get a name of one."""
+    module, _, rest = name.rpartition(".")
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError:
+        assert hasattr(importlib.import_module(module), rest), name
 
 
 def test_every_page_of_the_navigation_is_there_and_every_page_is_in_it() -> None:

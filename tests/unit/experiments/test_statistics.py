@@ -131,7 +131,7 @@ def test_runs_of_one_problem_are_drawn_together() -> None:
 
 @hypothesis.given(st.lists(st.tuples(st.integers(-50, 50), st.integers(0, 5)), min_size=1, max_size=12))
 @examples(100)
-def testweighted_medians_are_those_of_the_values_written_out(them: list[tuple[int, int]]) -> None:
+def test_weighted_medians_are_those_of_the_values_written_out(them: list[tuple[int, int]]) -> None:
     values = sorted(value for value, _ in them)
     counts = [count for _, count in them]
     if any(counts):

@@ -40,7 +40,7 @@ def test_every_runtime_publishes_while_it_searches(runtime: Runtime, protocol: s
 
 def test_processes_publish_while_they_search() -> None:
     told = Told()
-    options = Options(protocol="dsa", runtime=Runtime.PROCESSES, deadline=0.3, improve=60, settings=LONG)
+    options = Options(protocol="dsa", runtime=Runtime.PROCESSES, deadline=0.3, improve=600, settings=LONG)
     outcome = solve(costly(), options, audience=Watcher(told))
     agreed(costly(), outcome, told)
     assert outcome.improvements

@@ -46,8 +46,12 @@ class Bench:
             self.made.take(None)  # type: ignore[arg-type]
 
 
-def test_nothing_before_the_deadline_and_the_best_then(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(monkeypatch)
+
+
+def test_nothing_before_the_deadline_and_the_best_then(bench: Bench) -> None:
     for at_s, cost in ((0.2, 9), (0.5, 5), (0.8, 7)):
         bench.tick(at_s, answer(cost))
     assert bench.published == []
@@ -56,17 +60,15 @@ def test_nothing_before_the_deadline_and_the_best_then(monkeypatch: pytest.Monke
     assert bench.published == [(1.0, 5)]
 
 
-def test_a_robot_that_computes_at_the_deadline_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_robot_that_computes_at_the_deadline_keeps_nobody_waiting(bench: Bench) -> None:
     bench.tick(0.5, answer(5))
     bench.tick(0.9)  # asked, and not answered
     bench.tick(1.0)
     assert bench.published == [(1.0, 5)]
 
 
-def test_what_is_as_good_is_not_published_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_as_good_is_not_published_again(bench: Bench) -> None:
     """Robots are under way: they are not sent elsewhere for nothing."""
-    bench = Bench(monkeypatch)
     for at_s, cost in ((1.0, 5), (1.2, 5), (1.4, 6), (1.6, 4)):
         bench.tick(at_s, answer(cost))
     assert bench.published == [(1.0, 5), (1.6, 4)]
@@ -76,8 +78,7 @@ def test_what_is_as_good_is_not_published_again(monkeypatch: pytest.MonkeyPatch)
     assert [(one.at_s, one.cost) for one in final.improvements] == bench.published
 
 
-def test_a_bound_proves_what_was_found_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_bound_proves_what_was_found_before(bench: Bench) -> None:
     bench.tick(1.0, answer(5, bound=3, deadline=1.0))
     bench.tick(1.2, answer(7, bound=5))
     assert bench.made.satisfied
@@ -85,16 +86,14 @@ def test_a_bound_proves_what_was_found_before(monkeypatch: pytest.MonkeyPatch) -
     assert (final.verdict, final.cost, final.bound, final.deadline) == (Verdict.OPTIMAL, 5, None, None)
 
 
-def test_a_limit_leaves_the_best_of_those_that_were_published(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_limit_leaves_the_best_of_those_that_were_published(bench: Bench) -> None:
     bench.tick(1.0, answer(5, deadline=1.0))
     final = bench.made.concluded(Answer(Verdict.UNKNOWN, bound=4, reason="the time was over"), lost=False)
     assert (final.verdict, final.cost, final.bound, final.deadline) == (Verdict.SOLUTION, 5, 4, 1.0)
     assert final.reason is None
 
 
-def test_the_end_may_be_better_than_all_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_the_end_may_be_better_than_all_before(bench: Bench) -> None:
     bench.tick(1.0, answer(5))
     bench.now = 2.0
     final = bench.made.concluded(answer(3, Verdict.OPTIMAL, ended=True), lost=False)
@@ -103,24 +102,21 @@ def test_the_end_may_be_better_than_all_before(monkeypatch: pytest.MonkeyPatch) 
     assert final.improvements[-1] == Improvement(2.0, Verdict.OPTIMAL, 3)
 
 
-def test_who_ends_before_the_deadline_has_published_once_and_improved_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_who_ends_before_the_deadline_has_published_once_and_improved_nothing(bench: Bench) -> None:
     bench.tick(0.5, answer(5))
     final = bench.made.concluded(answer(3, Verdict.OPTIMAL, ended=True), lost=False)
     assert (final.verdict, final.cost, final.improvements) == (Verdict.OPTIMAL, 3, ())
     assert bench.published == [(0.5, 3)]
 
 
-def test_a_limit_before_the_deadline_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_limit_before_the_deadline_decides_nothing(bench: Bench) -> None:
     bench.tick(0.5, answer(5))
     unknown = Answer(Verdict.UNKNOWN, reason="so many messages have been sent (--messages 3)")
     assert bench.made.concluded(unknown, lost=False) == unknown
     assert bench.published == []
 
 
-def test_after_a_loss_what_was_published_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_after_a_loss_what_was_published_is_no_answer(bench: Bench) -> None:
     bench.tick(1.0, answer(5))
     final = bench.made.concluded(Answer(Verdict.UNKNOWN), lost=True)
     assert (final.verdict, final.cost, len(final.improvements)) == (Verdict.UNKNOWN, None, 1)
@@ -134,8 +130,7 @@ def test_a_protocol_that_an_answer_refutes_is_not_believed(monkeypatch: pytest.M
             bench.made.concluded(claim, lost=False)
 
 
-def test_that_nobody_flies_is_an_answer_only_once_it_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_that_nobody_flies_is_an_answer_only_once_it_is_proven(bench: Bench) -> None:
     nobody = answer(0, assignment={}, withdrawn=costly().order)
     bench.tick(1.0, nobody)
     assert bench.published == []
@@ -143,8 +138,7 @@ def test_that_nobody_flies_is_an_answer_only_once_it_is_proven(monkeypatch: pyte
     assert (final.verdict, final.withdrawn) == (Verdict.OPTIMAL, costly().order)
 
 
-def test_news_count_once_something_is_published(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
+def test_news_count_once_something_is_published(bench: Bench) -> None:
     bench.news = True
     bench.tick(0.5, answer(5))
     assert not bench.made.satisfied

@@ -76,7 +76,7 @@ def test_unread_standard_error_delays_neither_a_run_nor_its_end() -> None:
         "import sys\n"
         "from robochoc.cli import group, main\n"
         "from robochoc.system import streams\n"
-        "streams.PATIENCE_S = 0.1\n"
+        "streams.PATIENCE_S = float(sys.argv[1])\n"
         "def run():\n"
         "    for number in range(40_000): print(f'{number:0100}', file=sys.stderr)\n"
         "    print('done', flush=True)\n"
@@ -86,8 +86,8 @@ def test_unread_standard_error_delays_neither_a_run_nor_its_end() -> None:
         "main.main()\n"
     )
     environment = {**unmeasured(), "PYTHONPATH": str(ROOT)}
-    for is_read in (True, False):
-        command, pipe = [sys.executable, "-c", code], subprocess.PIPE
+    for is_read, patience_s in ((True, HANG_S), (False, 0.1)):
+        command, pipe = [sys.executable, "-c", code, str(patience_s)], subprocess.PIPE
         with subprocess.Popen(command, env=environment, stdin=pipe, stdout=pipe, stderr=pipe) as program:
             assert program.stdin
             assert program.stdout
