@@ -24,15 +24,8 @@ SMALL_QUEENS = ROOT / "instances" / "queens3d-4"
 QUEENS = ROOT / "instances" / "queens3d-7"
 REPORT_KEYS = {"team", "seconds", "robots"}
 ROBOT_KEYS = {
-    "robot",
-    "variables",
-    "interface",
-    "private_constraints",
-    "local_solutions",
-    "groups",
-    "seconds",
-    "source",
-}
+    "robot", "variables", "interface", "private_constraints", "local_solutions", "groups", "seconds", "source",
+}  # fmt: skip
 LIMITS = {
     "known solutions": (["--local-solutions", 10], "--local-solutions"),
     "solutions": (["--local-solutions", 10, "--no-cache"], "--local-solutions"),

@@ -111,29 +111,15 @@ def test_the_list_has_a_line_for_each_protocol_and_the_central_solver() -> None:
     assert row(done.stdout, "abt").split()[1:3] == ["satisfaction", "yes"]
     assert row(done.stdout, "abt").endswith(abt.ABT.traits.use_when)
     assert "\x1b" not in done.stdout
-
-
-def test_the_list_is_narrow_and_every_protocol_of_ours_says_when_to_use_it() -> None:
-    assert max(map(len, robochoc_within("protocols").stdout.splitlines())) <= 100
+    assert max(map(len, done.stdout.splitlines())) <= 100
     for name in protocol_names():
         assert 0 < len(protocol_named(name).traits.use_when) <= 60
 
 
 def test_the_long_list_has_all_traits() -> None:
     told = robochoc_within("protocols", "--long").stdout
-    heading = [
-        "name",
-        "for",
-        "complete",
-        "synchronous",
-        "constraints",
-        "dynamic",
-        "arrays",
-        "lossy",
-        "privacy",
-        "paper",
-    ]
-    assert told.splitlines()[0].split() == heading
+    heading = "name for complete synchronous constraints dynamic arrays lossy privacy paper"
+    assert told.splitlines()[0].split() == heading.split()
     assert row(told, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
     assert abt.ABT.traits.paper in row(told, "abt")
     assert abt.ABT.traits.privacy in row(told, "abt")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,18 +17,9 @@ from tests.support.program import ROOT, robochoc_within
 RESCUE = ROOT / "docs" / "examples" / "rescue"
 VERDICTS = ["solution", "solution", "solution", "no-solution", "solution"]
 EPOCH_KEYS = {
-    "verdict",
-    "opened_by",
-    "robots",
-    "assignment",
-    "cost",
-    "messages",
-    "bytes",
-    "ncccs",
-    "checks",
-    "wall_s",
+    "verdict", "opened_by", "robots", "assignment", "cost", "messages", "bytes", "ncccs", "checks", "wall_s",
     "verified",
-}
+}  # fmt: skip
 EPOCH_EXTRAS = {"witness", "messages_by_type", "memory", "largest", "dropped_constraints"}
 """Keys of an epoch that are missing where they are empty."""
 METRICS = ("messages", "bytes", "ncccs", "checks")
@@ -50,13 +42,11 @@ def test_validate_finds_nothing_wrong() -> None:
     assert done.stdout.count(": ok") == 2
 
 
-@pytest.mark.parametrize(
-    "words", [["dynabt"], ["dynabt", "--runtime", "simulator"], ["abt", "--runtime", "simulator"], ["central"]]
-)
-def test_all_come_to_the_same_verdicts(words: list[str]) -> None:
+def result_of(*words: str) -> dict[str, Any]:
+    """Return the result of the example, once it is checked."""
     done = robochoc_within("solve", RESCUE, "--json", "--protocol", *words)
     assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+    result: dict[str, Any] = json.loads(done.stdout)
     epochs = result["epochs"]
     assert [epoch["verdict"] for epoch in epochs] == VERDICTS
     assert (result["verdict"], result["verified"]) == ("solution", True)
@@ -68,14 +58,17 @@ def test_all_come_to_the_same_verdicts(words: list[str]) -> None:
         assert epoch["assignment"].keys() == {name.lower() for name in epoch["robots"] if solved}
     for key in METRICS:
         assert result["metrics"][key] == sum(epoch[key] for epoch in epochs)
+    return result
+
+
+@pytest.mark.parametrize("protocol", ["dynabt", "central"])
+def test_processes_and_the_central_solver_come_to_the_verdicts(protocol: str) -> None:
+    result_of(protocol)
 
 
 def test_going_on_costs_less_than_to_begin_anew() -> None:
-    messages = []
-    for protocol in ("dynabt", "abt"):
-        done = robochoc_within("solve", RESCUE, "--json", "--protocol", protocol, "--runtime", "simulator")
-        messages.append([epoch["messages"] for epoch in json.loads(done.stdout)["epochs"]])
-    went_on, anew = messages
+    results = [result_of(protocol, "--runtime", "simulator") for protocol in ("dynabt", "abt")]
+    went_on, anew = ([epoch["messages"] for epoch in result["epochs"]] for result in results)
     assert went_on[0] == anew[0]
     assert sum(went_on) < sum(anew)
 
