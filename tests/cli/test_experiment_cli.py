@@ -250,6 +250,7 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
                 assert not (tmp_path / "page.html").exists()
 
 
+@pytest.mark.usefixtures("runs_here")
 def test_a_contradiction_ends_with_status_4(small: Path) -> None:
     path = small.with_suffix(".sqlite")
     digest = finished(SMALL).rows[0]["digest"]

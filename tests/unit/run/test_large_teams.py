@@ -31,7 +31,7 @@ from robochoc.verification.checker import violations
 from tests.support.growth import kept_bytes, operations
 from tests.support.limits import HANG_S
 
-SMALL = 60
+SMALL = 40
 TWICE = 2.6
 """More than twice as much work for twice as many robots, and far less than four times."""
 
