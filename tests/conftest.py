@@ -97,11 +97,11 @@ def nothing_left_behind(leftovers_of_file: LeftoversOfFile) -> Iterator[None]:
 
 @pytest.fixture
 def quick_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Protocols that encrypt tables do so in a group in which no secret is safe, and whose elements are small."""
-    from robochoc.protocols.private.p2_dpop import P2DPOP
+    """Protocols that encrypt do so in a group in which no secret is safe, and whose elements are small."""
+    from robochoc.protocols.private.rerooting import RerootingProtocol
     from tests.support.toy_group import ToyGroup
 
-    monkeypatch.setattr(P2DPOP, "group", ToyGroup)
+    monkeypatch.setattr(RerootingProtocol, "group", ToyGroup)
 
 
 @pytest.fixture

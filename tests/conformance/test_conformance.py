@@ -85,8 +85,7 @@ def problems(protocol: str) -> dict[str, tuple[int, int]]:
         return {"hard": (40, 2700), "varied": (3, 2000)}
     if not traits.complete:  # runs are long
         return {"hard": (5, 180), "costs": (7, 40), "varied": (2, 2000)}
-    few = 2 if protocol == "p32-dpop" else 1  # it builds a tree below each robot
-    return {"hard": (8 // few, 2700), "costs": (14 // few, 2000), "varied": (2, 2000)}
+    return {"hard": (8, 2700), "costs": (14, 2000), "varied": (2, 2000)}
 
 
 @pytest.fixture
@@ -176,7 +175,7 @@ def test_a_turned_link_takes_a_variable_out_of_sight(protocol: str) -> None:
 def test_as_few_as_possible_step_aside(protocol: str, teams: int) -> None:
     """By weight. A team that has a solution flies as a whole."""
     aside = 0
-    for number in range(teams // 2 if protocol == "p32-dpop" else teams):
+    for number in range(teams):
         chance = drawn(f"fewest {protocol} {number}")
         team = affordable(protocol, partial(random_team, chance, n_ary=protocol_named(protocol).traits.n_ary))
         robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)

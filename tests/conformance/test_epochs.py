@@ -88,7 +88,7 @@ def test_dynabt_agrees_with_brute_force_after_each_change(problems: int) -> None
 @count("problems", 3, 16)
 @looped("protocol", COMPLETE)
 def test_any_protocol_begins_anew_after_each_change(protocol: str, problems: int) -> None:
-    for number in range(1 if protocol == "p32-dpop" and problems == 3 else problems):
+    for number in range(problems):
         chance = drawn(f"anew {protocol} {number}")
         team = random_changing_team(chance, 6)
         agrees(team, replace(random_schedule(chance), protocol=protocol))

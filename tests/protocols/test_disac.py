@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import pytest
@@ -13,7 +14,6 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.messages.disac import Del, Domain
 from robochoc.replay.replay import replay
@@ -21,11 +21,11 @@ from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.options import Preprocess
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.team_compiler import OutOfTimeError, TeamCompiler
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started, started_robot
+from tests.support.cases import looped
 from tests.support.examples import count
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import check_against_brute_force, loose_team
@@ -50,12 +50,7 @@ def chain(*values: int) -> Team:
     return team_of(dict.fromkeys("ABC", values), [below("A", "B"), below("B", "C")])
 
 
-def agent(team: Team, name: str) -> DisAC:
-    """The protocol object of one robot, started, with nothing left to say."""
-    robot = DisAC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
-    robot.start()
-    robot.outbox.clear()
-    return robot
+agent = partial(started_robot, DisAC)
 
 
 def three(*values: int) -> Domain:
@@ -63,10 +58,8 @@ def three(*values: int) -> Domain:
 
 
 def test_the_domain_is_told_to_all_that_share_a_constraint() -> None:
-    team = chain(1, 2, 3)
-    robot = DisAC(LocalProblem(agent_problems(team, shared_scopes=True)["RB"]), PriorityOrder(team.order))
-    robot.start()
-    assert robot.outbox == [("RA", three(1, 2, 3)), ("RC", three(1, 2, 3))]
+    robot = robot_of(DisAC, chain(1, 2, 3), "RB")
+    assert started(robot) == [("RA", three(1, 2, 3)), ("RC", three(1, 2, 3))]
 
 
 def test_nothing_is_revised_before_all_domains_are_known() -> None:
@@ -236,15 +229,15 @@ def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytes
     assert not replay(journal).contradictions
 
 
-@pytest.mark.parametrize("protocol", ["abt", "sfb"])
-@pytest.mark.parametrize("team", [chain(1, 2, 3, 4), pair()], ids=["solvable", "empty"])
+@looped("protocol", ["abt", "sfb"])
+@looped("team", [chain(1, 2, 3, 4), pair()])
 def test_its_journal_is_replayed(protocol: str, team: Team) -> None:
     done = replay(record(team, replace(AC, protocol=protocol)))
     assert done.difference is None
     assert not done.contradictions
 
 
-@pytest.mark.parametrize(
+@looped(
     ("options", "told"),
     [
         (replace(AC, runtime=Runtime.NETWORK), "--preprocess is of robots in processes or the simulator"),

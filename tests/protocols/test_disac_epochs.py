@@ -26,6 +26,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Preprocess
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.brute_force import solutions
+from tests.support.cases import looped
 from tests.support.changing_costs import agrees_on_costs, changing_cost_team
 from tests.support.examples import count
 from tests.support.limits import HANG_S
@@ -68,7 +69,7 @@ def removed(team: Team, protocol: str) -> int:
     return outcome.preprocessing.removed
 
 
-@pytest.mark.parametrize("protocol", ["abt", "dynabt"])
+@looped("protocol", ["abt", "dynabt"])
 def test_values_that_a_removed_constraint_ruled_out_come_back(protocol: str) -> None:
     """Without B < C, only A = 3 and B = 1 have no support."""
     assert removed(chain(), protocol) == 6
@@ -107,7 +108,7 @@ def test_the_first_epoch_may_have_no_solution() -> None:
         assert verdicts(outcome) == [Verdict.NO_SOLUTION, Verdict.SOLUTION]
 
 
-@pytest.mark.parametrize("protocol", ["abt", "dynabt"])
+@looped("protocol", ["abt", "dynabt"])
 def test_a_proof_that_rests_on_values_that_have_come_back_is_given_up(protocol: str) -> None:
     """D takes 3 from all others, who are three with two values; then it leaves."""
     differing = [Constraint("".join(two), DIFFERENT, two, two) for two in combinations("DABC", 2)]
@@ -168,7 +169,8 @@ def test_each_epoch_has_the_least_cost(problems: int) -> None:
     assert ended > 2 * problems
 
 
-@count("problems", 1, 20)
+@pytest.mark.more
+@count("problems", 2, 20)
 def test_the_same_in_processes(problems: int) -> None:
     chance = Random("ac in processes")
     for number in range(problems):
@@ -176,7 +178,7 @@ def test_the_same_in_processes(problems: int) -> None:
         agrees(random_changing_team(chance), Options(protocol=protocol, preprocess=Preprocess.AC, timeout=HANG_S))
 
 
-@pytest.mark.parametrize("protocol", ["abt", "dynabt", "s-dpop"])
+@looped("protocol", ["abt", "dynabt", "s-dpop"])
 @count("problems", 2, 60)
 def test_its_journal_is_replayed(protocol: str, problems: int) -> None:
     """Runs of both kinds alternate in it; the robots of the protocol stay what they were."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import msgspec
@@ -17,15 +18,12 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, ConstraintModel, Team
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.disfc import DisFC
 from robochoc.protocols.satisfaction.messages.disfc import AddLink, Nogood, Ok
 from robochoc.solver import filters
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.examples import count
 from tests.support.pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
@@ -56,31 +54,21 @@ def triangle() -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2, 3)), [differ(pair) for pair in ("AB", "AC", "BC", "CD")])
 
 
-def unstarted(team: Team, name: str) -> DisFC:
-    return DisFC(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
+agent = partial(started_robot, DisFC)
 
 
-def agent(team: Team, name: str) -> DisFC:
-    """The protocol object of one robot, started, with nothing left to say."""
-    robot = unstarted(team, name)
-    robot.start()
-    robot.outbox.clear()
-    return robot
+def unsaid(team: Team, name: str) -> list[tuple[str, Message]]:
+    """Return the first messages of a robot."""
+    return started(robot_of(DisFC, team, name))
 
 
 # The rules
 
 
 def test_start_sends_lower_neighbours_a_counter_and_their_domains_filtered() -> None:
-    robot = unstarted(triangle(), "RA")
-    robot.start()
-    assert robot.outbox == [("RB", Ok(1, b"\x06")), ("RC", Ok(1, b"\x06"))]
-
-
-def test_every_pair_of_a_filter_is_a_check() -> None:
-    robot = unstarted(triangle(), "RA")
-    robot.start()
-    assert robot.problem.checks == 6
+    robot = robot_of(DisFC, triangle(), "RA")
+    assert started(robot) == [("RB", Ok(1, b"\x06")), ("RC", Ok(1, b"\x06"))]
+    assert robot.problem.checks == 6, "every pair of a filter is a check"
 
 
 def test_a_value_that_a_filter_takes_away_is_left() -> None:
@@ -163,11 +151,8 @@ def test_who_asked_for_a_link_gets_a_filter_that_allows_everything_now_and_later
 
 def test_parts_go_down_and_up() -> None:
     team = pkc_pair(pkc_part("AB", (1, 2)), pkc_part("AB", (1, 1)))
-    higher, lower = unstarted(team, "RA"), unstarted(team, "RB")
-    higher.start()
-    lower.start()
-    assert higher.outbox == [("RB", Ok(1, b"\x02"))]
-    assert lower.outbox == [("RA", Ok(1, b"\x03"))]
+    assert unsaid(team, "RA") == [("RB", Ok(1, b"\x02"))]
+    assert unsaid(team, "RB") == [("RA", Ok(1, b"\x03"))]
 
 
 def test_a_higher_robot_outside_a_filter_from_below_says_so() -> None:
@@ -196,13 +181,6 @@ def test_filters_are_over_the_declared_domain_of_all_that_the_receiver_shows() -
     assert [row for place, row in enumerate(rows) if allows(ok.allowed, place)] == [(2, 1)]
 
 
-def unsaid(team: Team, name: str) -> list[tuple[str, Message]]:
-    """What a robot says at its start."""
-    robot = unstarted(team, name)
-    robot.start()
-    return robot.outbox
-
-
 def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "MAX_FILTER_BITS", 2)
     Simulation(pkc_pair(pkc_part("AB"), None), DisFC, Concurrent(0))
@@ -217,7 +195,7 @@ def test_a_filter_that_is_too_short_allows_nothing_more() -> None:
 # The truth
 
 
-@count("teams", 150, 500)
+@count("teams", 60, 500)
 def test_disfc_agrees_with_brute_force(teams: int) -> None:
     chance = Random("pkc disfc")
     seen = Counter(check_against_brute_force(random_pkc_team(chance), DisFC, chance) for _ in range(teams))
@@ -304,4 +282,3 @@ def test_no_value_of_a_queen_can_be_seen(private_queens: Team) -> None:
 
 def test_private_queens_have_no_solution(private_queens: Team) -> None:
     assert run(private_queens, DisFC, 0).result.verdict is Verdict.NO_SOLUTION
-    assert ProcessesRun(private_queens, DisFC).run(60).verdict is Verdict.NO_SOLUTION

@@ -21,6 +21,7 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies
+from tests.support.cases import looped
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products
 from tests.support.problems import ON_ONE_MACHINE, team_of
@@ -87,7 +88,7 @@ def test_costs_that_may_not_be_exact_end_the_run() -> None:
         replies(robot, ("RB", dimensions({"RA": 3}, dearest=EXACT)))
 
 
-@pytest.mark.parametrize("factor", [1, 60, 5000, 10**8, 10**14])
+@looped("factor", [1, 60, 5000, 10**8, 10**14])
 def test_costs_are_exact_up_to_there(factor: int) -> None:
     """With one, two, four and eight bytes a cost."""
     costs = tuple((cost + 1) * factor + cost for cost in PRODUCT.costs)
@@ -98,7 +99,7 @@ def test_costs_are_exact_up_to_there(factor: int) -> None:
     assert solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR)).cost == 3 * (5 * factor + 4)
 
 
-@pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
+@looped("withdraw", [None, Withdrawal.MINIMUM])
 def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawal | None) -> None:
     team = products("ABCDE", "AB BC AC AD BD CD AE")
     said = []
@@ -112,7 +113,7 @@ def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawa
     assert "dpop" not in re.split(r"[ ,]+", said[0])
 
 
-@pytest.mark.parametrize("memory", ["0", "-1", "much"])
+@looped("memory", ["0", "-1", "much"])
 def test_what_is_no_number_of_bytes_is_refused(memory: str) -> None:
     with pytest.raises(UnsupportedError, match=r"--set: .*memory"):
         solve(products("AB", "AB"), Options(protocol="dpop", settings={"memory": memory}))
@@ -128,7 +129,7 @@ def test_a_table_that_was_not_asked_for_is_refused() -> None:
         replies(robot, ("RC", UTIL(1, bytes(3))))
 
 
-@pytest.mark.parametrize("costs", [b"", bytes(4), bytes([10, 0, 0])])
+@looped("costs", [b"", bytes(4), bytes([10, 0, 0])])
 def test_a_table_of_another_size_or_costs_above_the_bound_is_refused(costs: bytes) -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
     replies(robot, ("RB", dimensions({"RA": 3})))
@@ -142,9 +143,7 @@ def test_children_that_contradict_each_other_are_refused() -> None:
         replies(robot, ("RA", domain()), ("RC", dimensions({"RA": 4})), ("RD", dimensions({"RA": 3})))
 
 
-@pytest.mark.parametrize(
-    ("sender", "message"), [("RC", dimensions({"RB": 9})), ("RA", dimensions({})), ("RC", domain())]
-)
+@looped(("sender", "message"), [("RC", dimensions({"RB": 9})), ("RA", dimensions({})), ("RC", domain())])
 def test_who_speaks_twice_or_out_of_place_is_refused(sender: str, message: Message) -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
     replies(robot, ("RC", dimensions({"RB": 3})))
@@ -160,15 +159,11 @@ def test_who_has_no_room_does_not_proceed() -> None:
         replies(robot, ("RA", Proceed(["RA", *(f"R{number}" for number in range(9))])))
 
 
-@pytest.mark.parametrize(
-    "said",
-    [
-        dimensions({f"R{number}": 2 for number in range(100_000)}),
-        dimensions({"RA": 3}, width=-5),
-        dimensions({"RA": 3}, most=Need(math.nan, "RC")),
-        dimensions({"RA": 3}, most=Need(-1, "RC")),
-    ],
-)
+@looped("said", [
+    dimensions({f"R{number}": 2 for number in range(100_000)}),
+    dimensions({"RA": 3}, width=-5), dimensions({"RA": 3}, most=Need(math.nan, "RC")),
+    dimensions({"RA": 3}, most=Need(-1, "RC")),
+])  # fmt: skip
 def test_dimensions_that_cannot_be_are_refused(said: Dimensions) -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
     with pytest.raises(ValueError, match="cannot be"):
@@ -180,7 +175,7 @@ def test_axes_that_are_not_the_separator_s_are_refused() -> None:
         replies(leaf(products("ABC", "AB BC AC")), ("RB", Proceed(["RB"])))
 
 
-@pytest.mark.parametrize("assignment", [[], [0], [0, 3], [-1, 0]])
+@looped("assignment", [[], [0], [0, 3], [-1, 0]])
 def test_values_that_are_none_are_refused(assignment: list[int]) -> None:
     robot = leaf(products("ABC", "AB BC AC"))
     replies(robot, ("RB", Proceed(["RB", "RA"])))

@@ -29,6 +29,7 @@ from robochoc.protocols.inference.dpop_tables import (
 )
 from robochoc.protocols.inference.dpop_tables import width_of as width_for
 from robochoc.run import Options, Runtime, solve
+from tests.support.cases import looped
 from tests.support.cost_problems import with_costs
 from tests.support.problems import ON_ONE_MACHINE, team_of
 
@@ -57,7 +58,7 @@ def plain(table: Table) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     return costs
 
 
-@pytest.mark.parametrize(("block", "longest"), SMALL)
+@looped(("block", "longest"), SMALL)
 def test_a_projection_is_the_least_of_the_sum(monkeypatch: pytest.MonkeyPatch, block: int, longest: int) -> None:
     monkeypatch.setattr(dpop_tables, "BLOCK", block)
     monkeypatch.setattr(dpop_tables, "LONGEST", longest)
@@ -87,10 +88,8 @@ def test_axes_are_turned_and_added_and_those_of_one_value_go() -> None:
     assert np.shares_memory(view, table)
 
 
-@pytest.mark.parametrize(
-    ("dearest", "width"), [(0, 1), (254, 1), (255, 2), (65534, 2), (65535, 4), (2**32 - 2, 4), (2**32 - 1, 8)]
-)
-@pytest.mark.parametrize("piece", [8, 24, 1 << 24])
+@looped(("dearest", "width"), [(0, 1), (254, 1), (255, 2), (65534, 2), (65535, 4), (2**32 - 2, 4), (2**32 - 1, 8)])
+@looped("piece", [8, 24, 1 << 24])
 def test_a_table_comes_as_it_went(
     monkeypatch: pytest.MonkeyPatch, dearest: int, width: Literal[1, 2, 4, 8], piece: int
 ) -> None:
@@ -122,7 +121,7 @@ def test_pieces_that_do_not_fit_are_refused_before_any_memory_is_taken() -> None
         arriving.add(1, bytes(1))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@looped("seed", range(8))
 def test_arrays_never_hold_more_than_was_told_before(seed: int) -> None:
     """As numpy reports to tracemalloc; a little room for Python's own objects."""
     chance = Random(seed)
@@ -162,7 +161,7 @@ def large() -> tuple[Team, int]:
     return with_costs(team_of(domains, constraints)), int(np.min(total))
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+@looped("runtime", ON_ONE_MACHINE)
 def test_tables_of_several_mib_travel(runtime: Runtime) -> None:
     team, least = large()
     outcome = solve(team, Options(protocol="dpop", runtime=runtime))

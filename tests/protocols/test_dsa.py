@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
-
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.settings.dsa import DSASettings
-from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
 from tests.support.local_search_runs import assignments_by_cycle, cost_of_assignment, domains_of, played
@@ -43,7 +41,7 @@ def hears(robot: DSA, left: int, right: int) -> tuple[int | None, ...] | None:
     return value(robot)
 
 
-@pytest.mark.parametrize(("lot", "first"), [(0.0, 1), (0.4, 2), (0.99, 3)])
+@looped(("lot", "first"), [(0.0, 1), (0.4, 2), (0.99, 3)])
 def test_the_first_value_is_drawn_by_lot(lot: float, first: int) -> None:
     robot = robot_of(DSA, colours(), "RA", lot)
     assert started(robot) == [("RB", Value((first,)))]
@@ -55,18 +53,18 @@ def test_the_value_is_told_in_each_cycle_also_if_it_is_the_old_one() -> None:
         assert replies(robot, ("RA", Value((3,))), ("RC", Value((3,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
 
 
-@pytest.mark.parametrize("variant", ["A", "B", "C"])
+@looped("variant", ["A", "B", "C"])
 def test_who_gains_moves_with_the_probability(variant: str) -> None:
     assert hears(middle(MOVES, variant=variant), 1, 2) == (3,)
     assert hears(middle(STAYS, variant=variant), 1, 2) == (1,)
 
 
-@pytest.mark.parametrize("variant", ["D", "E"])
+@looped("variant", ["D", "E"])
 def test_who_gains_always_moves_by_variants_d_and_e(variant: str) -> None:
     assert hears(middle(STAYS, variant=variant), 1, 2) == (3,)
 
 
-@pytest.mark.parametrize(("variant", "as_variant"), [("D", "B"), ("E", "C")])
+@looped(("variant", "as_variant"), [("D", "B"), ("E", "C")])
 def test_variants_d_and_e_move_sideways_as_b_and_c(variant: str, as_variant: str) -> None:
     for chance in (MOVES, STAYS):
         for heard in ((1, 2), (2, 2)):
@@ -84,17 +82,17 @@ def test_of_several_best_values_one_is_drawn() -> None:
     assert hears(middle(MOVES, 0.9), 1, 1) == (3,)
 
 
-@pytest.mark.parametrize(("variant", "moves"), [("A", False), ("B", True), ("C", True)])
+@looped(("variant", "moves"), [("A", False), ("B", True), ("C", True)])
 def test_in_conflict_b_and_c_move_to_a_value_that_is_as_good(variant: str, moves: bool) -> None:  # noqa: FBT001
     assert hears(middle(MOVES, variant=variant, values=2), 1, 2) == ((2,) if moves else (1,))
 
 
-@pytest.mark.parametrize(("variant", "moves"), [("A", False), ("B", False), ("C", True)])
+@looped(("variant", "moves"), [("A", False), ("B", False), ("C", True)])
 def test_without_conflict_only_c_moves_to_a_value_that_is_as_good(variant: str, moves: bool) -> None:  # noqa: FBT001
     assert hears(middle(MOVES, variant=variant), 2, 2) == ((3,) if moves else (1,))
 
 
-@pytest.mark.parametrize("variant", ["A", "B", "C"])
+@looped("variant", ["A", "B", "C"])
 def test_nobody_moves_to_a_value_that_is_worse(variant: str) -> None:
     assert hears(middle(MOVES, variant=variant, values=2), 2, 2) == (1,)
 
@@ -145,15 +143,3 @@ def test_variant_a_gets_better_on_the_whole(teams: int) -> None:
             worse += last > first
     assert better > teams * 2 // 3
     assert worse < teams // 15
-
-
-@pytest.mark.parametrize("probability", ["0", "1.5", "nan", "-1"])
-def test_a_probability_is_one(probability: str) -> None:
-    with pytest.raises(SettingsError, match="it must be more than 0 and at most 1"):
-        settings_of(DSA, {"probability": probability})
-
-
-def test_there_are_five_variants() -> None:
-    assert settings_of(DSA, {"variant": "E"}) == DSASettings(variant="E")
-    with pytest.raises(SettingsError, match="variant"):
-        settings_of(DSA, {"variant": "F"})

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
-import pytest
-
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa_sdp import DSASDP
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import settings_of
 from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.problems import team_of
 
 
@@ -30,24 +27,21 @@ def moves(now: float, other: float, chance: float, **settings: str) -> bool:
     return value(it) == (2,)
 
 
-@pytest.mark.parametrize(
-    ("now", "other", "probability"),
-    [(100, 95, 0.65), (100, 85, 0.75), (100, 0, 0.75), (INFINITE, 5, 0.75), (1, 0, 0.75)],
-)
+@looped(("now", "other", "probability"), [
+    (100, 95, 0.65), (100, 85, 0.75), (100, 0, 0.75), (INFINITE, 5, 0.75), (1, 0, 0.75),
+])  # fmt: skip
 def test_an_improvement_is_the_likelier_the_more_it_saves(now: float, other: float, probability: float) -> None:
     assert moves(now, other, probability - 0.01)
     assert not moves(now, other, probability + 0.01)
 
 
-@pytest.mark.parametrize(
-    ("now", "other", "probability"), [(100, 100, 0.8), (100, 110, 0.7), (100, 150, 0.4), (100, 200, 0.4)]
-)
+@looped(("now", "other", "probability"), [(100, 100, 0.8), (100, 110, 0.7), (100, 150, 0.4), (100, 200, 0.4)])
 def test_exploration_is_the_likelier_the_less_it_costs(now: float, other: float, probability: float) -> None:
     assert moves(now, other, probability - 0.01, period="1")
     assert not moves(now, other, probability + 0.01, period="1")
 
 
-@pytest.mark.parametrize(("now", "other"), [(100, 201), (0, 1), (0, 0), (5, INFINITE)])
+@looped(("now", "other"), [(100, 201), (0, 1), (0, 0), (5, INFINITE)])
 def test_what_costs_more_than_twice_as_much_is_not_explored(now: float, other: float) -> None:
     assert not moves(now, other, 0.0, period="1")
 
@@ -67,17 +61,3 @@ def test_who_has_no_other_value_stays() -> None:
     it = robot_of(DSASDP, team, "RA")
     started(it)
     assert replies(it, ("RB", Value((1,)))) == [("RB", Value((1,)))]
-
-
-@pytest.mark.parametrize(
-    ("settings", "why"),
-    [
-        ({"pa": "1.5"}, "pa is 1.5; it must be from 0 to 1"),
-        ({"pd": str(-math.inf)}, "pd is -inf; it must be from 0 to 1"),
-        ({"pb": "0.5"}, "pa [+] pb is 1.1; it must be at most 1"),
-        ({"period": "0"}, "period is 0; it must be 1 or more"),
-    ],
-)
-def test_settings_are_probabilities_and_a_period(settings: dict[str, str], why: str) -> None:
-    with pytest.raises(SettingsError, match=why):
-        settings_of(DSASDP, settings)

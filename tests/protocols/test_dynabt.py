@@ -38,6 +38,22 @@ from tests.support.small_teams import DIFFERENT, differ, triangle
 CAB, CBC, CAC = "RB<RA:C", "RC<RB:C", "RC<RA:C"  # keys of the triangle's constraints
 
 
+def refuted() -> tuple[Team, DynABT]:
+    """RA with one value, which RB rules out: there is no solution."""
+    team = triangle(1)
+    dynabt = agent(team, "RA")
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    return team, dynabt
+
+
+def ruled_out(values: int = 2) -> tuple[Team, DynABT]:
+    """RA, whose first value RB and RC rule out together."""
+    team = triangle(values)
+    dynabt = agent(team, "RA")
+    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    return team, dynabt
+
+
 # What explains a nogood
 
 
@@ -114,18 +130,14 @@ def test_remove_constraint_drops_what_was_derived_from_it_far_away() -> None:
 
 
 def test_a_no_solution_goes_with_a_constraint_that_it_rests_on() -> None:
-    team = triangle(1)
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    team, dynabt = refuted()
     said = after(dynabt, team, RemoveConstraint("RB", "RA", "C"), lossless=False)
     assert (dynabt.verdict, dynabt.proof) == (None, frozenset())
     assert ("RB", Ok((1,))) in said
 
 
 def test_a_no_solution_stays_when_another_constraint_goes() -> None:
-    team = triangle(1)
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    team, dynabt = refuted()
     assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), lossless=False) == []
     assert dynabt.verdict is Verdict.NO_SOLUTION
 
@@ -170,9 +182,7 @@ def test_add_constraint_links_the_new_child_and_tells_the_value_there_only() -> 
 
 
 def test_a_link_is_made_while_there_is_no_solution() -> None:
-    team = triangle(1)
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, "RB="])))
+    team, dynabt = refuted()
     after(dynabt, team, AddConstraint("RD", "RA", differ("A", "D", "N")), lossless=False)
     assert "RD" in dynabt.lower
 
@@ -210,9 +220,7 @@ def test_who_loses_its_last_value_says_why() -> None:
 
 
 def test_a_domain_that_grew_voids_the_resolvents_of_its_owner() -> None:
-    team = triangle()
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    team, dynabt = ruled_out()
     assert value(dynabt) == (2,)
     change(dynabt, team, apply_changes(team, [AddValue("C", 3)]))
     assert list(dynabt.store) == []
@@ -227,9 +235,7 @@ def test_a_domain_that_grew_leaves_direct_conflicts() -> None:
 
 
 def test_a_domain_that_shrank_leaves_resolvents() -> None:
-    team = triangle(3)
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    team, dynabt = ruled_out(3)
     change(dynabt, team, apply_changes(team, [RemoveValue("C", 3)]))
     assert list(dynabt.store) == [{}]
 
@@ -260,9 +266,7 @@ def test_a_child_that_left_is_told_nothing_more() -> None:
 
 
 def test_nogoods_that_rest_on_a_robot_that_left_are_void() -> None:
-    team = triangle()
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    team, dynabt = ruled_out()
     change(dynabt, team, apply_changes(team, [RemoveAgent("RC")]))
     assert list(dynabt.store) == []
 
@@ -277,9 +281,7 @@ def test_a_robot_that_comes_is_told_the_value_of_its_parents() -> None:
 
 
 def test_a_robot_of_an_old_name_is_a_stranger() -> None:
-    team = triangle()
-    dynabt = agent(team, "RA")
-    replies(dynabt, ("RB", Nogood({}, (1,), [CAB, CBC, "RB=", "RC="])))
+    team, dynabt = ruled_out()
     again = replace(team["RD"], parents=(Parent("RA", (differ("A", "D", "N"),)),))
     new = apply_changes(team, [RemoveAgent("RD"), AddAgent(again)])
     dynabt.change(

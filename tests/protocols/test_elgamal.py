@@ -10,9 +10,10 @@ from robochoc.protocols.key_stream import KeyStream
 from robochoc.protocols.private.ed25519 import Ed25519, Group
 from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.cases import looped
 from tests.support.toy_group import ToyGroup
 
-GROUPS = pytest.mark.parametrize("group", [Ed25519, ToyGroup])
+GROUPS = looped("group", [Ed25519, ToyGroup])
 
 
 def team(group: type[Group], robots: int) -> list[TeamKey]:
@@ -52,7 +53,7 @@ def test_a_renewed_cipher_is_of_the_same_bit_and_looks_different(group: type[Gro
 
 
 @GROUPS
-@pytest.mark.parametrize("wrong", [b"", b"\xff" * 8, b"\xff" * 32, b"\x02" + bytes(31)])
+@looped("wrong", [b"", b"\xff" * 8, b"\xff" * 32, b"\x02" + bytes(31)])
 def test_what_is_no_element_is_refused(group: type[Group], wrong: bytes) -> None:
     if group is ToyGroup and len(wrong) == Ed25519.size:
         wrong = wrong[:9]

@@ -31,12 +31,13 @@ from robochoc.protocols.private.p2_dpop import P2DPOP
 from robochoc.protocols.private.ring import Ring
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
+from tests.support.cases import looped
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 from tests.support.pseudo_trees import unplaced
 from tests.support.toy_group import ToyGroup
 
-GROUPS = pytest.mark.parametrize("group", [Ed25519, ToyGroup])
+GROUPS = looped("group", [Ed25519, ToyGroup])
 
 
 def alone(group: type[Group] = ToyGroup) -> TeamKey:
@@ -112,7 +113,7 @@ def test_a_sum_is_zero_only_if_all_are_and_a_blinded_one_says_no_more(group: typ
 # Questions
 
 
-@pytest.mark.parametrize("places", range(20))
+@looped("places", range(20))
 def test_a_bisection_finds_the_first_place_and_always_asks_as_often(places: int) -> None:
     for first in range(places + 1):
         bisection, asked = Bisection(places), 0
@@ -170,38 +171,26 @@ def robot(name: str = "RB") -> P2DPOP:
 CODENAME = "0" * 32
 
 
-@pytest.mark.parametrize(
-    ("message", "why"),
-    [
-        (CostRange(0, 1), "no costs of all"),
-        (CostSum(0, 1), "known already"),
-        (Plan(1, {}), "not under way"),
-        (Plan(0, {CODENAME: 0}), "plan that cannot be"),
-        (Plan(0, dict.fromkeys(map(str, range(1_001)), 2)), "plan that cannot be"),
-        (AskAxis(2), "cannot ask"),
-        (AskAxis(-1), "cannot ask"),
-        (Gone(0), "was not asked"),
-        (Axis(0, CODENAME, [(1,), (2,)]), "was not asked"),
-        (EncryptedTable(0, b""), "not under way"),
-        (Opening(b"x"), "not one cipher"),
-        (Opening(b"\xff" * 64), "no element"),
-    ],
-)
+@looped(("message", "why"), [
+    (CostRange(0, 1), "no costs of all"), (CostSum(0, 1), "known already"),
+    (Plan(1, {}), "not under way"), (Plan(0, {CODENAME: 0}), "plan that cannot be"),
+    (Plan(0, dict.fromkeys(map(str, range(1_001)), 2)), "plan that cannot be"),
+    (AskAxis(2), "cannot ask"), (AskAxis(-1), "cannot ask"), (Gone(0), "was not asked"),
+    (Axis(0, CODENAME, [(1,), (2,)]), "was not asked"), (EncryptedTable(0, b""), "not under way"),
+    (Opening(b"x"), "not one cipher"), (Opening(b"\xff" * 64), "no element"),
+])  # fmt: skip
 def test_a_message_that_cannot_be_is_refused(message: Message, why: str) -> None:
     with pytest.raises(ValueError, match=why):
         robot().receive("RA", message)
 
 
-@pytest.mark.parametrize(
-    ("answer", "why"),
-    [
-        (Axis(0, "short", [(1,), (2,)]), "axis that cannot be"),
-        (Axis(0, CODENAME, [(1,)]), "axis that cannot be"),
-        (Axis(0, CODENAME, [(1,), (1,)]), "not declared to have"),
-        (Axis(0, CODENAME, [(1,), (None,)]), "not declared to have"),
-        (Axis(1, CODENAME, [(1,), (2,)]), "another turn"),
-    ],
-)
+@looped(("answer", "why"), [
+    (Axis(0, "short", [(1,), (2,)]), "axis that cannot be"),
+    (Axis(0, CODENAME, [(1,)]), "axis that cannot be"),
+    (Axis(0, CODENAME, [(1,), (1,)]), "not declared to have"),
+    (Axis(0, CODENAME, [(1,), (None,)]), "not declared to have"),
+    (Axis(1, CODENAME, [(1,), (2,)]), "another turn"),
+])  # fmt: skip
 def test_an_axis_that_cannot_be_is_refused(answer: Axis, why: str) -> None:
     one = robot()
     one.receive("RA", Plan(0, {CODENAME: 2}))

@@ -16,6 +16,7 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
+from tests.support.cases import looped
 from tests.support.examples import count
 from tests.support.faults import open_descriptors, own_children
 from tests.support.faulty_protocols import (
@@ -50,17 +51,14 @@ def speaking(protocol: type[Protocol], *, timeout: float | None = None) -> tuple
 FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
 
 
-@pytest.mark.parametrize(
-    ("protocol", "lost", "why"),
-    [
-        (Raises, FIRST, r"ValueError: out of ideas \(.*faulty_protocols.py:\d+\)"),
-        (RaisesAtOnce, FIRST, r"ValueError: no ideas at all"),
-        (Leaves, FIRST, r"its process ended with status 7"),
-        (HangsUp, FIRST, r"its process cannot be reached any more"),
-        (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
-        (TalksNonsense, SECOND, rf"BadMessageError: {FIRST} sent {SECOND} an invalid message"),
-    ],
-)
+@looped(("protocol", "lost", "why"), [
+    (Raises, FIRST, r"ValueError: out of ideas \(.*faulty_protocols.py:\d+\)"),
+    (RaisesAtOnce, FIRST, r"ValueError: no ideas at all"),
+    (Leaves, FIRST, r"its process ended with status 7"),
+    (HangsUp, FIRST, r"its process cannot be reached any more"),
+    (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
+    (TalksNonsense, SECOND, rf"BadMessageError: {FIRST} sent {SECOND} an invalid message"),
+])  # fmt: skip
 def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:
     with pytest.raises(RobotsLostError) as caught:
         speaking(protocol)
@@ -84,7 +82,7 @@ def test_a_message_of_a_megabyte() -> None:
 
 
 def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
-    verdict, _ = speaking(Spins, timeout=0.5)
+    verdict, _ = speaking(Spins, timeout=0.1)
     assert verdict is Verdict.UNKNOWN
 
 
@@ -122,7 +120,7 @@ def test_who_reports_while_it_is_looked_at_is_heard(monkeypatch: pytest.MonkeyPa
     assert ProcessesRun(TEAM, Speaks).run().verdict is Verdict.SOLUTION
 
 
-@count("runs", 5, 50)
+@count("runs", 3, 50)
 def test_many_runs_leave_nothing_open(runs: int) -> None:
     before = open_descriptors()
     for _ in range(runs):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 from random import Random
 
-import pytest
-
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -20,6 +18,7 @@ from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, domains_of, played
@@ -53,7 +52,7 @@ def test_the_largest_reduction_is_told() -> None:
     assert cycle(robot(pair()), 2, Improve(0, 9)) == Improve(0, 1)
 
 
-@pytest.mark.parametrize(("told", "moves"), [(Improve(0, 0), True), (Improve(0, 1), True), (Improve(0, 2), False)])
+@looped(("told", "moves"), [(Improve(0, 0), True), (Improve(0, 1), True), (Improve(0, 2), False)])
 def test_the_largest_among_neighbours_moves_and_of_equals_the_first(told: Improve, moves: bool) -> None:  # noqa: FBT001
     it = robot(pair())
     cycle(it, 2, told)
@@ -69,30 +68,19 @@ def test_modifiers_are_raised_where_neither_it_nor_a_neighbour_gains() -> None:
     assert it.raised == {0: {(None, None): (0, 1)}}
 
 
-@pytest.mark.parametrize(
-    ("scope", "key"), [("E", (0, (1,))), ("R", (None, (1,))), ("C", (0, None)), ("T", (None, None))]
-)
+@looped(("scope", "key"), [("E", (0, (1,))), ("R", (None, (1,))), ("C", (0, None)), ("T", (None, None))])
 def test_the_scope_says_which_entries_are_raised(scope: str, key: tuple[object, object]) -> None:
     it = robot(pair(), violation="NZ", scope=scope)
     cycle(it, 1, Improve(0, 0))
     assert it.raised == {0: {key: (0, 1)}}
 
 
-@pytest.mark.parametrize(
-    ("violation", "costs", "raised"),
-    [
-        ("NZ", (0, 5, 3, 4), False),
-        ("NZ", (2, 5, 3, 4), True),
-        ("NM", (2, 5, 3, 4), False),
-        ("NM", (2, 5, 3, 1), True),
-        ("MX", (2, 5, 3, 4), False),
-        ("MX", (2, 1, 3, 4), False),
-        ("MX", (4, 1, 4, 4), True),
-        ("MX", (4, 1, 4, 5), False),
-        ("MX", (INFINITE, 1, INFINITE, 4), True),
-        ("MX", (4, 1, 4, INFINITE), False),
-    ],
-)
+@looped(("violation", "costs", "raised"), [
+    ("NZ", (0, 5, 3, 4), False), ("NZ", (2, 5, 3, 4), True), ("NM", (2, 5, 3, 4), False),
+    ("NM", (2, 5, 3, 1), True), ("MX", (2, 5, 3, 4), False), ("MX", (2, 1, 3, 4), False),
+    ("MX", (4, 1, 4, 4), True), ("MX", (4, 1, 4, 5), False), ("MX", (INFINITE, 1, INFINITE, 4), True),
+    ("MX", (4, 1, 4, INFINITE), False),
+])  # fmt: skip
 def test_what_is_violated(violation: str, costs: tuple[float, ...], raised: bool) -> None:  # noqa: FBT001
     relation = Relation("T", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), costs)
     it = robot(pair(relation), violation=violation)
@@ -100,7 +88,7 @@ def test_what_is_violated(violation: str, costs: tuple[float, ...], raised: bool
     assert bool(it.raised) is raised
 
 
-@pytest.mark.parametrize(("modifier", "waits"), [("A", (0, 1)), ("M", (1,))])
+@looped(("modifier", "waits"), [("A", (0, 1)), ("M", (1,))])
 def test_it_leaves_a_local_minimum_once_it_weighs_enough(modifier: str, waits: tuple[int, ...]) -> None:
     """2 against 3: 2 + 1 gains nothing, 2 + 2 gains 1; 2 * 2 gains 1 at once."""
     it = robot(pair(), modifier=modifier, violation="NZ", scope="E")
@@ -127,8 +115,8 @@ def test_a_cost_that_outgrows_messages_is_told_as_the_largest() -> None:
     assert cycle(it, 1, Improve(0, 0)) == Improve(0, MOST)
 
 
-@pytest.mark.parametrize("scope", "RT")
-@pytest.mark.parametrize("violation", ["NZ", "NM", "MX"])
+@looped("scope", "RT")
+@looped("violation", ["NZ", "NM", "MX"])
 @count("teams", 5, 40)
 def test_added_to_all_own_values_alike_it_is_mgm(scope: str, violation: str, teams: int) -> None:
     chance = Random(f"as mgm {scope} {violation}")

@@ -16,13 +16,15 @@ from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.costs import normalized
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE, ProblemKind, Team
+from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.auctions.grape import GRAPE
 from robochoc.protocols.auctions.messages.grape import Partition
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, robot_of, started
 from tests.support.allocation_problems import Congestion, plain, random_congestion, simple_allocation_team
+from tests.support.cases import looped
+from tests.support.cost_problems import with_costs
 from tests.support.examples import count
 from tests.support.limits import HANG_S
 from tests.support.local_search_runs import any_schedule, played
@@ -44,8 +46,7 @@ def team_of_three(*worth: tuple[int, int], cost: float = INFINITE) -> Team:
     for name, (one, other) in zip("ABC", worth, strict=True):
         saves = Relation(f"U{name}", 1, Semantics.SOFT, ((0,), (1,), (2,)), (100, 100 - one, 100 - other))
         made.append(Constraint("U", saves, (name,), (name,), None))
-    team = team_of(dict.fromkeys("ABC", (0, 1, 2)), made)
-    return replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
+    return with_costs(team_of(dict.fromkeys("ABC", (0, 1, 2)), made))
 
 
 def robot_a(*worth: tuple[int, int], cost: float = INFINITE, chances: tuple[float, ...] = (0.5,)) -> GRAPE:
@@ -171,7 +172,7 @@ def values_of(team: Team, chance: Random) -> tuple[dict[str, int], int]:
     return {name: value for own in result.assignments.values() for name, value in own.items()}, moves
 
 
-@count("runs", 200, 5000)
+@count("runs", 80, 5000)
 def test_it_ends_in_a_nash_stable_partition(runs: int) -> None:
     chance, several = Random("stable"), 0
     for number in range(runs):
@@ -186,7 +187,7 @@ def test_it_ends_in_a_nash_stable_partition(runs: int) -> None:
     assert runs // 5 < several < runs
 
 
-@count("runs", 200, 2000)
+@count("runs", 80, 2000)
 def test_so_it_does_where_robots_exclude_each_other(runs: int) -> None:
     chance, found = Random("exclusive"), 0
     while found < runs:
@@ -203,7 +204,7 @@ def gained(congestion: Congestion, values: tuple[int, ...]) -> float:
     return sum(own[value - 1] for own, value in zip(congestion.worth, values, strict=True) if value) - paid
 
 
-@count("runs", 200, 2000)
+@count("runs", 80, 2000)
 def test_where_coalitions_never_gain_less_with_more_robots_half_of_the_optimum_is_gained(runs: int) -> None:
     chance, worst = Random("half"), 1.0
     for _ in range(runs):
@@ -217,7 +218,8 @@ def test_where_coalitions_never_gain_less_with_more_robots_half_of_the_optimum_i
     assert 0.5 <= worst < 1
 
 
-@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
+@pytest.mark.more
+@looped("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
 def test_it_ends_so_on_every_runtime(runtime: Runtime) -> None:
     team = plain(random_congestion(Random(4)).team)
     outcome = solve(team, Options(protocol="grape", runtime=runtime, timeout=HANG_S))
@@ -243,8 +245,7 @@ def test_pairs_that_cost_different_amounts_are_refused() -> None:
     made = [
         Constraint("S", one, pair, pair) for one, pair in ((dear, ("A", "B")), (cheap, ("B", "C")), (dear, ("A", "C")))
     ]
-    team = team_of(dict.fromkeys("ABC", (0, 1)), made)
-    team = replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
+    team = with_costs(team_of(dict.fromkeys("ABC", (0, 1)), made))
     with pytest.raises(UnsupportedError, match="a task whose pairs of robots cost 4 and 5"):
         solve(team, Options(protocol="grape", runtime=Runtime.SIMULATOR))
 

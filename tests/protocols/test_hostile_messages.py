@@ -28,6 +28,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.encoding import TooLargeError
 from tests.support.allocation_problems import random_allocation
+from tests.support.cases import cases, looped
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 
@@ -36,7 +37,7 @@ TEAMS = [team_of(dict.fromkeys("ABC", values), TRIANGLE) for values in ((1, 2, 3
 """With a solution, and without one."""
 ALLOCATIONS = [random_allocation(Random(seed), simple=True).team for seed in range(3)]
 """For protocols that take only these."""
-MOST = 200
+MOST = 120
 """Messages in a run."""
 SPOILT = {1, 4}
 """Which messages of each type are spoilt, counted from one."""
@@ -93,7 +94,7 @@ def run(protocol: type[Protocol], team: Team, number: int = -1, content: bytes =
     return taken
 
 
-def cases(protocol: type[Protocol], team: Team) -> Iterator[tuple[int, bytes]]:
+def spoilt_messages(protocol: type[Protocol], team: Team) -> Iterator[tuple[int, bytes]]:
     """Yield the numbers of messages that are to be spoilt, with what stands in their place."""
     seen: Counter[str] = Counter()
     for number, envelope in enumerate(run(protocol, team)):
@@ -104,22 +105,30 @@ def cases(protocol: type[Protocol], team: Team) -> Iterator[tuple[int, bytes]]:
 
 
 LONG = {"kopt", "mgm2", "p32-dpop"}
-NAMES = [name for name in protocol_names() if not protocol_named(name).traits.lacks]
+SHORT = {name for name in protocol_names() if not protocol_named(name).traits.lacks} - LONG
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in NAMES])
-def test_a_message_that_cannot_be_is_refused_or_harmless(name: str) -> None:
-    protocol = protocol_named(name)
+@pytest.mark.usefixtures("quick_encryption")
+@pytest.mark.parametrize("names", [SHORT, pytest.param(LONG, marks=pytest.mark.slow)], ids=["short", "long"])
+def test_a_message_that_cannot_be_is_refused_or_harmless(names: set[str]) -> None:
+    with cases() as each:
+        for name in sorted(names):
+            with each(name):
+                assert refusals(protocol_named(name))
+
+
+def refusals(protocol: type[Protocol]) -> int:
+    """Run the protocol with each spoilt message in turn; return how many were refused."""
     refused = 0
     for team in ALLOCATIONS if protocol.traits.allocates else TEAMS:
-        for number, content in cases(protocol, team):
+        for number, content in spoilt_messages(protocol, team):
             try:
                 run(protocol, team, number, content)
             except BadMessageError as bad:
                 refused += "cannot be used" in str(bad)
             except TooLargeError:  # it believes a size, and says so
                 continue
-    assert refused
+    return refused
 
 
 BAD_VALUES: dict[Value, str] = {
@@ -129,8 +138,8 @@ BAD_VALUES: dict[Value, str] = {
 }
 
 
-@pytest.mark.parametrize("value", BAD_VALUES)
-@pytest.mark.parametrize("name", ["abt", "afc", "awc", "syncbb"])
+@looped("value", BAD_VALUES)
+@looped("name", ["abt", "afc", "awc", "syncbb"])
 def test_the_reason_says_whose_value_it_is(name: str, value: Value) -> None:
     """Also where it is found out later than the message has come, or from what another robot passes on."""
     protocol = protocol_named(name)

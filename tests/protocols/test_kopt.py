@@ -16,10 +16,10 @@ from robochoc.protocols.local_search.kopt import KOpt
 from robochoc.protocols.local_search.kopt_groups import Neighbourhood
 from robochoc.protocols.local_search.messages.kopt import MoveTogether, Offer, Offers, Part, Region, Table, Values
 from robochoc.protocols.local_search.settings.kopt import KOptSettings
-from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.solver.encoding import TooLargeError
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import (
@@ -60,12 +60,14 @@ def pair(*, k: int = 2) -> KOpt:
     return robot
 
 
-def offering() -> KOpt:
-    """The same, when all values are known: 1 and 1."""
+def offering(*, told: bool = False) -> KOpt:
+    """The same, when all values are known: 1 and 1; with `told` its offer has been told."""
     robot = pair()
     replies(robot, ("RB", Region({"RB": Part(FREE, [])})))
     assert replies(robot, ("RB", Region({}))) == [("RB", Values({"RA": 0}))]
     assert replies(robot, ("RB", Values({"RB": 0}))) == [("RB", Values({"RB": 0}))]
+    if told:
+        replies(robot, ("RB", Values({})))
     return robot
 
 
@@ -79,47 +81,34 @@ def test_a_centre_offers_the_best_move_of_a_group() -> None:
     assert replies(offering(), ("RB", Values({}))) == [("RB", offered)]
 
 
-@pytest.mark.parametrize(("rival", "moves"), [(4, True), (5, True), (6, False)])
+@looped(("rival", "moves"), [(4, True), (5, True), (6, False)])
 def test_of_moves_that_touch_each_other_the_best_is_made_and_of_equal_ones_the_first(
     rival: int,
     moves: bool,  # noqa: FBT001
 ) -> None:
-    robot = offering()
-    replies(robot, ("RB", Values({})))
+    robot = offering(told=True)
     replies(robot, ("RB", Offers({"RB": Offer(0, rival, {"RB": 1})})))
     replies(robot, ("RB", Offers({})))
     assert replies(robot, ("RB", Offers({}))) == [("RB", MoveTogether({"RA": 1, "RB": 1} if moves else {}))]
 
 
 def test_who_is_told_to_move_takes_its_new_value_and_tells_it() -> None:
-    robot = offering()
-    replies(robot, ("RB", Values({})))
+    """Who has not moved tells no value."""
+    robot = offering(told=True)
     for _ in range(3):
         replies(robot, ("RB", Offers({"RB": Offer(0, 9, {"RA": 1, "RB": 1})})))
     assert replies(robot, ("RB", MoveTogether({"RA": 1, "RB": 1}))) == [("RB", Values({"RA": 1}))]
     assert value(robot) == (2,)
-
-
-def test_who_has_not_moved_tells_no_value() -> None:
-    robot = offering()
-    replies(robot, ("RB", Values({})))
+    robot = offering(told=True)
     for _ in range(3):
         replies(robot, ("RB", Offers({"RB": Offer(0, 9, {"RB": 1})})))
     assert replies(robot, ("RB", MoveTogether({"RB": 1}))) == [("RB", Values({}))]
 
 
-@pytest.mark.parametrize(
-    ("centre", "k", "groups"),
-    [
-        ("RC", 1, {"C"}),
-        ("RC", 2, {"BC", "CD"}),
-        ("RA", 2, {"AB"}),
-        ("RC", 3, {"BCD"}),
-        ("RC", 4, {"ABCD", "BCDE"}),
-        ("RC", 5, {"ABCDE"}),
-        ("RA", 8, {"ABCDE"}),
-    ],
-)
+@looped(("centre", "k", "groups"), [
+    ("RC", 1, {"C"}), ("RC", 2, {"BC", "CD"}), ("RA", 2, {"AB"}), ("RC", 3, {"BCD"}),
+    ("RC", 4, {"ABCD", "BCDE"}), ("RC", 5, {"ABCDE"}), ("RA", 8, {"ABCDE"}),
+])  # fmt: skip
 def test_groups_are_connected_and_reach_half_of_k_from_the_centre(centre: str, k: int, groups: set[str]) -> None:
     known = Neighbourhood(centre, parts(), RANK, k, k // 2)
     assert {"".join(name[1:] for name in group) for group in known.groups} == groups
@@ -137,16 +126,10 @@ def test_of_equally_good_moves_one_of_the_fewest_robots_is_offered() -> None:
     assert Neighbourhood("RA", told, RANK, 2, 1).best({"RA": 0, "RB": 1}).moves.keys() == {"RA"}
 
 
-@pytest.mark.parametrize(
-    "table",
-    [
-        Table(["RA", "RB"], [0, 0, 0]),
-        Table(["RB", "RA"], COSTS),
-        Table(["RA", "RA"], COSTS),
-        Table(["RA", "RB"], [0, -1, 0, 0]),
-        Table(["RA", "RB"], [0, float("nan"), 0, 0]),
-    ],
-)
+@looped("table", [
+    Table(["RA", "RB"], [0, 0, 0]), Table(["RB", "RA"], COSTS), Table(["RA", "RA"], COSTS),
+    Table(["RA", "RB"], [0, -1, 0, 0]), Table(["RA", "RB"], [0, float("nan"), 0, 0]),
+])  # fmt: skip
 def test_tables_that_cannot_be_are_refused(table: Table) -> None:
     with pytest.raises(ValueError, match=r"that cannot be|not its own"):
         Neighbourhood("RA", {"RA": Part(FREE, [table]), "RB": Part(FREE, [])}, RANK, 2, 1)
@@ -196,8 +179,8 @@ def connected(names: tuple[str, ...], scopes: list[set[str]]) -> bool:
     return len(reached) == len(names)
 
 
-@pytest.mark.parametrize("k", [1, 2, 3, 4])
-@count("teams", 6, 60)
+@looped("k", [1, 2, 3, 4])
+@count("teams", 4, 60)
 def test_the_cost_never_rises_and_the_end_is_a_k_optimum(teams: int, k: int) -> None:
     chance = Random(f"kopt {k}")
     for seed in range(teams):
@@ -224,9 +207,3 @@ def test_three_that_are_stuck_in_pairs_move_together() -> None:
     }
     assert (0, 5) in ends[2]
     assert ends[3] == {(0, 0)}
-
-
-@pytest.mark.parametrize("k", ["0", "9"])
-def test_k_is_bounded(k: str) -> None:
-    with pytest.raises(SettingsError, match="it must be from 1 to 8"):
-        settings_of(KOpt, {"k": k})

@@ -15,6 +15,7 @@ from robochoc.protocols.local_search.messages.lamdls import Colour
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import (
@@ -55,7 +56,7 @@ def test_who_has_no_neighbour_of_higher_priority_takes_the_first_colour_at_once(
     assert started(robot_of(LAMDLS, triangle(), "RA", 0.9)) == [("RB", Colour((3,), 0)), ("RC", Colour((3,), 0))]
 
 
-@pytest.mark.parametrize(("left", "right", "own"), [(0, 1, 2), (1, 2, 0), (0, 2, 1), (1, 1, 0)])
+@looped(("left", "right", "own"), [(0, 1, 2), (1, 2, 0), (0, 2, 1), (1, 1, 0)])
 def test_the_smallest_colour_that_is_free_is_taken(left: int, right: int, own: int) -> None:
     robot = robot_of(LAMDLS, triangle(), "RC", 0.0)
     started(robot)

@@ -25,10 +25,10 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.listed_optima import put_together
 from robochoc.run.options import Preprocess, Withdrawal
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import priced_solutions
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
 from tests.support.dpop_robots import FEW, products
@@ -107,18 +107,13 @@ def test_what_is_said_of_optima_in_words() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("message", "why"),
-    [
-        (ListedValues([], []), "0 combinations"),
-        (ListedValues([[0]], ["0", "0"]), "1 combinations of values, and 2 numbers"),
-        (ListedValues([[0]] * 101, ["0"] * 101), "101 combinations"),
-        (ListedValues([[2]], ["0"]), "are no values"),
-        (ListedValues([[-1]], ["0"]), "are no values"),
-        (ListedValues([[0, 0]], ["0"]), "are no values"),
-        (ListedValues([[0]], ["1"]), "has no optimum 1"),
-    ],
-)
+@looped(("message", "why"), [
+    (ListedValues([], []), "0 combinations"),
+    (ListedValues([[0]], ["0", "0"]), "1 combinations of values, and 2 numbers"),
+    (ListedValues([[0]] * 101, ["0"] * 101), "101 combinations"),
+    (ListedValues([[2]], ["0"]), "are no values"), (ListedValues([[-1]], ["0"]), "are no values"),
+    (ListedValues([[0, 0]], ["0"]), "are no values"), (ListedValues([[0]], ["1"]), "has no optimum 1"),
+])  # fmt: skip
 def test_optima_that_cannot_be_are_refused(message: Message, why: str) -> None:
     robot = robot_of("RB", "A")
     replies(robot, ("RA", Proceed(["RA"])))
@@ -133,12 +128,6 @@ def test_optima_that_come_twice_or_too_early_are_refused() -> None:
     replies(robot, ("RA", Proceed(["RA"])), ("RA", ListedValues([[0]], ["0"])))
     with pytest.raises(ValueError, match="values already"):
         replies(robot, ("RA", ListedValues([[0]], ["0"])))
-
-
-@pytest.mark.parametrize("limit", ["0", "-1", "10001"])
-def test_a_limit_that_is_none_is_refused(limit: str) -> None:
-    with pytest.raises(UnsupportedError, match="limit is a number of optima"):
-        solve(pairs(1), replace(IN_SIMULATOR, settings={"limit": limit}))
 
 
 # The run
@@ -239,7 +228,7 @@ def test_of_a_robot_that_nobody_sees_one_value_is_listed() -> None:
     assert optima == Optima(1, ({"A": 1},))
 
 
-@pytest.mark.parametrize(
+@looped(
     ("places", "why"), [({"RA": [0], "RB": [0, 1]}, "listed 1 to 2 optima"), ({"RA": [0, 0], "RB": [1, 1]}, "the same")]
 )
 def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]], why: str) -> None:

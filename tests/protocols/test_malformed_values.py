@@ -16,6 +16,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.agents import robot_of
+from tests.support.cases import looped
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 
@@ -73,8 +74,8 @@ def after(protocol: type[Protocol], number: int, changed: Callable[[Value], Valu
 CYCLES = tuple(name for name in protocol_names() if issubclass(protocol_named(name), CycleProtocol))
 
 
-@pytest.mark.parametrize("bad", BAD)
-@pytest.mark.parametrize("name", [*CYCLES, "async-maxsum", "bounded-maxsum", "cocoa", "d-gibbs"])
+@looped("bad", BAD)
+@looped("name", [*CYCLES, "async-maxsum", "bounded-maxsum", "cocoa", "d-gibbs"])
 def test_a_value_that_the_sender_cannot_have_is_refused(name: str, bad: str) -> None:
     protocol = protocol_named(name)
     with pytest.raises(ValueError, match=r"has 1 part|cannot be 99"):

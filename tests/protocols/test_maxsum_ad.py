@@ -14,10 +14,10 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.inference.maxsum_ad import MaxSumAD
 from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum_ad import MaxSumADSettings
-from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain, Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_tree
 from tests.support.examples import count
 from tests.support.local_search_runs import (
@@ -89,9 +89,7 @@ def test_from_the_third_phase_on_a_value_is_told_instead_of_q() -> None:
     assert robot.own == [[4, 6]]
 
 
-@pytest.mark.parametrize(
-    ("variant", "kinds"), [("AD", "QQQQQ"), ("ADVP", "QVVVV"), ("ADSSVP", "QVVQV")], ids=["AD", "ADVP", "ADSSVP"]
-)
+@looped(("variant", "kinds"), [("AD", "QQQQQ"), ("ADVP", "QVVVV"), ("ADSSVP", "QVVQV")])
 def test_which_phases_down_tell_values(variant: str, kinds: str) -> None:
     """Of phases 3, 4 | 6, 7 | 9, 10 values are told by ADSSVP, and of those 4, 6 and 10 go down."""
     robot = middle(variant)
@@ -149,7 +147,7 @@ def test_who_has_no_r_from_below_tells_its_domain_again() -> None:
 
 
 @count("trees", 60, 500)
-@pytest.mark.parametrize("variant", ["AD", "ADVP", "ADSSVP"])
+@looped("variant", ["AD", "ADVP", "ADSSVP"])
 def test_on_a_tree_in_its_order_two_phases_find_the_optimum(variant: str, trees: int) -> None:
     """With preferences too small to matter. ADVP stays there."""
     chance = Random(f"trees {variant}")
@@ -205,7 +203,7 @@ def test_with_value_propagation_the_cost_never_rises_and_the_search_settles(team
 
 
 @count("teams", 25, 300)
-@pytest.mark.parametrize("variant", ["AD", "ADVP", "ADSSVP"])
+@looped("variant", ["AD", "ADVP", "ADSSVP"])
 def test_what_is_proven_is_true(variant: str, teams: int) -> None:
     chance = Random(f"proofs {variant}")
     proofs = 0
@@ -217,12 +215,3 @@ def test_what_is_proven_is_true(variant: str, teams: int) -> None:
                 proofs += 1
                 assert least_cost(team) == INFINITE
     assert proofs or teams < 100
-
-
-@pytest.mark.parametrize(
-    ("name", "given", "rule"),
-    [("variant", "VP", "variant"), ("preference", "-1", "a number, 0 or more"), ("cycles", "0", "1 or more")],
-)
-def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
-    with pytest.raises(SettingsError, match=rule):
-        settings_of(MaxSumAD, {name: given})

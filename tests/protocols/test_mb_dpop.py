@@ -5,26 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from decimal import Decimal
+from functools import partial
 from random import Random
 
 import pytest
 
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Sent
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.inference.mb_dpop import MBDPOP
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Need, Proceed
+from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Proceed
 from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth, Label
-from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import minimum_withdrawal
-from tests.support.dpop_robots import products
+from tests.support.dpop_robots import FEW, bounded, products, told
 from tests.support.examples import count
 from tests.support.loose_problems import loosened
 from tests.support.problems import random_team
@@ -32,23 +32,14 @@ from tests.support.pseudo_trees import placed
 from tests.support.random_options import random_options
 from tests.support.wide_problems import wide_team
 
-FEW = Need(1, "RX")
 BOUNDED = ("mb-dpop", "rmb-dpop")
+
+
+robot_of = partial(bounded, MBDPOP)
 
 
 def place(depth: int, values: tuple[int, ...] = (1, 2, 3)) -> DomainAtDepth:
     return DomainAtDepth(depth, [(one,) for one in values])
-
-
-def robot_of(team: Team, name: str, above: str = "", below: str = "", k: int = 1) -> MBDPOP:
-    """One robot below the robots of `above`, nearest first, of which the last is the root; with children `below`."""
-    over, under = ([f"R{letter}" for letter in letters] for letters in (above, below))
-    robot = placed(MBDPOP, team, name, over[0] if over else None, pseudo_parents=over[1:], children=under)
-    equip(robot, {"k": str(k)})
-    for depth, one in enumerate(reversed(over)):
-        robot.receive(one, place(depth))
-    robot.settle()
-    return robot
 
 
 def label(sizes: dict[str, tuple[int, int]], cut: dict[str, int], dearest: int = 9) -> Label:
@@ -58,11 +49,6 @@ def label(sizes: dict[str, tuple[int, int]], cut: dict[str, int], dearest: int =
 def last_label(robot: MBDPOP) -> Label:
     (said,) = [message for _, message in robot.outbox if isinstance(message, Label)]
     return said
-
-
-def told(robot: MBDPOP, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    robot.outbox.clear()
-    return replies(robot, *packet)
 
 
 # Labels
@@ -80,19 +66,19 @@ def test_a_separator_of_at_most_k_robots_is_not_cut() -> None:
 
 
 def test_of_a_larger_separator_the_highest_robots_are_cut_until_k_are_left() -> None:
-    robot = robot_of(products("ABCD", "AB BC CD AD BD AC"), "RD", "CBA", k=1)
+    robot = robot_of(products("ABCD", "AB BC CD AD BD AC"), "RD", "CBA")
     assert last_label(robot).cut == {"RA": 3, "RB": 3}
 
 
 def test_lists_of_children_are_taken_over_and_count() -> None:
     team = products("ABCD", "AB BC CD AD BD AC")
-    robot = robot_of(team, "RC", "BA", "D", k=1)
+    robot = robot_of(team, "RC", "BA", "D")
     replies(robot, ("RD", label({"RC": (3, 2), "RB": (3, 1), "RA": (3, 0)}, {"RA": 3, "RB": 3})))
     assert robot.cut == {"RA": 3, "RB": 3}
 
 
 def test_a_cluster_root_has_nobody_of_the_lists_above_it() -> None:
-    robot = robot_of(products("ABCD", "AB BC BD CD"), "RB", "A", "C", k=1)
+    robot = robot_of(products("ABCD", "AB BC BD CD"), "RB", "A", "C")
     replies(robot, ("RC", label({"RB": (3, 1)}, {"RB": 3, "RC": 3})))
     assert robot.enumerated == {"RB": 3, "RC": 3}
     assert robot.cut == {}
@@ -100,7 +86,7 @@ def test_a_cluster_root_has_nobody_of_the_lists_above_it() -> None:
 
 def test_clusters_are_joined_where_the_separator_is_still_too_large() -> None:
     team = products("ABCDE", "AC BC AB CD")
-    robot = robot_of(team, "RC", "BA", "D", k=1)
+    robot = robot_of(team, "RC", "BA", "D")
     replies(robot, ("RD", label({"RC": (3, 2)}, {"RC": 3})))
     assert robot.enumerated == {}
     assert robot.cut == {"RC": 3, "RA": 3}
@@ -117,7 +103,7 @@ def test_without_lists_a_robot_is_one_of_dpop() -> None:
 
 
 def cut_leaf() -> MBDPOP:
-    robot = robot_of(products("ABC", "AB BC AC"), "RC", "BA", k=1)
+    robot = robot_of(products("ABC", "AB BC AC"), "RC", "BA")
     replies(robot, ("RB", Proceed(["RB", "RA"])))
     return robot
 
@@ -133,7 +119,7 @@ def test_a_leaf_in_a_cluster_waits_for_a_context_and_sends_the_table_that_is_lef
 
 def test_a_robot_that_is_fixed_does_not_choose_in_a_context() -> None:
     """B passes contexts on to C, and takes the value that it has in them."""
-    robot = robot_of(products("ABC", "AB BC AC"), "RB", "A", "C", k=1)
+    robot = robot_of(products("ABC", "AB BC AC"), "RB", "A", "C")
     replies(robot, ("RC", label({"RB": (3, 1), "RA": (3, 0)}, {"RA": 3, "RB": 3})))
     told(robot, ("RA", Proceed(["RA"])))
     assert told(robot, ("RA", Context([2, 1]))) == [("RC", Context([2, 1]))]
@@ -143,7 +129,7 @@ def test_a_robot_that_is_fixed_does_not_choose_in_a_context() -> None:
 
 
 def test_a_cluster_root_tries_every_context_and_sends_the_best_once_more() -> None:
-    robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B", k=1)
+    robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B")
     assert told(robot, ("RB", label({"RA": (2, 0)}, {"RA": 2}))) == [("RB", Proceed(["RA"])), ("RB", Context([0]))]
     assert told(robot, ("RB", UTIL(1, bytes([3])))) == [("RB", Context([1]))]
     assert told(robot, ("RB", UTIL(1, bytes([5])))) == [("RB", Context([0]))]
@@ -153,13 +139,13 @@ def test_a_cluster_root_tries_every_context_and_sends_the_best_once_more() -> No
 
 
 def test_the_last_context_is_not_sent_again_if_it_was_the_best() -> None:
-    robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B", k=1)
+    robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B")
     replies(robot, ("RB", label({"RA": (2, 0)}, {"RA": 2})), ("RB", UTIL(1, bytes([6]))))
     assert told(robot, ("RB", UTIL(1, bytes([5])))) == [("RB", VALUE([1]))]
 
 
 def test_a_child_outside_the_cluster_is_asked_once() -> None:
-    robot = robot_of(products("ABC", "AB AC", (1, 2)), "RA", below="BC", k=1)
+    robot = robot_of(products("ABC", "AB AC", (1, 2)), "RA", below="BC")
     packet = [("RB", label({"RA": (2, 0)}, {"RA": 2})), ("RC", label({"RA": (2, 0)}, {}))]
     replies(robot, *packet, ("RC", UTIL(1, bytes([1, 9]))), ("RB", UTIL(1, bytes([3]))))
     assert told(robot, ("RB", UTIL(1, bytes([2])))) == [("RB", Context([0]))]
@@ -167,7 +153,7 @@ def test_a_child_outside_the_cluster_is_asked_once() -> None:
 
 
 def test_a_context_without_a_solution_proves_nothing() -> None:
-    robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B", k=1)
+    robot = robot_of(products("AB", "AB", (1, 2)), "RA", below="B")
     replies(robot, ("RB", label({"RA": (2, 0)}, {"RA": 2})), ("RB", UTIL(1, bytes([255]))))
     assert robot.verdict is None
     replies(robot, ("RB", UTIL(1, bytes([255]))))
@@ -187,7 +173,7 @@ def test_what_is_said_of_contexts_in_words() -> None:
 # What is no message of a well-behaved robot
 
 
-@pytest.mark.parametrize("values", [[], [3], [0, 0], [-1]])
+@looped("values", [[], [3], [0, 0], [-1]])
 def test_contexts_that_are_none_are_refused(values: list[int]) -> None:
     with pytest.raises(ValueError, match="are no values of RA"):
         replies(cut_leaf(), ("RB", Context(values)))
@@ -201,7 +187,7 @@ def test_a_context_for_who_needs_none_is_refused() -> None:
 
 
 def test_a_label_of_a_larger_table_is_refused() -> None:
-    robot = robot_of(products("ABC", "AB BC AC"), "RA", below="B", k=1)
+    robot = robot_of(products("ABC", "AB BC AC"), "RA", below="B")
     with pytest.raises(ValueError, match="2 dimensions"):
         replies(robot, ("RB", label({"RA": (3, 0), "RC": (3, 0)}, {})))
 
@@ -214,16 +200,10 @@ def test_values_that_are_not_those_of_the_context_are_refused() -> None:
 
 
 def test_a_table_before_a_context_is_refused() -> None:
-    robot = robot_of(products("ABC", "AB BC AC"), "RB", "A", "C", k=1)
+    robot = robot_of(products("ABC", "AB BC AC"), "RB", "A", "C")
     replies(robot, ("RC", label({"RB": (3, 1), "RA": (3, 0)}, {"RA": 3, "RB": 3})), ("RA", Proceed(["RA"])))
     with pytest.raises(ValueError, match="was not asked"):
         replies(robot, ("RC", UTIL(1, bytes([7]))))
-
-
-@pytest.mark.parametrize("settings", [{"k": "0"}, {"k": "-1"}, {"memory": "0"}])
-def test_what_is_no_bound_is_refused(settings: dict[str, str]) -> None:
-    with pytest.raises(UnsupportedError, match="--set"):
-        solve(products("AB", "AB"), Options(protocol="mb-dpop", settings=settings))
 
 
 # Its promises
@@ -251,7 +231,7 @@ def tables(team: Team, options: Options) -> tuple[float | Decimal | None, dict[s
     return outcome.cost if outcome.verdict is Verdict.OPTIMAL else None, dimensions, sent
 
 
-@pytest.mark.parametrize("protocol", BOUNDED)
+@looped("protocol", BOUNDED)
 @count("problems", 15, 2000)
 def test_the_least_cost_is_found_without_a_table_over_k_dimensions(protocol: str, problems: int) -> None:
     chance, cut = Random(f"bounded {protocol}"), 0
@@ -268,7 +248,7 @@ def test_the_least_cost_is_found_without_a_table_over_k_dimensions(protocol: str
     assert cut > problems // 5
 
 
-@pytest.mark.parametrize("protocol", BOUNDED)
+@looped("protocol", BOUNDED)
 @count("problems", 2, 100)
 def test_as_few_as_possible_withdraw_with_one_dimension(protocol: str, problems: int) -> None:
     chance = Random(f"withdrawal {protocol}")
@@ -280,7 +260,7 @@ def test_as_few_as_possible_withdraw_with_one_dimension(protocol: str, problems:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("protocol", BOUNDED)
+@looped("protocol", BOUNDED)
 def test_the_least_cost_is_found_in_processes_with_one_dimension(protocol: str) -> None:
     chance = Random(f"bounded processes {protocol}")
     for _ in range(20):
@@ -291,7 +271,7 @@ def test_the_least_cost_is_found_in_processes_with_one_dimension(protocol: str) 
         assert outcome.cost == (None if least == INFINITE else least)
 
 
-@pytest.mark.parametrize("protocol", BOUNDED)
+@looped("protocol", BOUNDED)
 def test_it_works_where_dpop_has_no_room_and_is_named_then(protocol: str) -> None:
     team = random_csp(9, 3, 0.9, 0, 4, max_cost=9)
     with pytest.raises(UnsupportedError, match=rf"induced width .*these do: .*\b{protocol}\b"):
@@ -300,10 +280,9 @@ def test_it_works_where_dpop_has_no_room_and_is_named_then(protocol: str) -> Non
     assert solve(team, options).cost == solve(team, replace(options, protocol="dpop", settings={})).cost
 
 
-@pytest.mark.parametrize(
-    ("refused", "settings"),
-    [("dpop", {"memory": "5000"}), ("count-dpop", {"memory": "5000"}), ("p-dpop", {"cells": "500"})],
-)
+@looped(("refused", "settings"), [
+    ("dpop", {"memory": "5000"}), ("count-dpop", {"memory": "5000"}), ("p-dpop", {"cells": "500"}),
+])  # fmt: skip
 def test_whose_tables_are_as_wide_is_not_named_then(refused: str, settings: dict[str, str]) -> None:
     team = random_csp(9, 3, 0.9, 0, 4, max_cost=9)
     with pytest.raises(UnsupportedError, match="these do: ") as told:

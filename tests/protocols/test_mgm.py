@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
-
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.examples import count
 from tests.support.local_search_runs import (
     any_schedule,
     assignments_by_cycle,
@@ -62,7 +62,7 @@ def test_who_does_not_stays_and_tells_its_value() -> None:
     assert replies(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 11))) == [("RA", Value((1,))), ("RC", Value((1,)))]
 
 
-@pytest.mark.parametrize(("left", "right", "moves"), [(10, 0, False), (0, 10, True)])
+@looped(("left", "right", "moves"), [(10, 0, False), (0, 10, True)])
 def test_of_equal_gains_the_first_in_the_order_moves(left: int, right: int, moves: bool) -> None:  # noqa: FBT001
     robot = middle()
     replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
@@ -87,10 +87,10 @@ def test_a_broken_constraint_weighs_more_than_any_cost() -> None:
     assert value(robot) == (2,)
 
 
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
-def test_the_cost_never_rises_and_the_end_is_a_local_optimum(batch: int) -> None:
-    chance = Random(f"mgm {batch}")
-    for seed in range(100 if batch else 30):
+@count("teams", 30, 200)
+def test_the_cost_never_rises_and_the_end_is_a_local_optimum(teams: int) -> None:
+    chance = Random("mgm")
+    for seed in range(teams):
         team = chance.choice((random_cost_team, random_hard_team))(chance)
         if all(domains_of(team).values()):
             course = assignments_by_cycle(team, played(team, MGM, any_schedule(chance), seed, cycles=30))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
-
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -13,10 +11,11 @@ from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.local_search.messages.mgm2 import Accept, Go, Offer, Reject
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
-from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain, Value
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.examples import count
 from tests.support.local_search_runs import (
     any_schedule,
     assignments_by_cycle,
@@ -64,8 +63,20 @@ def test_an_offerer_tells_one_neighbour_what_each_pair_of_values_saves_it() -> N
     assert replies(robot, *both(Value((1,)))) == [("RA", Offer(None)), ("RC", gains((0, -8), (-4, 1)))]
 
 
-def test_who_is_no_offerer_tells_that_there_is_no_offer() -> None:
-    assert replies(middle(WAITS), *both(Value((1,)))) == both(Offer(None))
+def committed() -> MGM2:
+    """An offerer whose offer A has taken."""
+    robot = middle(OFFERS, FIRST)
+    replies(robot, *both(Value((1,))))
+    replies(robot, *both(Offer(None)))
+    assert replies(robot, ("RA", Accept(1, 0, 7))) == both(Gain(0, 7)), "the gain of both is told"
+    return robot
+
+
+def receiver() -> MGM2:
+    """A robot that makes no offer, tells so, and knows the values: 1 each."""
+    robot = middle(WAITS)
+    assert replies(robot, *both(Value((1,)))) == both(Offer(None))
+    return robot
 
 
 def missing(robot: MGM2, *senders: str) -> None:
@@ -115,7 +126,7 @@ def test_a_neighbour_whose_domain_is_lost_is_offered_nothing() -> None:
     assert replies(robot, *both(Value((1,)))) == both(Offer(None))
 
 
-@pytest.mark.parametrize(("lot", "offers"), [(0.49, True), (0.5, False)])
+@looped(("lot", "offers"), [(0.49, True), (0.5, False)])
 def test_the_threshold_is_the_probability_of_being_an_offerer(lot: float, offers: bool) -> None:  # noqa: FBT001
     said = replies(middle(lot), *both(Value((1,))))
     assert any(offer.gains is not None for _, offer in said if isinstance(offer, Offer)) is offers
@@ -129,8 +140,7 @@ def test_an_offerer_takes_no_offer() -> None:
 
 def test_a_receiver_adds_what_the_offerer_has_no_part_in() -> None:
     """A would save 5 by (2, 2); B pays 5 to C now, and would pay 9 then."""
-    robot = middle(WAITS)
-    replies(robot, *both(Value((1,))))
+    robot = receiver()
     assert replies(robot, ("RA", gains((0, -4), (-4, 5))), ("RC", Offer(None))) == [
         ("RA", Accept(1, 0, 1)),
         *both(Gain(0, 1)),
@@ -138,15 +148,13 @@ def test_a_receiver_adds_what_the_offerer_has_no_part_in() -> None:
 
 
 def test_the_best_of_all_offers_is_taken_and_the_others_are_not() -> None:
-    robot = middle(WAITS)
-    replies(robot, *both(Value((1,))))
+    robot = receiver()
     said = replies(robot, ("RA", gains((0, -4), (-4, 5))), ("RC", gains((0, -4), (-4, 6))))
     assert said == [("RC", Accept(1, 0, 2)), ("RA", Reject()), *both(Gain(0, 2))]
 
 
 def test_an_offer_that_saves_nothing_is_not_taken() -> None:
-    robot = middle(WAITS)
-    replies(robot, *both(Value((1,))))
+    robot = receiver()
     assert replies(robot, *both(gains((0, -4), (-4, 4)))) == [*both(Reject()), *both(Gain(0, 0))]
 
 
@@ -158,37 +166,21 @@ def test_an_offerer_whose_offer_is_not_taken_stands_alone() -> None:
     assert replies(robot, *both(Gain(0, 9))) == both(Value((2,)))
 
 
-def test_an_offerer_whose_offer_is_taken_tells_the_gain_of_both() -> None:
-    robot = middle(OFFERS, FIRST)
-    replies(robot, *both(Value((1,))))
-    replies(robot, *both(Offer(None)))
-    assert replies(robot, ("RA", Accept(1, 0, 7))) == both(Gain(0, 7))
-
-
-@pytest.mark.parametrize(("rival", "go"), [(6, True), (7, True), (8, False)])
+@looped(("rival", "go"), [(6, True), (7, True), (8, False)])
 def test_the_committed_say_go_if_nobody_else_gains_more(rival: int, go: bool) -> None:  # noqa: FBT001
-    robot = middle(OFFERS, FIRST)
-    replies(robot, *both(Value((1,))))
-    replies(robot, *both(Offer(None)))
-    replies(robot, ("RA", Accept(1, 0, 7)))
+    robot = committed()
     assert replies(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, rival))) == [("RA", Go(go))]
 
 
-@pytest.mark.parametrize(("theirs", "moved"), [(True, (2,)), (False, (1,))])
+@looped(("theirs", "moved"), [(True, (2,)), (False, (1,))])
 def test_both_move_or_neither(theirs: bool, moved: tuple[int]) -> None:  # noqa: FBT001
-    robot = middle(OFFERS, FIRST)
-    replies(robot, *both(Value((1,))))
-    replies(robot, *both(Offer(None)))
-    replies(robot, ("RA", Accept(1, 0, 7)))
+    robot = committed()
     replies(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, 0)))
     assert replies(robot, ("RA", Go(theirs))) == both(Value(moved))
 
 
 def test_who_is_committed_and_has_lost_stays_though_the_partner_would_go() -> None:
-    robot = middle(OFFERS, FIRST)
-    replies(robot, *both(Value((1,))))
-    replies(robot, *both(Offer(None)))
-    replies(robot, ("RA", Accept(1, 0, 7)))
+    robot = committed()
     replies(robot, ("RA", Gain(0, 7)), ("RC", Gain(0, 8)))
     replies(robot, ("RA", Go(True)))
     assert value(robot) == (1,)
@@ -233,22 +225,16 @@ def test_two_that_are_stuck_alone_move_together() -> None:
     assert set(ends[MGM2]) == {(0, 0)}
 
 
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
-def test_the_cost_never_rises_and_the_end_is_a_2_optimum(batch: int) -> None:
+@count("teams", 20, 120)
+def test_the_cost_never_rises_and_the_end_is_a_2_optimum(teams: int) -> None:
     """By what is drawn a pair may not have come to it yet; that it has not in 60 cycles is rare."""
-    chance = Random(f"mgm2 {batch}")
+    chance = Random("mgm2")
     ended = at_optimum = 0
-    for seed in range(60 if batch else 20):
+    for seed in range(teams):
         team = chance.choice((random_cost_team, random_hard_team))(chance)
         if all(domains_of(team).values()):
             course = assignments_by_cycle(team, played(team, MGM2, any_schedule(chance), seed, cycles=60))
             assert never_rises([cost_of_assignment(team, values) for values in course])
             ended += 1
             at_optimum += is_optimal(team, course[-1], together=2)
-    assert at_optimum >= ended - 1
-
-
-@pytest.mark.parametrize("threshold", ["-0.1", "1.1", "nan"])
-def test_the_threshold_is_a_probability(threshold: str) -> None:
-    with pytest.raises(SettingsError, match="it must be from 0 to 1"):
-        settings_of(MGM2, {"threshold": threshold})
+    assert at_optimum >= ended - (1 if teams == 20 else 4)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
-
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.mixed_dsa import MixedDSA
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import settings_of
 from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, domains_of, played
@@ -29,18 +28,12 @@ def moves(now: float, other: float, chance: float, variant: str) -> bool:
     return value(it) == (2,)
 
 
-@pytest.mark.parametrize(
-    ("now", "other", "probabilities"),
-    [
-        (INFINITE, 9, {"A": 0.6, "B": 0.6, "C": 0.6}),
-        (9, 8, {"A": 0.3, "B": 0.3, "C": 0.3}),
-        (INFINITE, INFINITE, {"A": 0, "B": 0.6, "C": 0.6}),
-        (9, 9, {"A": 0, "B": 0.3, "C": 0.3}),
-        (0, 0, {"A": 0, "B": 0, "C": 0.3}),
-        (8, 9, {"A": 0, "B": 0, "C": 0}),
-        (9, INFINITE, {"A": 0, "B": 0, "C": 0}),
-    ],
-)
+@looped(("now", "other", "probabilities"), [
+    (INFINITE, 9, {"A": 0.6, "B": 0.6, "C": 0.6}), (9, 8, {"A": 0.3, "B": 0.3, "C": 0.3}),
+    (INFINITE, INFINITE, {"A": 0, "B": 0.6, "C": 0.6}), (9, 9, {"A": 0, "B": 0.3, "C": 0.3}),
+    (0, 0, {"A": 0, "B": 0, "C": 0.3}), (8, 9, {"A": 0, "B": 0, "C": 0}),
+    (9, INFINITE, {"A": 0, "B": 0, "C": 0}),
+])  # fmt: skip
 def test_the_probability_of_a_move(now: float, other: float, probabilities: dict[str, float]) -> None:
     for variant, probability in probabilities.items():
         if probability:
@@ -57,10 +50,3 @@ def test_with_one_probability_for_both_it_is_dsa(teams: int) -> None:
             one = played(team, MixedDSA, any_schedule(chance), seed, hard=0.4, soft=0.4, variant="ABC"[seed % 3])
             other = played(team, DSA, any_schedule(chance), seed, probability=0.4, variant="ABC"[seed % 3])
             assert one.findings == other.findings
-
-
-@pytest.mark.parametrize("name", ["hard", "soft"])
-@pytest.mark.parametrize("probability", ["0", "1.1", "nan"])
-def test_what_is_no_probability_is_refused(name: str, probability: str) -> None:
-    with pytest.raises(SettingsError, match=f"{name} is {probability}; it must be more than 0 and at most 1"):
-        settings_of(MixedDSA, {name: probability})

@@ -57,32 +57,23 @@ def test_the_root_tells_its_first_value_to_all_below_at_once() -> None:
     assert [(name, Greedy((1,))) for name in ("RA", "RB", "RC")] == root.outbox
 
 
-def test_the_costs_of_the_first_values_add_up() -> None:
-    robot = middle()
-    replies(robot, ("RZ", Greedy((2,))), ("RA", Greedy((1,))))
-    said = replies(robot, ("RC", Result(4, {"RC": (1,)})))
-    assert said == [("RA", Result(1 + 3 + 4, {"RB": (2,), "RC": (1,)}))]
+def test_the_costs_of_the_first_values_add_up_unless_they_are_not_allowed() -> None:
+    for below, told in (
+        (Result(4, {"RC": (1,)}), Result(1 + 3 + 4, {"RB": (2,), "RC": (1,)})),
+        (Result(INFINITE, {}), Result(INFINITE, {})),
+    ):
+        robot = middle()
+        replies(robot, ("RZ", Greedy((2,))), ("RA", Greedy((1,))))
+        assert replies(robot, ("RC", below)) == [("RA", told)]
 
 
-def test_first_values_that_are_not_allowed_give_no_bound() -> None:
-    robot = middle()
-    replies(robot, ("RZ", Greedy((2,))), ("RA", Greedy((1,))))
-    assert replies(robot, ("RC", Result(INFINITE, {}))) == [("RA", Result(INFINITE, {}))]
-
-
-def test_the_root_searches_below_the_first_cost_and_knows_an_assignment() -> None:
+def test_the_root_searches_below_the_first_cost_and_keeps_that_assignment_if_nothing_is_cheaper() -> None:
     team = priced("ZA", {"Z": [3, 0], "ZA": [1, 2, 2, 5]})
     root = placed(NCBB, team, "RZ", children=["RA"])
     said = replies(root, ("RA", Members({"RZ": ["RA"]})), ("RA", Result(2, {"RA": (1,)})))
     assert root.limit == 2
     assert root.incumbent == Incumbent(2, {"RZ": (2,), "RA": (1,)})
     assert said[-1] == ("RA", Request((2,)))
-
-
-def test_the_first_assignment_is_the_answer_if_nothing_is_cheaper() -> None:
-    team = priced("ZA", {"Z": [3, 0], "ZA": [1, 2, 2, 5]})
-    root = placed(NCBB, team, "RZ", children=["RA"])
-    replies(root, ("RA", Members({"RZ": ["RA"]})), ("RA", Result(2, {"RA": (1,)})))
     assert replies(root, ("RA", Result(2, {"RA": (1,)}))) == [("RA", Terminate({"RA": (1,)}))]
     assert (value(root), root.findings.bound, root.over) == ((2,), 2, True)
 

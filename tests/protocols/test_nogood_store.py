@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 
-import pytest
-
 from robochoc.model.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.nogood import NOTHING, Explanation, LeftSide, NogoodStore, contradicts
+from tests.support.cases import looped
 
 ROBOTS = ("A", "B", "C", "D")
 SIZE = 6
@@ -47,7 +46,7 @@ def any_value(chance: Random) -> Value:
     return chance.choice((None, 0, 1)), chance.choice((None, 0, 1))
 
 
-@pytest.mark.parametrize("seed", range(40))
+@looped("seed", range(40))
 def test_the_index_changes_nothing(seed: int) -> None:
     chance = Random(seed)
     store, plain = NogoodStore(ORDER, SIZE), Plain()

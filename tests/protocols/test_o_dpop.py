@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import replace
 from random import Random
 
 import pytest
@@ -15,15 +14,15 @@ from robochoc.model.wording import Wording
 from robochoc.protocols.inference.messages.dpop import VALUE, Proceed
 from robochoc.protocols.inference.messages.o_dpop import Ask, Done, Good
 from robochoc.protocols.inference.o_dpop import ODPOP
-from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
-from tests.support.cost_problems import minimum_withdrawal, with_costs
+from tests.support.cases import looped
+from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import dimensions, domain, products
 from tests.support.examples import count
-from tests.support.limits import HANG_S
 from tests.support.loose_problems import loosened
-from tests.support.problems import random_team, team_of
+from tests.support.problems import team_of
 from tests.support.pseudo_trees import placed
 from tests.support.random_options import random_options
 from tests.support.wide_problems import wide_team
@@ -103,7 +102,7 @@ def test_what_is_said_in_words() -> None:
 # What is no message of a well-behaved robot
 
 
-@pytest.mark.parametrize("assignment", [[], [3], [-1], [0, 0]])
+@looped("assignment", [[], [3], [-1], [0, 0]])
 def test_goods_with_values_that_are_none_are_refused(assignment: list[int]) -> None:
     with pytest.raises(ValueError, match="are no values of RB's separator"):
         replies(root(), ("RB", Good(assignment, 1)))
@@ -158,25 +157,6 @@ def test_the_least_cost_is_found_and_goods_never_become_cheaper(problems: int) -
             if isinstance(event, Sent) and event.type == "Good":
                 costs[event.sender].append(event.content["cost"])
         assert all(one == sorted(one) for one in costs.values())
-
-
-@count("problems", 2, 100)
-def test_as_few_as_possible_withdraw(problems: int) -> None:
-    chance = Random("o-dpop withdrawal")
-    for _ in range(problems):
-        team = random_team(chance)
-        outcome = solve(team, replace(random_options(team, "o-dpop", chance), withdraw=Withdrawal.MINIMUM))
-        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
-
-
-@pytest.mark.slow
-def test_the_least_cost_is_found_in_processes() -> None:
-    chance = Random("o-dpop processes")
-    for _ in range(20):
-        team = wide_team(chance)
-        least = least_cost(team)
-        outcome = solve(team, Options(protocol="o-dpop", timeout=HANG_S))
-        assert outcome.cost == (None if least == INFINITE else least)
 
 
 def test_it_sends_fewer_bytes_than_dpop_where_few_combinations_are_good() -> None:

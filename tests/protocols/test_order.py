@@ -64,24 +64,17 @@ def test_the_lowest_robot_stands_last_in_the_order() -> None:
 def test_depth_is_the_place_of_the_lowest_robot_and_before_all_for_none() -> None:
     assert PriorityOrder("BAC").depth({"A", "B"}) == 1
     assert PriorityOrder("BAC").depth(()) == -1
+    assert PriorityOrder("BAC").tree is None, "no tree is made unless it is asked for"
 
 
-def test_no_tree_is_made_unless_asked_for() -> None:
-    assert PriorityOrder("BAC").tree is None
-
-
-def test_a_tree_parent_is_the_lowest_of_those_above() -> None:
-    assert induced({"A": "", "B": "A", "C": "AB"}).parents == {"A": None, "B": "A", "C": "B"}
+def test_a_tree_parent_is_the_lowest_of_those_above_also_of_those_that_a_child_hands_up() -> None:
+    for b_knows in ("A", ""):
+        assert induced({"A": "", "B": b_knows, "C": "AB"}).parents == {"A": None, "B": "A", "C": "B"}
 
 
 def test_robots_without_a_constraint_between_them_stand_on_branches_of_their_own() -> None:
     tree = induced({"A": "", "B": "A", "C": "A", "D": "B"})
     assert tree.children == {"A": ["B", "C"], "B": ["D"], "C": [], "D": []}
-
-
-def test_what_a_robot_has_to_agree_with_is_handed_up_to_its_tree_parent() -> None:
-    tree = induced({"A": "", "B": "", "C": "AB"})
-    assert tree.parents == {"A": None, "B": "A", "C": "B"}
 
 
 def test_ancestors_go_up_to_the_root_and_descendants_down_each_after_its_parent() -> None:
@@ -99,47 +92,20 @@ def test_a_robot_alone_is_a_root() -> None:
 
 @EVERY
 @given(teams | complex_teams)
-def test_the_robots_of_every_constraint_stand_on_one_branch(team: Team) -> None:
-    tree = tree_of(team)
-    for constraint in team.constraints():
-        robots = sorted({team.owner[name] for name in constraint.variables}, key=team.order.index)
-        *above, lowest = robots
-        assert set(above) <= set(tree.ancestors(lowest))
-
-
-@EVERY
-@given(teams | complex_teams)
-def test_priority_decreases_along_every_branch(team: Team) -> None:
-    tree = tree_of(team)
-    for name, parent in tree.parents.items():
-        assert parent is None or team.order.index(parent) < team.order.index(name)
-
-
-@EVERY
-@given(teams | complex_teams)
-def test_a_robot_is_below_exactly_its_ancestors(team: Team) -> None:
-    tree = tree_of(team)
-    for name in team.order:
-        for other in team.order:
-            assert (other in tree.ancestors(name)) is (name in tree.descendants(other))
-
-
-@EVERY
-@given(teams | complex_teams)
-def test_each_unconnected_part_has_one_root_its_highest_robot(team: Team) -> None:
-    highest = {min(part, key=team.order.index) for part in connected(team).values()}
-    assert set(tree_of(team).roots) == highest
-
-
-@EVERY
-@given(teams | complex_teams)
-def test_a_subtree_has_to_agree_with_its_root_s_tree_parent(team: Team) -> None:
-    """Or else the root could stand higher, and more could go on at once."""
-    tree = tree_of(team)
+def test_a_tree_has_every_constraint_on_one_branch_and_goes_on_as_early_as_it_can(team: Team) -> None:
+    """Priority decreases along branches, and the root of each unconnected part is its highest robot."""
+    tree, place = tree_of(team), team.order.index
     met = [{team.owner[variable] for variable in constraint.variables} for constraint in team.constraints()]
+    for robots in met:
+        *above, lowest = sorted(robots, key=place)
+        assert {*above} <= {*tree.ancestors(lowest)}
     for name, parent in tree.parents.items():
-        subtree = {name, *tree.descendants(name)}
-        assert parent is None or any(parent in robots and robots & subtree for robots in met)
+        assert all((other in tree.ancestors(name)) is (name in tree.descendants(other)) for other in team.order)
+        if parent is not None:
+            subtree = {name, *tree.descendants(name)}
+            assert place(parent) < place(name)
+            assert any(parent in robots and robots & subtree for robots in met), "else the root could stand higher"
+    assert {*tree.roots} == {min(part, key=place) for part in connected(team).values()}
 
 
 @EVERY

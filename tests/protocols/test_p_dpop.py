@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from random import Random
 
 import msgspec
 import pytest
@@ -14,7 +13,6 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.journal.journal import Header, JournalRecorder, read_journal
-from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.privacy import Kind, Measure, privacy_of
 from robochoc.protocols.key_stream import KeyStream, shuffled
@@ -25,29 +23,13 @@ from robochoc.replay import CannotReplayError, replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
-from tests.support.cost_problems import random_cost_team, random_hard_team, with_costs
-from tests.support.examples import count, examples
-from tests.support.loose_problems import loosened
+from tests.support.cost_problems import with_costs
+from tests.support.examples import examples
 from tests.support.pkc_bytes import nothing_hidden, run
 from tests.support.private_problems import RING, own_values, priced, told_values
 from tests.support.problems import team_of
-from tests.support.random_options import random_options
 
 # The optimum
-
-
-@count("problems", fast=40, slow=2_000)
-def test_the_optimum_is_that_of_dpop(problems: int) -> None:
-    unsolvable = 0
-    for number in range(problems):
-        chance = Random(f"p-dpop {number}")
-        team = (random_cost_team, random_hard_team)[number % 2](chance)
-        team = loosened(team, chance) if number % 3 == 0 else team
-        options = replace(random_options(team, "p-dpop", chance), cache=False)
-        private, plain = (solve(team, replace(options, protocol=name)) for name in ("p-dpop", "dpop"))
-        assert (private.verdict, private.cost) == (plain.verdict, plain.cost), (number, options)
-        unsolvable += private.verdict is Verdict.NO_SOLUTION
-    assert 0 < unsolvable < problems
 
 
 # What is in the messages

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -15,16 +16,18 @@ from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel, Team
-from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.disfc import DisFC
 from robochoc.protocols.satisfaction.messages.abt import Ok
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.agents import replies
+from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.brute_force import solutions
+from tests.support.cases import looped
 from tests.support.compiled import plain_python_only
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.examples import count
@@ -42,14 +45,7 @@ from tests.support.pkc_problems import (
 )
 from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
 
-
-def agent(team: Team, name: str) -> ABT:
-    """The protocol object of one robot, started, with nothing left to say."""
-    abt = ABT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    abt.start()
-    abt.outbox.clear()
-    return abt
-
+agent = partial(started_robot, ABT)
 
 # The rules
 
@@ -57,9 +53,7 @@ def agent(team: Team, name: str) -> ABT:
 def test_the_value_goes_up_too_where_a_pkc_is_shared_and_only_there() -> None:
     constraints = [pkc_part("AC"), replace(pkc_part("BC", name="T"), model=ConstraintModel.TKC)]
     team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
-    abt = ABT(LocalProblem(agent_problems(team)["RC"]), PriorityOrder(team.order))
-    abt.start()
-    assert abt.outbox == [("RA", Ok((1,)))]
+    assert started(robot_of(ABT, team, "RC")) == [("RA", Ok((1,)))]
 
 
 def test_the_value_goes_up_where_only_the_parent_holds_a_part() -> None:
@@ -143,7 +137,7 @@ def test_who_steps_aside_cannot_be_found_with_pkc() -> None:
 # The truth
 
 
-@count("teams", 150, 500)
+@count("teams", 60, 500)
 def test_abt_agrees_with_brute_force(teams: int) -> None:
     chance = Random("pkc abt")
     seen = Counter(check_against_brute_force(random_pkc_team(chance), ABT, chance) for _ in range(teams))
@@ -241,7 +235,12 @@ def test_private_queens_have_no_solution(private_queens: Team) -> None:
     assert {constraint.model for constraint in shared} == {ConstraintModel.PKC}
     assert len(pkc_parts(private_queens)) == 2 * len(shared)
     assert run(private_queens, ABT, 0).result.verdict is Verdict.NO_SOLUTION
-    assert ProcessesRun(private_queens, ABT).run(60).verdict is Verdict.NO_SOLUTION
+
+
+@pytest.mark.more
+@looped("protocol", [ABT, DisFC])
+def test_private_queens_have_no_solution_in_processes_either(private_queens: Team, protocol: type[Protocol]) -> None:
+    assert ProcessesRun(private_queens, protocol).run(HANG_S).verdict is Verdict.NO_SOLUTION
 
 
 # The example

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import pytest
 
@@ -18,13 +19,12 @@ from robochoc.model.problem import (
     Semantics,
     Variable,
 )
-from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.messages.abt import AddLink
 from robochoc.protocols.traits import ENDS_WITH_EITHER, ENDS_WITH_PROOF, UNDECLARED, Traits
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from tests.support.agents import robot_of
+from tests.support.cases import looped
 from tests.support.small_teams import different
 
 NOT_BOTH = Relation("N", 2, Semantics.CONFLICTS, ((0, 0),))
@@ -33,9 +33,7 @@ BITS = Domain("D", (range(2),))
 OWNERS = {"A": "RA", "B": "RB", "B2": "RB", "C": "RC"}
 
 
-def agent(name: str) -> ABT:
-    team = different("AB", "AB", 2)
-    return ABT(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
+agent = partial(robot_of, ABT, different("AB", "AB", 2))
 
 
 def test_a_robot_alone_ends_the_search_with_what_its_protocol_declares_only() -> None:
@@ -48,18 +46,14 @@ def test_a_robot_alone_ends_the_search_with_what_its_protocol_declares_only() ->
     assert robot.verdict is Verdict.NO_SOLUTION
 
 
-@pytest.mark.parametrize(
-    ("concludes", "verdict", "fault"),
-    [
-        (ENDS_WITH_EITHER, "solution", ""),
-        (ENDS_WITH_PROOF, "no-solution", ""),
-        (UNDECLARED, "unknown", ""),
-        (ENDS_WITH_EITHER, "unknown", "it has concluded unknown, and a robot of this protocol concludes solution and"),
-        (UNDECLARED, "optimal", "it has concluded optimal, and"),
-        (UNDECLARED, "nonsense", "it has concluded what is no verdict, and"),
-        ((), "solution", "it has concluded solution, and a robot of this protocol concludes nothing alone"),
-    ],
-)
+@looped(("concludes", "verdict", "fault"), [
+    (ENDS_WITH_EITHER, "solution", ""), (ENDS_WITH_PROOF, "no-solution", ""),
+    (UNDECLARED, "unknown", ""),
+    (ENDS_WITH_EITHER, "unknown", "it has concluded unknown, and a robot of this protocol concludes solution and"),
+    (UNDECLARED, "optimal", "it has concluded optimal, and"),
+    (UNDECLARED, "nonsense", "it has concluded what is no verdict, and"),
+    ((), "solution", "it has concluded solution, and a robot of this protocol concludes nothing alone"),
+])  # fmt: skip
 def test_verdicts_that_are_not_declared_are_faults(concludes: tuple[Verdict, ...], verdict: str, fault: str) -> None:
     told = Traits(concludes=concludes).fault_of_conclusion(verdict)
     assert told.startswith(fault)
@@ -106,15 +100,11 @@ def holder(relation: Relation, scope: Sequence[str]) -> Robot:
     return Robot("RA", (Variable("A", BITS),), parents=(Parent("RB", constraints=(constraint,)),))
 
 
-@pytest.mark.parametrize(
-    ("relation", "scope", "traits", "unmet"),
-    [
-        (NOT_ALL, ("A", "B", "C"), Traits(n_ary=False), "RA holds a constraint over more than two robots (C)"),
-        (NOT_ALL, ("A", "B", "B2"), Traits(n_ary=False), ""),
-        (NOT_ALL, ("A", "B", "C"), Traits(), ""),
-        (NOT_BOTH, ("A", "B"), Traits(n_ary=False), ""),
-    ],
-)
+@looped(("relation", "scope", "traits", "unmet"), [
+    (NOT_ALL, ("A", "B", "C"), Traits(n_ary=False), "RA holds a constraint over more than two robots (C)"),
+    (NOT_ALL, ("A", "B", "B2"), Traits(n_ary=False), ""), (NOT_ALL, ("A", "B", "C"), Traits(), ""),
+    (NOT_BOTH, ("A", "B"), Traits(n_ary=False), ""),
+])  # fmt: skip
 def test_constraints_over_more_than_two_robots(
     relation: Relation, scope: tuple[str, ...], traits: Traits, unmet: str
 ) -> None:

@@ -38,7 +38,10 @@ def fork() -> PTFB:
 
 
 def exploring() -> PTFB:
-    """B, which has its value 1 searched below C for less than 13, and below D for less than 10."""
+    """B, which has its value 1 searched below C for less than 13, and below D for less than 10.
+
+    Its CPAs have the bounds of the child's subtree, old and new.
+    """
     robot = fork()
     replies(robot, ("RA", CPA(20, {"RF": 7})))
     said = replies(robot, ("RC", Report(2)), ("RE", Report(3)), ("RD", Report(1)))
@@ -64,10 +67,6 @@ def test_they_may_rule_values_out_before_anyone_is_asked() -> None:
     assert replies(fork(), ("RA", CPA(7, {"RF": 7}))) == [("RA", Result(INFINITE, {}))]
 
 
-def test_a_cpa_has_the_bounds_of_the_child_s_subtree_old_and_new() -> None:
-    exploring()
-
-
 def test_the_bounds_of_an_earlier_search_are_forgotten() -> None:
     robot = exploring()
     replies(robot, ("RC", Result(INFINITE, {})), ("RD", Result(INFINITE, {})))
@@ -79,13 +78,9 @@ def test_the_bounds_of_an_earlier_search_are_forgotten() -> None:
 
 
 def test_the_bound_of_a_subtree_falls_when_the_cost_of_another_is_known() -> None:
-    said = replies(exploring(), ("RC", Result(9, {"RC": (1,), "RE": (1,)})))
-    assert said[-1] == ("RD", Reduce(11))
-
-
-def test_a_subtree_searches_no_further_when_its_value_is_out() -> None:
-    said = replies(exploring(), ("RC", Result(INFINITE, {})))
-    assert said[-1] == ("RD", Reduce(0))
+    """It searches no further when its value is out."""
+    for result, bound in ((Result(9, {"RC": (1,), "RE": (1,)}), 11), (Result(INFINITE, {}), 0)):
+        assert replies(exploring(), ("RC", result))[-1] == ("RD", Reduce(bound))
 
 
 def test_a_bound_that_falls_is_passed_on() -> None:

@@ -7,14 +7,13 @@ from collections import Counter
 from fractions import Fraction
 from random import Random
 
-import pytest
-
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.regret_matching import UNIT, RegretMatching
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import settings_of
 from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, assignments_by_cycle, cost_of_assignment, domains_of, played
@@ -54,8 +53,8 @@ def recomputed(course: list[tuple[int, list[int]]], weight: Fraction, variant: s
     return regrets
 
 
-@pytest.mark.parametrize("variant", ["rm", "rm+"])
-@pytest.mark.parametrize("weight", ["0", "0.01", "0.1", "0.5", "1"])
+@looped("variant", ["rm", "rm+"])
+@looped("weight", ["0", "0.01", "0.1", "0.5", "1"])
 @count("games", 2, 20)
 def test_regrets_are_what_other_values_would_have_saved(variant: str, weight: str, games: int) -> None:
     """Exactly where all cycles count alike; else rounding is down, by a unit a cycle, which fades as all does."""
@@ -119,7 +118,7 @@ def test_a_broken_constraint_is_regretted_more_than_all_costs() -> None:
     assert it.regrets == [0, 1 * UNIT, 5 * UNIT]
 
 
-@pytest.mark.parametrize("variant", ["rm", "rm+"])
+@looped("variant", ["rm", "rm+"])
 @count("teams", 10, 300)
 def test_who_moves_has_regretted_its_new_value(variant: str, teams: int) -> None:
     """By the definition, from the values of all robots in all cycles, as long as nothing was broken."""
@@ -146,18 +145,3 @@ def test_a_replay_shows_regrets() -> None:
     it = robot(((9, 0, 0), (4, 0, 0)), weight="0.5", inertia="0.5")
     hears(it, 1)
     assert [it.value_notes(index) for index in range(2)] == [{"regret": 0}, {"regret": 2.5}]
-
-
-@pytest.mark.parametrize(
-    ("settings", "why"),
-    [
-        ({"weight": "1.5"}, "weight is 1.5; it must be from 0 to 1"),
-        ({"weight": "nan"}, "weight is nan; it must be from 0 to 1"),
-        ({"inertia": "1"}, "inertia is 1; it must be 0 or more, and less than 1"),
-        ({"cycles": "0"}, "cycles is 0; it must be 1 or more"),
-        ({"variant": "RM"}, "variant: 'RM' is not allowed; allowed: rm, rm[+]"),
-    ],
-)
-def test_settings_are_a_part_and_a_probability(settings: dict[str, str], why: str) -> None:
-    with pytest.raises(SettingsError, match=why):
-        settings_of(RegretMatching, settings)

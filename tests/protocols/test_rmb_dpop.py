@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import pytest
 
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
-from robochoc.model.problem import Team
 from robochoc.model.wording import Wording
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Need, Proceed
-from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth
+from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Proceed
+from robochoc.protocols.inference.messages.mb_dpop import Axis, Context
 from robochoc.protocols.inference.messages.rmb_dpop import (
     Allocation,
     Candidate,
@@ -23,28 +23,18 @@ from robochoc.protocols.inference.messages.rmb_dpop import (
 )
 from robochoc.protocols.inference.rmb_cuts import best
 from robochoc.protocols.inference.rmb_dpop import RMBDPOP
-from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
-from tests.support.dpop_robots import products
-from tests.support.pseudo_trees import placed
+from tests.support.cases import looped
+from tests.support.dpop_robots import FEW, bounded, products, told
 from tests.support.wide_problems import wide_team
 
-FEW = Need(1, "RX")
 DONE = SepDegree({}, FEW)
 Proposals = dict[str, tuple[int, int, int]]
 """The depth of each candidate, how many robots it relieves, and the depth of the lowest of these."""
 
 
-def robot_of(team: Team, name: str, above: str = "", below: str = "") -> RMBDPOP:
-    """One robot below the robots of `above`, nearest first, of which the last is the root; k is 1."""
-    over, under = ([f"R{letter}" for letter in letters] for letters in (above, below))
-    robot = placed(RMBDPOP, team, name, over[0] if over else None, pseudo_parents=over[1:], children=under)
-    equip(robot, {"k": "1"})
-    for depth, one in enumerate(reversed(over)):
-        robot.receive(one, DomainAtDepth(depth, [(1,), (2,), (3,)]))
-    robot.settle()
-    return robot
+robot_of = partial(bounded, RMBDPOP)
 
 
 def candidates(proposals: Proposals) -> dict[str, Candidate]:
@@ -57,11 +47,6 @@ def label(separator: dict[str, int], proposals: Proposals | None = None) -> Clus
     return ClusterLabel(axes, candidates(proposals or {}), 9, len(separator), FEW)
 
 
-def told(robot: RMBDPOP, *packet: tuple[str, Message]) -> list[tuple[str, Message]]:
-    robot.outbox.clear()
-    return replies(robot, *packet)
-
-
 def proposed(said: list[tuple[str, Message]]) -> Proposals:
     (message,) = [one for _, one in said if isinstance(one, ClusterLabel | SepDegree)]
     return {name: (one.depth, one.relieved, one.lowest) for name, one in message.candidates.items()}
@@ -70,14 +55,10 @@ def proposed(said: list[tuple[str, Message]]) -> Proposals:
 # The choice of cut robots
 
 
-def test_a_robot_with_too_large_a_separator_proposes_all_of_it() -> None:
+def test_a_robot_proposes_all_of_a_separator_that_is_too_large_and_nobody_of_another() -> None:
     robot = robot_of(products("ABC", "AB BC AC"), "RC", "BA")
     assert proposed(list(robot.outbox)) == {"RB": (1, 1, 2), "RA": (0, 1, 2)}
-
-
-def test_a_robot_with_a_small_separator_proposes_nobody() -> None:
-    robot = robot_of(products("AB", "AB"), "RB", "A")
-    assert proposed(list(robot.outbox)) == {}
+    assert proposed(list(robot_of(products("AB", "AB"), "RB", "A").outbox)) == {}
 
 
 def test_proposals_are_added_up_and_of_those_not_above_only_the_best_goes_on() -> None:
@@ -153,9 +134,15 @@ def test_a_child_whose_context_did_not_change_is_not_asked_again() -> None:
     assert len(told(robot, ("RD", util(0, 0, 0)))) == 1
 
 
-def test_the_best_values_are_sent_down_and_the_cluster_chooses_under_them() -> None:
+def enumerated() -> RMBDPOP:
+    """C, which has tried all its values where A has its first."""
     robot = chain()
     replies(robot, ("RB", Context([0])), *[("RD", util(0, 0, 5)), ("RD", util(9, 0, 0)), ("RD", util(0, 0, 0))])
+    return robot
+
+
+def test_the_best_values_are_sent_down_and_the_cluster_chooses_under_them() -> None:
+    robot = enumerated()
     assert told(robot, ("RB", CutValue([0, 1]))) == [("RD", CutValue([1]))]
     assert told(robot, ("RD", util(9, 0, 0))) == [("RB", UTIL(1, bytes([13, 6, 8])))]
     assert told(robot, ("RB", VALUE([2, 0]))) == [("RD", VALUE([1, 2]))]
@@ -180,15 +167,16 @@ def test_what_is_said_in_words() -> None:
 # What is no message of a well-behaved robot
 
 
-def test_candidates_without_need_and_a_need_without_candidates_are_refused() -> None:
-    for wrong in (label({"RA": 0}, {"RA": (0, 1, 1)}), label(SEPARATOR)):
-        with pytest.raises(ValueError, match="candidates"):
+def test_candidates_that_cannot_be_are_refused() -> None:
+    """Without need; none where there is need; more than one from below; from a robot that was not asked."""
+    for wrong, why in (
+        (label({"RA": 0}, {"RA": (0, 1, 1)}), "candidates"),
+        (label(SEPARATOR), "candidates"),
+        (label(SEPARATOR, {"RX": (2, 1, 3), "RY": (2, 1, 3)}), "cannot be cut"),
+        (DONE, "was not asked"),
+    ):
+        with pytest.raises(ValueError, match=why):
             replies(cluster_root(), ("RC", wrong))
-
-
-def test_more_than_one_candidate_from_below_is_refused() -> None:
-    with pytest.raises(ValueError, match="cannot be cut"):
-        replies(cluster_root(), ("RC", label(SEPARATOR, {"RX": (2, 1, 3), "RY": (2, 1, 3)})))
 
 
 def test_an_allocation_that_was_not_proposed_is_refused() -> None:
@@ -197,12 +185,7 @@ def test_an_allocation_that_was_not_proposed_is_refused() -> None:
         replies(robot, ("RB", Allocation("RX")))
 
 
-def test_degrees_of_who_was_not_asked_are_refused() -> None:
-    with pytest.raises(ValueError, match="was not asked"):
-        replies(cluster_root(), ("RC", DONE))
-
-
-@pytest.mark.parametrize("places", [b"", b"\0\0", b"\0\0\0\0", b"\3\0\0"])
+@looped("places", [b"", b"\0\0", b"\0\0\0\0", b"\3\0\0"])
 def test_values_that_do_not_fit_their_table_are_refused(places: bytes) -> None:
     robot = cluster_root()
     replies(robot, ("RC", label(SEPARATOR, {"RA": (0, 2, 3), "RX": (2, 1, 3)})))
@@ -226,24 +209,15 @@ def test_values_for_a_table_that_needs_none_are_refused() -> None:
         replies(robot, ("RD", CutUTIL(1, bytes([1, 2, 3]), b"\0\0\0")))
 
 
-@pytest.mark.parametrize("values", [[], [0], [0, 3], [0, 0, 0], [-1, 0]])
-def test_best_values_that_are_none_are_refused(values: list[int]) -> None:
-    robot = chain()
-    replies(robot, ("RB", Context([0])), *[("RD", util(0, 0, 5)), ("RD", util(9, 0, 0)), ("RD", util(0, 0, 0))])
+@looped("values", [[], [0], [0, 3], [0, 0, 0], [-1, 0]])
+def test_best_values_that_are_none_or_come_too_early_are_refused(values: list[int]) -> None:
+    robot = enumerated()
     with pytest.raises(ValueError, match="are no values"):
         replies(robot, ("RB", CutValue(values)))
-
-
-def test_best_values_before_a_table_are_refused() -> None:
     with pytest.raises(ValueError, match="not to be given"):
-        replies(chain(), ("RB", CutValue([0, 0])))
-
-
-def test_values_before_the_best_of_the_cut_robots_are_refused() -> None:
-    robot = chain()
-    replies(robot, ("RB", Context([0])), *[("RD", util(0, 0, 5)), ("RD", util(9, 0, 0)), ("RD", util(0, 0, 0))])
+        replies(chain(), ("RB", CutValue(values)))
     with pytest.raises(ValueError, match="does not know the best values"):
-        replies(robot, ("RB", VALUE([0, 0])))
+        replies(enumerated(), ("RB", VALUE([0, 0])))
 
 
 # Its promises

@@ -36,6 +36,7 @@ from robochoc.protocols.inference.s_dpop import SDPOP
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.agents import replies
+from tests.support.cases import looped
 from tests.support.changing_costs import agrees_on_costs, changing_cost_team
 from tests.support.dpop_robots import PRODUCT, domain, products
 from tests.support.encrypted_problems import affordable
@@ -188,20 +189,20 @@ def test_what_is_said_in_words() -> None:
 # Against brute force
 
 
-@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 5))])
-def test_each_epoch_has_the_least_cost(batch: int) -> None:
-    chance, ended, reused = Random(f"s-dpop {batch}"), 0, 0
-    for _ in range(60 if batch else 6):
+@count("teams", 6, 240)
+def test_each_epoch_has_the_least_cost(teams: int) -> None:
+    chance, ended, reused = Random("s-dpop"), 0, 0
+    for _ in range(teams):
         team = changing_cost_team(chance, change=lambda team: loosened(team, chance) if chance.random() < 0.3 else team)
         order = chance.choice([None, None, *Order])
         number, outcome = agrees_on_costs(team, replace(random_schedule(chance), protocol="s-dpop", order=order))
         ended += number
         reused += sum(epoch.metrics.messages.get("Reuse", 0) for epoch in outcome.epochs)
-    assert ended > (500 if batch else 50)
-    assert reused > (200 if batch else 20)
+    assert ended > 8 * teams
+    assert reused > 3 * teams
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+@looped("runtime", ON_ONE_MACHINE)
 @count("teams", 1, 10)
 def test_each_epoch_has_the_least_cost_in_every_runtime(runtime: Runtime, teams: int) -> None:
     chance = Random(f"s-dpop {runtime}")
@@ -210,7 +211,7 @@ def test_each_epoch_has_the_least_cost_in_every_runtime(runtime: Runtime, teams:
 
 
 @pytest.mark.usefixtures("quick_encryption")
-@pytest.mark.parametrize("protocol", MINIMISING)
+@looped("protocol", MINIMISING)
 @count("teams", 1, 10)
 def test_every_protocol_that_proves_an_optimum_goes_through_costs_that_change(protocol: str, teams: int) -> None:
     chance = Random(f"costs anew {protocol}")

@@ -19,12 +19,12 @@ from robochoc.protocols.optimization.interchangeable import expanded
 from robochoc.protocols.optimization.messages.sfb import Above, Below, CPAs, Explored, Solution
 from robochoc.protocols.optimization.settings.sfb import SFBSettings
 from robochoc.protocols.optimization.sfb import LARGEST, SFB
-from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
 from tests.support.problems import team_of
@@ -88,24 +88,17 @@ def test_robots_that_are_alike_are_told_of_once() -> None:
     assert len(encode(said)) < 60
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        Above([BOTH], []),
-        Above([BOTH], [(0, 2)]),
-        Above([BOTH], [(0, 10**12)]),
-        Above([BOTH], [(1, 1)]),
-        Above([BOTH], [(-1, 1)]),
-        Above([BOTH], [(0, 2), (0, -1)]),
-    ],
-)
+@looped("message", [
+    Above([BOTH], []), Above([BOTH], [(0, 2)]), Above([BOTH], [(0, 10**12)]), Above([BOTH], [(1, 1)]),
+    Above([BOTH], [(-1, 1)]), Above([BOTH], [(0, 2), (0, -1)]),
+])  # fmt: skip
 def test_domains_of_more_or_fewer_robots_than_there_are_above_are_refused(message: Above) -> None:
     robot = agents(team(CHAIN))["RB"]
     with pytest.raises(ValueError, match="cannot say"):
         robot.receive("RA", message)
 
 
-@pytest.mark.parametrize(
+@looped(
     "message",
     [Below([BOTH], [], [(0, 1)], 0), Below([BOTH], [(0,)], [(0, 1)], 0), Below([BOTH], [(0, 0)], [(0, 2)], 0)],
 )
@@ -178,32 +171,21 @@ class Watcher:
             self.under_way[event.receiver] -= 1
 
 
-def keeps_to_its_share(seed: int) -> None:
-    """A random problem, memory and window: shares are kept, the answer is right, and the bound is proven."""
-    chance = Random(f"sfb memory {seed}")
-    problem = random_cost_team(chance)
-    memory, window = chance.choice((1, 7, 50, 300, 2000)), chance.choice((1, 1, 3))
-    watcher = Watcher(memory / (len(problem.robots) * window), window)
-    settings = {"memory": str(memory), "window": str(window), "batch": str(chance.choice((1, 3, 4096)))}
-    end = Simulation(
-        problem, SFB, RandomChannels(seed), observer=watcher, parameters=RunParameters(settings=settings)
-    ).run(60)
-    least, best = least_cost(problem), end.findings["RX00"].best
-    assert (INFINITE if best is None else best.cost) == least
-    assert (end.verdict is Verdict.NO_SOLUTION) == (best is None)
-    assert best is None or end.findings["RX00"].bound == least
-
-
-def test_messages_keep_to_their_share_whatever_the_memory_and_the_answer_is_right() -> None:
-    for seed in range(20):
-        keeps_to_its_share(seed)
-
-
-@pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_messages_keep_to_their_share_on_thousands_of_problems() -> None:
-    for seed in range(20, 2000):
-        keeps_to_its_share(seed)
+@count("problems", 20, 2000)
+def test_messages_keep_to_their_share_whatever_the_memory_and_the_answer_is_right(problems: int) -> None:
+    for seed in range(problems):
+        chance = Random(f"sfb memory {seed}")
+        problem = random_cost_team(chance)
+        memory, window = chance.choice((1, 7, 50, 300, 2000)), chance.choice((1, 1, 3))
+        watcher = Watcher(memory / (len(problem.robots) * window), window)
+        settings = {"memory": str(memory), "window": str(window), "batch": str(chance.choice((1, 3, 4096)))}
+        parameters = RunParameters(settings=settings)
+        end = Simulation(problem, SFB, RandomChannels(seed), observer=watcher, parameters=parameters).run(60)
+        least, best = least_cost(problem), end.findings["RX00"].best
+        assert (INFINITE if best is None else best.cost) == least, seed
+        assert (end.verdict is Verdict.NO_SOLUTION) == (best is None), seed
+        assert best is None or end.findings["RX00"].bound == least, seed
 
 
 def test_with_much_memory_messages_are_no_larger_than_others_can_take() -> None:
@@ -212,17 +194,15 @@ def test_with_much_memory_messages_are_no_larger_than_others_can_take() -> None:
 
 
 def test_no_more_messages_are_under_way_than_the_window_allows() -> None:
+    """One, unless more are asked for."""
+    robots, _ = introduced(team(CHAIN))
+    said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
+    assert [message.count for _, message in said if isinstance(message, CPAs)] == [2]
     robots, _ = introduced(team(CHAIN), SFBSettings(window=2))
     said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [2, 4]
     said = replies(robots["RB"], ("RC", Explored()))
     assert [message.count for _, message in said if isinstance(message, CPAs)] == [8]
-
-
-def test_one_message_is_under_way_unless_more_are_asked_for() -> None:
-    robots, _ = introduced(team(CHAIN))
-    said = replies(robots["RB"], ("RA", cpas(*[row(0)] * 11, ceiling=10)))
-    assert [message.count for _, message in said if isinstance(message, CPAs)] == [2]
 
 
 def test_a_bundle_is_explored_when_all_that_came_of_it_is() -> None:
@@ -239,12 +219,6 @@ def test_bundles_are_explored_in_the_order_in_which_they_came() -> None:
     assert replies(robots["RB"], ("RC", Explored())) == [("RA", Explored())] * 2
 
 
-@pytest.mark.parametrize("settings", [{"batch": "0"}, {"window": "0"}, {"memory": "0"}, {"batch": "many"}])
-def test_settings_that_will_not_do_are_refused(settings: dict[str, str]) -> None:
-    with pytest.raises(SettingsError):
-        settings_of(SFB, settings)
-
-
 # Solutions
 
 
@@ -255,16 +229,11 @@ def test_the_last_robot_makes_the_cheapest_of_its_cpas_a_solution() -> None:
     assert value(robots["RC"]) == (1,)
 
 
-def test_one_that_is_no_cheaper_is_none() -> None:
-    robots, _ = introduced(team(CHAIN))
-    assert replies(robots["RC"], ("RB", cpas([1, 1, 1, 0, 0, 4], least=1, ceiling=10))) == [("RB", Explored())]
-    assert value(robots["RC"]) is None
-
-
-def test_one_that_costs_more_than_the_robot_before_said_is_none() -> None:
-    robots, _ = introduced(team(CHAIN))
-    assert replies(robots["RC"], ("RB", cpas([1, 3, 1, 0, 2, 4], least=5, ceiling=10))) == [("RB", Explored())]
-    assert value(robots["RC"]) is None
+def test_one_that_is_no_cheaper_or_costs_more_than_the_robot_before_said_is_none() -> None:
+    for bundle in (cpas([1, 1, 1, 0, 0, 4], least=1, ceiling=10), cpas([1, 3, 1, 0, 2, 4], least=5, ceiling=10)):
+        robots, _ = introduced(team(CHAIN))
+        assert replies(robots["RC"], ("RB", bundle)) == [("RB", Explored())]
+        assert value(robots["RC"]) is None
 
 
 def test_a_solution_is_told_up_the_order_and_everybody_holds_its_value() -> None:
@@ -285,14 +254,11 @@ def test_what_a_solution_costs_prunes_what_is_there_already_and_what_is_sent() -
     assert [one[0] for one in rows(sent)] == [0, 1]
 
 
-def test_when_the_first_robot_has_explored_all_there_is_nothing_to_say_and_the_solution_stands() -> None:
+def test_when_the_first_robot_has_explored_all_the_solution_stands_or_there_is_none() -> None:
     robots, _ = introduced(team(CHAIN))
     assert replies(robots["RA"], ("RB", Solution(1, [1, 0, 0])), ("RB", Explored())) == []
     assert robots["RA"].verdict is None
     assert value(robots["RA"]) == (2,)
-
-
-def test_when_the_first_robot_has_explored_all_without_a_solution_there_is_none() -> None:
     robots, _ = introduced(team(CHAIN))
     replies(robots["RA"], ("RB", Explored()))
     assert robots["RA"].verdict is Verdict.NO_SOLUTION
@@ -319,25 +285,14 @@ def test_all_robots_hold_an_optimal_solution_in_the_end(teams: int) -> None:
 # What nobody says
 
 
-@pytest.mark.parametrize(
-    ("sender", "message"),
-    [
-        ("RA", cpas(row(0))),
-        ("RC", cpas(row(0))),
-        ("RA", CPAs(0, b"", 9, 10)),
-        ("RA", CPAs(-1, cpas(row(0)).rows, 9, 10)),
-        ("RA", CPAs(10**12, b"", 9, 10)),
-        ("RA", CPAs(1, cpas(row(0)).rows, 9, 2**62)),
-        ("RA", CPAs(1, cpas(row(0)).rows, -1, 10)),
-        ("RA", cpas([0, 0, 99, 0, 0, 0, 0], ceiling=10)),
-        ("RA", Above.of([((1,),)])),
-        ("RC", Below.of([(((1,),), (0,))], 1)),
-        ("RC", Explored()),
-        ("RC", Solution(3, [0, 0])),
-        ("RC", Solution(3, [0, 9, 0])),
-        ("RA", Solution(3, [0, 0, 0])),
-    ],
-)
+@looped(("sender", "message"), [
+    ("RA", cpas(row(0))), ("RC", cpas(row(0))), ("RA", CPAs(0, b"", 9, 10)),
+    ("RA", CPAs(-1, cpas(row(0)).rows, 9, 10)), ("RA", CPAs(10**12, b"", 9, 10)),
+    ("RA", CPAs(1, cpas(row(0)).rows, 9, 2**62)), ("RA", CPAs(1, cpas(row(0)).rows, -1, 10)),
+    ("RA", cpas([0, 0, 99, 0, 0, 0, 0], ceiling=10)), ("RA", Above.of([((1,),)])),
+    ("RC", Below.of([(((1,),), (0,))], 1)), ("RC", Explored()), ("RC", Solution(3, [0, 0])),
+    ("RC", Solution(3, [0, 9, 0])), ("RA", Solution(3, [0, 0, 0])),
+])  # fmt: skip
 def test_what_no_robot_says_is_refused(sender: str, message: Message) -> None:
     robots, _ = introduced(team(CHAIN))
     stranger = agents(team(CHAIN))["RB"]

@@ -21,6 +21,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.brute_force import solutions
+from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.examples import count
 from tests.support.problems import random_team, team_of
@@ -105,7 +106,7 @@ def test_a_row_takes_a_bit_for_each_value_and_one_for_each_robot() -> None:
     assert {len(one["rows"]) // one["count"] for one in rows} == {1 + 8 * (7 + 1) // 8}
 
 
-@pytest.mark.parametrize(("values", "size"), [(256, 1), (257, 2)])
+@looped(("values", "size"), [(256, 1), (257, 2)])
 def test_places_of_many_values_take_two_bytes(values: int, size: int) -> None:
     less = (Constraint(pair, PREDEFINED["le"], tuple(pair), tuple(pair)) for pair in ("AB", "AC", "BC"))
     (first, _), (second, _), _ = both(team_of({"A": range(values), "B": range(values), "C": (values - 1,)}, less))
@@ -124,7 +125,7 @@ def test_places_that_there_are_not_are_refused_in_two_bytes_as_well() -> None:
         second.read((300).to_bytes(2, "little") + row[2:], 1)
 
 
-@pytest.mark.parametrize(
+@looped(
     ("rows", "number", "ceiling"),
     [
         (b"", 1, 1),
@@ -155,7 +156,7 @@ def test_nothing_is_left_once_there_is_a_solution() -> None:
     assert bits.completed([]) == (1, [])
 
 
-@pytest.mark.parametrize(("n", "checks", "ncccs"), [(3, 252, 54), (4, 1216, 144)])
+@looped(("n", "checks", "ncccs"), [(3, 252, 54), (4, 1216, 144)])
 def test_robots_evaluate_their_constraints_at_the_same_time(n: int, checks: int, ncccs: int) -> None:
     spent = Simulation(queens3d(n), SFB, RandomChannels(0)).run(60).metrics
     assert (spent.checks, spent.ncccs) == (checks, ncccs)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from random import Random
 
-import pytest
-
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.messages.bounding import Number
 from robochoc.protocols.optimization.soft_arcs import SoftArc, move_costs
+from tests.support.cases import looped
 
 HARD = 0.2
 """How often a cost is infinite."""
@@ -78,7 +77,7 @@ def test_an_own_value_that_goes_with_nothing_above_costs_infinity_and_counts_no_
     assert [arc.up for arc in arcs] == [[4, 6], [2]]
 
 
-@pytest.mark.parametrize("extending", [False, True])
+@looped("extending", [False, True])
 def test_the_parent_gets_what_every_value_costs_at_least(extending: bool) -> None:  # noqa: FBT001
     own: list[Number] = [5, 3]
     arcs = [SoftArc([[0, 0], [0, 0]], 2), SoftArc([[0, 0]], 2)]
@@ -87,7 +86,7 @@ def test_the_parent_gets_what_every_value_costs_at_least(extending: bool) -> Non
     assert own == [2, 0]
 
 
-@pytest.mark.parametrize("extending", [False, True])
+@looped("extending", [False, True])
 def test_every_assignment_keeps_its_cost_and_nothing_becomes_negative(extending: bool) -> None:  # noqa: FBT001
     chance = Random(f"arcs {extending}")
     for _ in range(400):
@@ -108,7 +107,7 @@ def test_every_assignment_keeps_its_cost_and_nothing_becomes_negative(extending:
             assert min(own[index], here) >= 0
 
 
-@pytest.mark.parametrize("extending", [False, True])
+@looped("extending", [False, True])
 def test_nothing_more_can_be_moved_afterwards(extending: bool) -> None:  # noqa: FBT001
     chance = Random(f"fixpoint {extending}")
     for _ in range(200):

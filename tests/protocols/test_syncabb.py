@@ -14,10 +14,8 @@ from robochoc.protocols.asymmetric.messages.syncabb import CPA, CPABack, FullBac
 from robochoc.protocols.asymmetric.settings.syncabb import SyncABBSettings
 from robochoc.protocols.asymmetric.syncabb import SyncABB
 from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Terminate
-from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from tests.support.agents import replies, robot_of, started, value
+from tests.support.cases import looped
 
 NONE = BestPath(math.inf)
 
@@ -38,31 +36,31 @@ def chain() -> Team:
     return assemble("chain", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
 
 
+def cpa(*values: int, paid: float, best: BestPath = NONE) -> CPA:
+    return CPA([(one,) for one in values], paid, best)
+
+
 def agent(name: str, phases: Literal[1, 2] = 1) -> SyncABB:
     """The protocol object of one robot, started, with nothing left to say."""
-    team = chain()
-    robot = SyncABB(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
+    robot = robot_of(SyncABB, chain(), name)
     robot.settings = SyncABBSettings(phases)  # type: ignore[misc] # as the host does
-    robot.start()
-    robot.outbox.clear()
+    started(robot)
     return robot
 
 
-def cpa(*values: int, paid: float, best: BestPath = NONE) -> CPA:
-    return CPA([(one,) for one in values], paid, best)
+def middle(phases: Literal[1, 2] = 1) -> SyncABB:
+    """B, which has heard that A = 1; as it shares nothing partially known above, it hands its value 1 on at once."""
+    robot = agent("RB", phases)
+    assert replies(robot, ("RA", cpa(1, paid=0))) == [("RC", cpa(1, 1, paid=0))]
+    return robot
 
 
 def test_a_robot_adds_a_value_with_its_own_side() -> None:
     assert replies(agent("RC"), ("RB", cpa(1, 1, paid=0))) == [("RB", CPABack("RC", (1,), 5, math.inf, ["RA"]))]
 
 
-def test_who_shares_nothing_partially_known_above_hands_it_on_at_once() -> None:
-    assert replies(agent("RB"), ("RA", cpa(1, paid=0))) == [("RC", cpa(1, 1, paid=0))]
-
-
 def test_a_robot_before_adds_its_side_and_sends_it_further_back() -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa(1, paid=0)))
+    robot = middle()
     back = CPABack("RC", (1,), 5, 20, ["RA"])
     assert replies(robot, ("RC", back)) == [("RA", CPABack("RC", (1,), 8, 20, []))]
 
@@ -71,10 +69,9 @@ def test_the_last_one_that_is_asked_tells_the_holder_the_sum() -> None:
     assert replies(agent("RA"), ("RB", CPABack("RC", (1,), 8, 20, []))) == [("RC", Priced(15))]
 
 
-@pytest.mark.parametrize("bound", [8, 7])
+@looped("bound", [8, 7])
 def test_a_cpa_that_reaches_the_bound_goes_straight_back(bound: int) -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa(1, paid=0)))
+    robot = middle()
     assert replies(robot, ("RC", CPABack("RC", (1,), 5, bound, ["RA"]))) == [("RC", TooCostly())]
 
 
@@ -106,32 +103,24 @@ def test_at_the_end_all_take_the_best() -> None:
 
 
 def test_with_two_phases_only_a_complete_cpa_goes_back() -> None:
-    assert replies(agent("RB", 2), ("RA", cpa(1, paid=0))) == [("RC", cpa(1, 1, paid=0))]
     full = FullBack([(1,), (1,), (1,)], 5, math.inf)
     assert replies(agent("RC", 2), ("RB", cpa(1, 1, paid=0))) == [("RB", full)]
 
 
 def test_with_two_phases_each_robot_adds_its_sides_towards_all_after_it() -> None:
-    robot = agent("RB", 2)
-    replies(robot, ("RA", cpa(1, paid=0)))
+    robot = middle(2)
     values: list[tuple[int | None, ...]] = [(1,), (1,), (1,)]
     assert replies(robot, ("RC", FullBack(values, 5, 20))) == [("RA", FullBack(values, 8, 20))]
     assert replies(robot, ("RC", FullBack(values, 5, 8))) == [("RC", TooCostly())]
     assert replies(agent("RA", 2), ("RB", FullBack(values, 8, 20))) == [("RC", Priced(15))]
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        CPABack("RB", (1,), 0, 9, []),
-        CPABack("RC", (1,), 0, 9, ["RC"]),
-        CPABack("RC", (1,), 0, 9, ["nobody"]),
-        FullBack([(1,)], 0, 9),
-    ],
-)
+@looped("message", [
+    CPABack("RB", (1,), 0, 9, []), CPABack("RC", (1,), 0, 9, ["RC"]),
+    CPABack("RC", (1,), 0, 9, ["nobody"]), FullBack([(1,)], 0, 9),
+])  # fmt: skip
 def test_a_cpa_that_cannot_be_is_refused(message: CPABack | FullBack) -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa(1, paid=0)))
+    robot = middle()
     with pytest.raises(ValueError, match="CPA"):
         replies(robot, ("RC", message))
 
@@ -141,18 +130,11 @@ def test_a_side_without_an_own_value_is_refused() -> None:
         replies(agent("RB"), ("RC", CPABack("RC", (1,), 0, 9, [])))
 
 
-@pytest.mark.parametrize(
-    ("robot", "message"),
-    [
-        ("RC", cpa(1, paid=0)),
-        ("RC", cpa(1, 3, paid=0)),
-        ("RC", CPA([(1,), (1, 1)], 0, NONE)),
-        ("RC", CPA([(1,), ()], 0, NONE)),
-        ("RA", CPABack("RC", (1, 1), 0, math.inf, [])),
-        ("RA", CPABack("RC", (), 0, math.inf, [])),
-        ("RA", FullBack([(1,), (1,), ()], 0, math.inf)),
-    ],
-)
+@looped(("robot", "message"), [
+    ("RC", cpa(1, paid=0)), ("RC", cpa(1, 3, paid=0)), ("RC", CPA([(1,), (1, 1)], 0, NONE)),
+    ("RC", CPA([(1,), ()], 0, NONE)), ("RA", CPABack("RC", (1, 1), 0, math.inf, [])),
+    ("RA", CPABack("RC", (), 0, math.inf, [])), ("RA", FullBack([(1,), (1,), ()], 0, math.inf)),
+])  # fmt: skip
 def test_a_cpa_with_values_that_cannot_be_is_refused(robot: str, message: CPA | CPABack | FullBack) -> None:
     with pytest.raises(ValueError, match="R"):
         replies(agent(robot), ("RB", message))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from random import Random
-
-import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
@@ -16,11 +15,10 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Cost, Path, Terminate
 from robochoc.protocols.optimization.syncbb import SyncBB
-from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import replies, value
+from robochoc.solver.agent_problem import RunParameters
+from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.brute_force import least_cost
+from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.problems import team_of
 
@@ -43,12 +41,7 @@ def triangle() -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), constraints)
 
 
-def agent(team: Team, name: str) -> SyncBB:
-    """The protocol object of one robot, started, with nothing left to say."""
-    robot = SyncBB(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    robot.start()
-    robot.outbox.clear()
-    return robot
+agent = partial(started_robot, SyncBB)
 
 
 def path(*assignments: tuple[int, Cost], best: BestPath = NONE) -> Path:
@@ -61,14 +54,8 @@ def best(bound: Cost, *values: int) -> BestPath:
 
 
 def test_the_first_robot_makes_the_path_and_the_others_wait() -> None:
-    team = triangle()
-    first, second = (
-        SyncBB(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order)) for name in ("RA", "RB")
-    )
-    first.start()
-    second.start()
-    assert first.outbox == [("RB", path((1, 0)))]
-    assert second.outbox == []
+    assert started(robot_of(SyncBB, triangle(), "RA")) == [("RB", path((1, 0)))]
+    assert started(robot_of(SyncBB, triangle(), "RB")) == []
 
 
 def test_a_robot_adds_its_first_value_and_what_it_costs() -> None:
@@ -166,10 +153,7 @@ def test_an_n_ary_constraint_is_paid_by_its_lowest_robot() -> None:
 
 def test_who_may_step_aside_does_so_last() -> None:
     team = team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): INFINITE})])
-    robot = SyncBB(
-        LocalProblem(agent_problems(team, parameters=RunParameters(withdrawal_cost=3))["RB"]), PriorityOrder(team.order)
-    )
-    robot.start()
+    robot = agent(team, "RB", parameters=RunParameters(withdrawal_cost=3))
     aside: Value = (None,)
     assert replies(robot, ("RA", path((1, 0)))) == [("RA", Backtrack(BestPath(3, ((1,), aside))))]
     replies(robot, ("RA", Terminate(BestPath(3, ((1,), aside)))))
@@ -185,7 +169,7 @@ def test_the_best_path_and_a_bound_are_found_before_the_end() -> None:
     assert agent(triangle(), "RB").findings == Findings()
 
 
-@pytest.mark.parametrize("seed", range(10))
+@looped("seed", range(10))
 def test_what_is_found_at_any_moment_is_on_both_sides_of_the_least_cost(seed: int) -> None:
     team = random_cost_team(Random(seed))
     least = least_cost(team)

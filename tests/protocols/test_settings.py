@@ -1,0 +1,57 @@
+"""Settings outside their ranges are refused, by the rule that they break."""
+
+from __future__ import annotations
+
+import pytest
+
+from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.run.registry import protocol_named
+from tests.support.cases import looped
+
+PART, POSITIVE_PART = "it must be from 0 to 1", "it must be more than 0 and at most 1"
+
+
+@looped(("protocol", "setting", "values", "rule"), [
+    ("dpop", "memory", "0 -1 much", "memory"),
+    ("dsa", "probability", "0 1.5 nan -1", POSITIVE_PART),
+    ("dsa", "variant", "F", "variant"),
+    ("dsa-sdp", "pa", "1.5", PART),
+    ("dsa-sdp", "pb", "0.5", "pa [+] pb is 1.1; it must be at most 1"),
+    ("dsa-sdp", "pd", "-inf", PART),
+    ("dsa-sdp", "period", "0", "it must be 1 or more"),
+    ("duct", "bound", "-1", "it must be"),
+    ("duct", "confidence", "1", "it must be"),
+    ("duct", "contexts", "0", "it must be"),
+    ("duct", "error", "-1", "it must be"),
+    ("duct", "samples", "0", "it must be"),
+    ("hs-cai", "k", "0", "1 or more"),
+    ("hs-cai", "t", "0", "1 or more"),
+    ("kopt", "k", "0 9", "it must be from 1 to 8"),
+    ("list-dpop", "limit", "0 -1 10001", "limit is a number of optima"),
+    ("maxsum", "damping", "1 -0.5 nan", "from 0 to below 1"),
+    ("maxsum", "preference", "-1 inf", "a number, 0 or more"),
+    ("maxsum", "split", "0.6 -0.1 nan", "from 0 .none. to 0.5 .halves."),
+    ("maxsum-ad", "cycles", "0", "1 or more"),
+    ("maxsum-ad", "preference", "-1", "a number, 0 or more"),
+    ("maxsum-ad", "variant", "VP", "variant"),
+    ("mb-dpop", "k", "0 -1", "k"),
+    ("mb-dpop", "memory", "0", "memory"),
+    ("mgm2", "threshold", "-0.1 1.1 nan", PART),
+    ("mixed-dsa", "hard", "0 1.1 nan", POSITIVE_PART),
+    ("mixed-dsa", "soft", "0 1.1 nan", POSITIVE_PART),
+    ("p2-dpop", "ciphers", "0 1000001", "a number of ciphers from 1 to 1,000,000"),
+    ("p2-dpop", "spare", "-1 1001", "spare is a number"),
+    ("p32-dpop", "spare", "-1 1001", "spare is a number"),
+    ("regret-matching", "cycles", "0", "it must be 1 or more"),
+    ("regret-matching", "inertia", "1", "it must be 0 or more, and less than 1"),
+    ("regret-matching", "variant", "RM", "'RM' is not allowed; allowed: rm, rm[+]"),
+    ("regret-matching", "weight", "1.5 nan", PART),
+    ("sfb", "batch", "0 many", "batch"),
+    ("sfb", "memory", "0", "memory"),
+    ("sfb", "window", "0", "window"),
+])  # fmt: skip
+def test_a_setting_outside_its_range_is_refused(protocol: str, setting: str, values: str, rule: str) -> None:
+    for value in values.split():
+        with pytest.raises(SettingsError, match=rule) as refused:
+            settings_of(protocol_named(protocol), {setting: value})
+        assert setting in str(refused.value), value
