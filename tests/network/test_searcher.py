@@ -91,6 +91,17 @@ def searcher(
     return Searcher(CompiledRobot(team["RB"]), tasks(team, protocol, parameters)["RB"], protocol, around)
 
 
+def begun(
+    protocol: type[Protocol] = ABT, team: Team | None = None, *, observed: bool = False, private: bool = False
+) -> tuple[Around, Searcher]:
+    """Return RB's searcher in its search, and what is around it."""
+    around = Around()
+    one = searcher(around.context(observed=observed, private=private), protocol, team=team)
+    one.prepare()
+    one.begin(0)
+    return around, one
+
+
 def ok(value: int | None, clock: int = 0) -> Envelope:
     return Envelope("RA", "RB", encode(Ok((value,))), clock)
 
@@ -150,10 +161,7 @@ def test_searching_counts_and_tells() -> None:
 
 
 def test_after_the_end_nothing_is_taken_in() -> None:
-    around = Around()
-    one = searcher(around.context())
-    one.prepare()
-    one.begin(0)
+    around, one = begun()
     one.take_in([ok(1)])
     one.pause()
     sent = len(around.sent)
@@ -177,9 +185,7 @@ def test_nothing_is_taken_in_before_the_start() -> None:
 
 
 def test_what_is_no_message_is_bad() -> None:
-    one = searcher(Around().context())
-    one.prepare()
-    one.begin(0)
+    _, one = begun()
     with pytest.raises(BadMessageError, match="RA sent RB an invalid message"):
         one.take_in([Envelope("RA", "RB", b"\x93", 0)])
 
@@ -207,10 +213,7 @@ def test_who_never_was_ready_reports_all_the_same() -> None:
 
 def test_in_a_private_run_values_stay_at_home() -> None:
     for private in (False, True):
-        around = Around()
-        one = searcher(around.context(private=private))
-        one.prepare()
-        one.begin(0)
+        around, one = begun(private=private)
         one.pause()
         (account,) = around.heard(DetailedReport)
         assert isinstance(account, DetailedReport)
@@ -222,10 +225,7 @@ def test_in_a_private_run_values_stay_at_home() -> None:
 
 def test_events_are_told_if_anybody_wants_them_and_not_too_many_at_once() -> None:
     for observed in (False, True):
-        around = Around()
-        one = searcher(around.context(observed=observed))
-        one.prepare()
-        one.begin(0)
+        around, one = begun(observed=observed)
         one.take_in([ok(1 + number % 2) for number in range(2 * EVENTS_AT_ONCE)])
         one.pause()
         told = [word.events for word in around.said if isinstance(word, Events)]
@@ -247,10 +247,7 @@ def test_a_verdict_is_told_once() -> None:
 
 
 def test_checking_is_by_the_own_file() -> None:
-    around = Around()
-    one = searcher(around.context())
-    one.prepare()
-    one.begin(0)
+    _, one = begun()
     one.take_in([ok(1)])
     assert one.check_constraints({"A": 1, "C": 1}) == judgement(price=0)
     assert one.check_constraints({"A": 2, "C": 2}) == judgement(price=INFINITE)
@@ -265,10 +262,7 @@ def judgement(price: float) -> CheckResult:
 
 
 def test_checking_adds_up_what_its_constraints_charge() -> None:
-    around = Around()
-    one = searcher(around.context(), team=chain(4))
-    one.prepare()
-    one.begin(0)
+    _, one = begun(team=chain(4))
     assert one.assignment == {"B": 1}
     assert one.check_constraints({"A": 1}) == judgement(price=4)
     assert one.check_constraints({"A": 2}) == judgement(price=0)
@@ -293,10 +287,7 @@ def believed(around: Around) -> DetailedReport:
 
 
 def test_a_clock_that_another_has_set_as_late_as_can_be() -> None:
-    around = Around()
-    one = searcher(around.context())
-    one.prepare()
-    one.begin(0)
+    around, one = begun()
     one.take_in([ok(1, clock=LATEST)])
     last = around.sent[-1][1]
     assert isinstance(last, ProtocolMessage)
@@ -307,10 +298,7 @@ def test_a_clock_that_another_has_set_as_late_as_can_be() -> None:
 
 
 def test_costs_that_another_has_made_up_are_not_passed_on() -> None:
-    around = Around()
-    one = searcher(around.context(), SyncBB, team=chain(4))
-    one.prepare()
-    one.begin(0)
+    around, one = begun(SyncBB, chain(4))
     best = BestPath(-5, ((1,), (2,), (1,)))
     one.take_in([Envelope("RA", "RB", encode(Path([((1,), 0)], best)), 0)])
     one.pause()

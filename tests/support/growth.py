@@ -28,6 +28,23 @@ def operations(act: Callable[[], object]) -> int:
     return count
 
 
+def steps_of(work: Callable[[], object]) -> int:
+    """Return how many functions are called while `work` is done, Python's own among them."""
+    count = 0
+
+    def note(_: FrameType, event: str, __: object) -> None:
+        nonlocal count
+        count += event in {"call", "c_call"}
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(before)
+    return count
+
+
 def kept_bytes(make: Callable[[], object]) -> int:
     """Return how many bytes that which `make` makes takes, as long as it is there."""
     tracemalloc.start()

@@ -87,16 +87,28 @@ def test_the_silent_are_those_of_whom_nothing_is_known_then_those_that_owe_an_an
     assert (counters.silent, counters.waving) == (("B", "C"), True)
 
 
-def test_an_answer_to_an_older_wave_is_counted_and_ends_nothing() -> None:
+def waved(counters: FourCounters, a: Counts, b: Counts) -> int:
+    """Ask A and B, who have counted this; return the number of the wave."""
+    wave = counters.begin_wave()
+    counters.answer("A", wave, a)
+    counters.answer("B", wave, b)
+    return wave
+
+
+def heard(a: Counts, b: Counts) -> FourCounters:
+    """Return the counters once A and B have reported this by themselves."""
     counters = FourCounters(("A", "B"))
-    for robot in ("A", "B"):
-        counters.hear(robot, Counts(1, 1))
-    older = counters.begin_wave()
-    for robot in ("A", "B"):
-        counters.answer(robot, older, Counts(2, 1))
+    counters.hear("A", a)
+    counters.hear("B", b)
+    return counters
+
+
+def test_an_answer_to_an_older_wave_is_counted_and_ends_nothing() -> None:
+    counters = heard(Counts(1, 1), Counts(1, 1))
+    older = waved(counters, Counts(2, 1), Counts(2, 1))
     assert not counters.quiescent
-    for robot in ("A", "B"):
-        counters.hear(robot, Counts(2, 2))
+    counters.hear("A", Counts(2, 2))
+    counters.hear("B", Counts(2, 2))
     newer = counters.begin_wave()
     assert newer == older + 1
     counters.answer("A", newer, Counts(2, 2))
@@ -107,34 +119,22 @@ def test_an_answer_to_an_older_wave_is_counted_and_ends_nothing() -> None:
 
 
 def test_a_wave_that_finds_the_same_is_not_enough_while_messages_are_under_way() -> None:
-    counters = FourCounters(("A", "B"))
-    for robot, counts in (("A", Counts(1, 0)), ("B", Counts(0, 0))):
-        counters.hear(robot, counts)
-    wave = counters.begin_wave()  # as the count is wanted
-    for robot, counts in (("A", Counts(1, 0)), ("B", Counts(0, 0))):
-        counters.answer(robot, wave, counts)
+    counters = heard(Counts(1, 0), Counts(0, 0))
+    waved(counters, Counts(1, 0), Counts(0, 0))  # as the count is wanted
     assert not counters.quiescent
 
 
 def test_a_wave_begun_before_all_were_heard_has_nothing_to_be_compared_with() -> None:
     counters = FourCounters(("A", "B"))
-    wave = counters.begin_wave()
-    for robot in ("A", "B"):
-        counters.answer(robot, wave, Counts(0, 0))
+    waved(counters, Counts(0, 0), Counts(0, 0))
     assert not counters.quiescent
     assert counters.due
-    wave = counters.begin_wave()
-    for robot in ("A", "B"):
-        counters.answer(robot, wave, Counts(0, 0))
+    waved(counters, Counts(0, 0), Counts(0, 0))
     assert counters.quiescent
 
 
 def test_one_balanced_wave_is_not_enough() -> None:
-    counters = FourCounters(("A", "B"))
-    counters.hear("A", Counts(1, 0))
-    counters.hear("B", Counts(0, 1))
-    wave = counters.begin_wave()
-    counters.answer("A", wave, Counts(1, 0))
-    counters.answer("B", wave, Counts(1, 1))  # it has spoken since
+    counters = heard(Counts(1, 0), Counts(0, 1))
+    waved(counters, Counts(1, 0), Counts(1, 1))  # B has spoken since
     assert not counters.quiescent
     assert not counters.due

@@ -23,8 +23,8 @@ from robochoc.solver.agent_problem import RunParameters
 from tests.support import golden
 from tests.support.cases import cases, looped
 from tests.support.examples import examples
+from tests.support.growth import steps_of
 from tests.support.problems import team_of, teams
-from tests.support.steps import steps_of
 
 IN_SIMULATOR = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 

@@ -54,8 +54,8 @@ from tests.support.broken_objects import AS_IN_FILES, OF_OBJECTS
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.examples import examples
+from tests.support.growth import steps_of
 from tests.support.problems import random_team, team_of
-from tests.support.steps import steps_of
 from tests.support.team_mutations import mutated
 
 HERE = Options(runtime=Runtime.SIMULATOR)

@@ -28,7 +28,7 @@ from robochoc.model.expression import (
 )
 from tests.support.cases import looped
 from tests.support.examples import examples
-from tests.support.steps import steps_of
+from tests.support.growth import steps_of
 
 NAMES = ("X", "Y", "i", "V3.1")
 FIGURE_2 = "and( (neq(X, Y) , neq( abs(minus(X , Y) ) , abs(minus(i-j) ) ) ) )"
