@@ -41,9 +41,9 @@ from robochoc.model.problem import (
 )
 from tests.support.broken_case import TEAM, write_files
 from tests.support.examples import examples
+from tests.support.growth import steps_of
 from tests.support.program import ROOT
 from tests.support.random_robots import random_robots
-from tests.support.steps import steps_of
 
 DATA = ROOT / "tests" / "data"
 FIGURE_2 = DATA / "figure2" / "Robot3.1.xml"
