@@ -331,7 +331,6 @@ def _strike(pid: int, signum: signal.Signals) -> None:
         os.kill(pid, signum)
 
 
-@pytest.mark.more
 def test_workers_end_with_their_runner(tmp_path: Path) -> None:
     """A worker that is at a long run does not outlive the runner, and leaves nothing."""
     (tmp_path / "study.toml").write_text(_LONG)

@@ -8,6 +8,7 @@ import signal
 import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import Self
 from urllib.request import urlopen
 
 import pytest
@@ -199,6 +200,39 @@ def test_ctrl_c_never_ends_the_viewer_not_even_while_it_starts(tmp_path: Path) -
         status = Path(f"/proc/{viewer._process.pid}/status").read_text()  # noqa: SLF001 - nothing else knows it
         masks = dict(re.findall(r"^(SigBlk|SigIgn):\s*([0-9a-f]+)$", status, re.MULTILINE))
         assert any(int(mask, 16) & 1 << (signal.SIGINT - 1) for mask in masks.values())
+
+
+class PlayedViewer:
+    """A viewer without a process."""
+
+    url = "http://127.0.0.1:1/page/"
+    is_gone = False
+
+    def __init__(self, *_: object, **__: object) -> None:
+        self.told: list[str] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.told.append("closed")
+
+    def finish(self) -> None:
+        self.told.append("finished")
+
+    def wait(self) -> None:
+        assert self.told == ["finished"]
+
+
+def test_a_page_outlives_its_run_and_a_run_its_page(teams: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.sniffer.viewer.Viewer", PlayedViewer)
+    failed = robochoc_within("solve", teams / "short", "--sniff", "--kill", "Robot2.2@0")
+    assert failed.returncode == 4
+    assert f"{PlayedViewer.url} stays until Ctrl-C\n" in failed.stderr
+    monkeypatch.setattr(PlayedViewer, "is_gone", True)
+    done = robochoc_within("solve", teams / "short", "--sniff", "--runtime", "simulator")
+    assert (done.returncode, "no solution" in done.stdout) == (0, True)
+    assert "the page is gone: its process ended during the run, which went on without it\n" in done.stderr
 
 
 def robot_of(run: Run, viewer: int) -> int:

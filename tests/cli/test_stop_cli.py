@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,8 +15,8 @@ from robochoc.journal.events import Heard
 from robochoc.journal.reader import Follower
 from robochoc.system.stopping import STOP, stop_heard, stop_requested
 from tests.support.faults import PROGRAM, running
-from tests.support.limits import wait_until
-from tests.support.program import ROOT
+from tests.support.limits import HANG_S, wait_until
+from tests.support.program import ROOT, robochoc_within
 from tests.support.slot_sketches import slots
 
 
@@ -34,11 +36,7 @@ def test_that_it_tells_the_best_so_far(tmp_path: Path, runtime: str) -> None:
         assert run.status() == 3, run.errors()
         assert "somebody has asked to stop" in run.errors()
         assert run.left_behind() == []
-    result = json.loads((tmp_path / "stdout").read_bytes())
-    assert result["verdict"] == "unknown"
-    assert result["reason"] == "somebody has asked to stop"
-    assert result["cost"] == sum(range(1, 15))
-    assert len(result["assignment"]) == 14
+    told_best_so_far(json.loads((tmp_path / "stdout").read_bytes()))
 
 
 @pytest.mark.parametrize(
@@ -64,6 +62,30 @@ def test_while_better_answers_are_searched_for(tmp_path: Path, signum: signal.Si
     assert place.exists() == (signum is STOP)
     if signum is STOP:
         assert "by the deadline of 0.3 s" in (tmp_path / "stdout").read_text()
+
+
+def test_a_search_in_the_simulator_stops_with_the_best_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The signal comes at the 20th look whether somebody has asked to stop."""
+    model_of(slots(14, 14)).save(tmp_path / "team")
+    looks = itertools.count()
+
+    def asked() -> bool:
+        if next(looks) == 20:
+            signal.raise_signal(STOP)
+        return stop_requested()
+
+    monkeypatch.setattr("robochoc.communication.simulator.simulator.stop_requested", asked)
+    words = ("--protocol", "syncbb", "--runtime", "simulator", "--timeout", HANG_S, "--json")
+    done = robochoc_within("solve", tmp_path / "team", *words)
+    assert (done.returncode, "somebody has asked to stop" in done.stderr) == (3, True)
+    told_best_so_far(json.loads(done.stdout))
+
+
+def told_best_so_far(result: dict[str, Any]) -> None:
+    assert result["verdict"] == "unknown"
+    assert result["reason"] == "somebody has asked to stop"
+    assert result["cost"] == sum(range(1, 15))
+    assert len(result["assignment"]) == 14
 
 
 def test_that_it_is_heard_meanwhile_only() -> None:
