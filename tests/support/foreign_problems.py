@@ -10,6 +10,9 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import pytest
+
+from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ExportOptions, Imported, ImportOptions
 from robochoc.formats.dialects.registry import dialect_called, read_foreign
 from robochoc.model.assembly import Extras, assemble
@@ -71,6 +74,14 @@ def imported(text: str, folder: Path, name: str = "problem.xml", **options: Any)
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return read_foreign([path], ImportOptions(**options))
+
+
+def refused(text: str, folder: Path, name: str = "problem.xml", **options: Any) -> str:  # noqa: ANN401
+    """Return the one message about a file with this text, from its line on."""
+    with pytest.raises(InvalidInputError) as refusal:
+        check_team(imported(text, folder, name, **options).team)
+    assert len(refusal.value.diagnostics) == 1, refusal.value
+    return str(refusal.value).partition(name)[2]
 
 
 def written(name: str, team: Team, *, intension: bool = False) -> Mapping[str, bytes]:

@@ -6,7 +6,6 @@ import re
 from fractions import Fraction
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import pytest
 from lxml import etree
@@ -20,7 +19,7 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.cases import looped
-from tests.support.foreign_problems import imported, optimum, random_problem, written
+from tests.support.foreign_problems import imported, optimum, random_problem, refused, written
 
 HEAD = '<instance xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">'
 
@@ -40,13 +39,6 @@ def soft(text: str, more: str = "", scope: str = "xa xb") -> str:
     return f"""<relations><relation name="r" arity="2" nbTuples="1" semantics="soft" {more}>{text}</relation>
         </relations>
         <constraints><constraint name="c" scope="{scope}" arity="2" reference="r"/></constraints>"""
-
-
-def refused(text: str, folder: Path, **options: Any) -> str:  # noqa: ANN401
-    with pytest.raises(InvalidInputError) as failure:
-        check_team(imported(text, folder, **options).team)
-    assert len(failure.value.diagnostics) == 1
-    return re.sub(r"^.*problem\.xml:?", "", str(failure.value))
 
 
 @looped(

@@ -23,7 +23,7 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, RemoveAgent, Team
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.cases import looped
-from tests.support.foreign_problems import imported, optimum, written
+from tests.support.foreign_problems import imported, optimum, refused, written
 
 HEAD = """name: small
 objective: min
@@ -144,10 +144,7 @@ def test_functions_that_are_refused(
     function: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(python_function, "MAX_STEPS", 100_000)
-    with pytest.raises(InvalidInputError) as error:
-        imported(constraint(function), tmp_path, "a.yaml")
-    assert len(error.value.diagnostics) == 1
-    assert message in str(error.value)
+    assert message in refused(constraint(function), tmp_path, "a.yaml")
 
 
 LAUGHS = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
@@ -171,10 +168,7 @@ LAUGHS = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
     ],
 )
 def test_files_that_are_refused(text: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError) as error:
-        imported(text, tmp_path, "a.yaml")
-    assert len(error.value.diagnostics) == 1
-    assert message in str(error.value)
+    assert message in refused(text, tmp_path, "a.yaml")
 
 
 def test_python_files_are_executed_only_where_that_is_allowed(tmp_path: Path) -> None:
@@ -218,9 +212,8 @@ def test_unknown_keys_are_refused_at_every_level(tmp_path: Path) -> None:
     ):
         assert before in WHOLE
         sign = "\n" if before == "name:" else ", "
-        with pytest.raises(InvalidInputError) as error:
-            imported(WHOLE.replace(before, f"zebra: 1{sign}{before}", 1), tmp_path, "a.yaml")
-        assert f":{line}: unknown key 'zebra'{inside} (" in str(error.value)
+        said = refused(WHOLE.replace(before, f"zebra: 1{sign}{before}", 1), tmp_path, "a.yaml")
+        assert said.startswith(f":{line}: unknown key 'zebra'{inside} (")
 
 
 def test_values_of_another_kind_are_refused(tmp_path: Path) -> None:
@@ -235,9 +228,7 @@ def test_values_of_another_kind_are_refused(tmp_path: Path) -> None:
         ),
     ):
         assert now in WHOLE
-        with pytest.raises(InvalidInputError) as error:
-            imported(WHOLE.replace(now, then, 1), tmp_path, "a.yaml")
-        assert message in str(error.value)
+        assert message in refused(WHOLE.replace(now, then, 1), tmp_path, "a.yaml")
 
 
 def test_scenarios_and_distributions_are_strict_too(tmp_path: Path) -> None:
