@@ -226,3 +226,13 @@ def domain(text: str) -> tuple[str, str, str]:
 def predicate(text: str) -> tuple[str, str, str]:
     """Robot2 with another predicate."""
     return (R2, P1, text)
+
+
+def relation(text: str) -> tuple[str, str, str]:
+    """Robot2 with another relation."""
+    return (R2, RELATION, text)
+
+
+def scenario(*changes: str) -> str:
+    """A scenario of one event."""
+    return "\n".join(['<scenario>\n<event after="solved">', *changes, "</event></scenario>\n"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.support.broken_case import R1, R2, R3, RELATION, case, predicate, weighted
+from tests.support.broken_case import R1, R2, R3, case, predicate, relation, weighted
 
 FUNCTION = """
   <functions>
@@ -13,11 +13,6 @@ FUNCTION = """
       </expression>
     </function>
   </functions>"""
-
-
-def relation(text: str) -> tuple[str, str, str]:
-    """Robot2 with another relation."""
-    return (R2, RELATION, text)
 
 
 COSTS = [

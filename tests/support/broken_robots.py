@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from tests.support.broken_case import D2, R1, R2, R3, RELATION, case, domain, predicate, weighted
+from tests.support.broken_case import D2, R1, R2, R3, case, domain, predicate, relation, weighted
 
 P = """<predicate name="r1"><parameters/><expression><functional>eq(1,1)</functional></expression></predicate>"""
 V2 = '<variable name="V2" domain="D1"/>'
-
-
-def relation(text: str) -> tuple[str, str, str]:
-    """Robot2 with another relation."""
-    return (R2, RELATION, text)
 
 
 DOMAINS = [

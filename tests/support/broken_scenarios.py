@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.support.broken_case import R1, SCENARIO, TEAM, Broken, files
+from tests.support.broken_case import R1, SCENARIO, TEAM, Broken, files, scenario
 
 LATE = "late/Robot9.xml"
 ROBOT_9 = """\
@@ -28,11 +28,6 @@ ROBOT_9 = """\
 """A robot without a fault, for which the team has room."""
 
 ADD_9 = f'<add_agent file="{LATE}"/>'
-
-
-def scenario(*changes: str) -> str:
-    """A scenario of one event."""
-    return "\n".join(['<scenario>\n<event after="solved">', *changes, "</event></scenario>\n"])
 
 
 def add(agent: str, parent: str, *constraints: str) -> str:

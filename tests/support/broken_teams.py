@@ -17,6 +17,7 @@ from tests.support.broken_case import (
     files,
     other,
     predicate,
+    scenario,
 )
 
 
@@ -36,11 +37,6 @@ def ring(name: str, parent: str, child: str) -> str:
 <agent name="{parent}"/>
 </agents_parent></agents_neighbours></instance>
 """
-
-
-def added(change: str) -> str:
-    """A scenario of one change."""
-    return f'<scenario>\n<event after="solved">\n{change}\n</event></scenario>\n'
 
 
 NEIGHBOURS = [
@@ -118,13 +114,13 @@ SCENARIOS = [
           (SCENARIO, "<event", ('after="noon"', "200 messages"))),
     files("an unknown change", {SCENARIO: '<scenario><event after="solved">\n<explode/></event></scenario>'},
           (SCENARIO, "<explode/>", "<explode> does not belong in <event>")),
-    files("a value of 5000 digits", {SCENARIO: added(f'<add_value variable="V1" value="{"9" * 5000}"/>')},
+    files("a value of 5000 digits", {SCENARIO: scenario(f'<add_value variable="V1" value="{"9" * 5000}"/>')},
           (SCENARIO, "<add_value", "at most 18 digits")),
-    files("a robot from outside", {SCENARIO: added('<add_agent file="../../x.xml"/>')},
+    files("a robot from outside", {SCENARIO: scenario('<add_agent file="../../x.xml"/>')},
           (SCENARIO, "<add_agent", "outside the team's folder")),
-    files("a robot from anywhere", {SCENARIO: added('<add_agent file="/etc/passwd"/>')},
+    files("a robot from anywhere", {SCENARIO: scenario('<add_agent file="/etc/passwd"/>')},
           (SCENARIO, "<add_agent", "outside the team's folder")),
-    files("a robot from nowhere", {SCENARIO: added('<add_agent file="late/X.xml"/>')},
+    files("a robot from nowhere", {SCENARIO: scenario('<add_agent file="late/X.xml"/>')},
           (SCENARIO, "<add_agent", "there is no file 'late/X.xml'")),
     other("a scenario that is a folder", lambda folder: (folder / SCENARIO).mkdir(),
           (SCENARIO, "", "not a regular file")),

@@ -23,8 +23,8 @@ from robochoc.model.problem import (
     ScenarioEvent,
     Team,
 )
-from tests.support.broken_case import TEAM, write_files
-from tests.support.broken_scenarios import ADD_9, LATE, ROBOT_9, add, constraint, scenario
+from tests.support.broken_case import TEAM, scenario, write_files
+from tests.support.broken_scenarios import ADD_9, LATE, ROBOT_9, add, constraint
 from tests.support.cases import looped
 
 
