@@ -48,10 +48,13 @@ def last(number: int) -> Tick:
     return Tick((number,), True)
 
 
-def test_there_is_no_tick_before_a_value_of_each_neighbour_is_known() -> None:
+def test_there_is_no_tick_before_a_value_of_each_neighbour_is_known_and_a_packet_is_one_by_the_last_values() -> None:
     robot = middle(MOVES)
     assert replies(robot, ("RA", now(1))) == []
-    assert replies(robot, ("RA", now(2)), ("RC", now(1))) == both(now(3))
+    assert replies(robot, ("RC", now(2)), ("RA", now(3)), ("RA", now(2)), ("RA", now(1))) == both(now(3))
+    assert (robot.cycle, value(robot)) == (1, (3,))
+    assert replies(robot) == [], "there is no news"
+    assert robot.cycle == 1
 
 
 def test_a_tick_waits_for_no_neighbour_and_tells_the_value_also_if_it_is_the_old_one() -> None:
@@ -59,14 +62,6 @@ def test_a_tick_waits_for_no_neighbour_and_tells_the_value_also_if_it_is_the_old
     assert replies(robot, ("RA", now(1)), ("RC", now(2))) == both(now(1))
     assert replies(robot, ("RA", now(1))) == both(now(3))
     assert robot.cycle == 2
-
-
-def test_a_packet_is_one_tick_by_the_last_values_and_without_news_there_is_none() -> None:
-    robot = middle(MOVES)
-    replies(robot, ("RC", now(2)), ("RA", now(3)), ("RA", now(2)), ("RA", now(1)))
-    assert (robot.cycle, value(robot)) == (1, (3,))
-    assert replies(robot) == []
-    assert robot.cycle == 1
 
 
 def test_the_last_tick_is_told_and_then_a_robot_is_silent() -> None:

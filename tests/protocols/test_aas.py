@@ -23,7 +23,7 @@ from tests.support.agents import replies, started_robot, value
 from tests.support.examples import count
 from tests.support.problems import random_team, team_of
 from tests.support.random_options import random_schedule
-from tests.support.small_teams import differ, triangle
+from tests.support.small_teams import differ, different, triangle
 from tests.support.spent import spent
 
 
@@ -56,25 +56,19 @@ def test_what_still_goes_with_the_view_is_kept_and_sent_only_when_it_has_changed
     assert replies(robot, ("RB", ok(1))) == []
 
 
-def test_an_empty_intersection_is_a_nogood_over_aggregates_to_the_lowest_robot() -> None:
+def test_where_no_value_goes_with_all_of_the_view_the_largest_part_is_asked_for_and_assumed() -> None:
+    robot = agent(triangle(3), "RC")
+    asked = [(name, Narrow(((2,), (3,)))) for name in ("RA", "RB")]
+    assert replies(robot, ("RA", ok(1, 2, 3)), ("RB", ok(1, 2, 3))) == [("RD", ok(1)), *asked]
+    assert replies(robot, ("RA", ok(2, 3)), ("RB", ok(2, 3))) == []
+
+
+def test_an_empty_intersection_is_a_nogood_over_whole_aggregates_to_the_lowest_robot() -> None:
     team = team_of({"A": (1, 2), "B": (1, 3), "C": (3,)}, [differ("A", "B"), differ("A", "C"), differ("B", "C")])
     assert replies(agent(team, "RC"), ("RA", ok(1, 2)), ("RB", ok(3))) == [("RB", Nogood({}, ((3,),)))]
-
-
-def test_a_nogood_names_whole_sets() -> None:
     never = Constraint("N", Relation("N", 2, Semantics.CONFLICTS, ((1, 1), (2, 1))), ("A", "C"), ("A", "C"))
     team = team_of({"A": (1, 2, 3), "C": (1,)}, [never])
     assert replies(agent(team, "RC"), ("RA", ok(1, 2))) == [("RA", Nogood({}, ((1,), (2,))))]
-
-
-def test_where_no_value_goes_with_all_of_the_view_the_largest_part_is_asked_for_and_assumed() -> None:
-    robot = agent(triangle(3), "RC")
-    assert replies(robot, ("RA", ok(1, 2, 3)), ("RB", ok(1, 2, 3))) == [
-        ("RD", ok(1)),
-        ("RA", Narrow(((2,), (3,)))),
-        ("RB", Narrow(((2,), (3,)))),
-    ]
-    assert replies(robot, ("RA", ok(2, 3)), ("RB", ok(2, 3))) == []
 
 
 def test_whoever_is_asked_proposes_less_and_keeps_the_rest_for_later() -> None:
@@ -87,9 +81,12 @@ def test_whoever_is_asked_proposes_less_and_keeps_the_rest_for_later() -> None:
     assert replies(robot, ("RC", Nogood({}, ((2,), (3,))))) == [("RB", ok(1)), ("RC", ok(1))]
 
 
-def test_a_nogood_rules_out_what_it_names_and_the_rest_of_the_aggregate_stays() -> None:
-    robot = agent(triangle(3), "RA")
-    assert replies(robot, ("RB", Nogood({}, ((1,),)))) == [("RB", ok(2, 3)), ("RC", ok(2, 3))]
+def test_a_nogood_rules_out_what_it_names_and_without_a_value_left_there_is_no_solution() -> None:
+    said = replies(agent(triangle(3), "RA"), ("RB", Nogood({}, ((1,),))))
+    assert said == [("RB", ok(2, 3)), ("RC", ok(2, 3))], "the rest of the aggregate stays"
+    robot = agent(triangle(1), "RA")
+    assert replies(robot, ("RB", Nogood({}, ((1,),)))) == []
+    assert robot.verdict is Verdict.NO_SOLUTION
 
 
 def test_a_nogood_holds_as_long_as_what_others_propose_is_covered_and_is_answered_otherwise() -> None:
@@ -104,16 +101,10 @@ def test_a_nogood_holds_as_long_as_what_others_propose_is_covered_and_is_answere
 
 
 def test_add_link_asks_unknown_robots_of_a_nogood_for_their_aggregates() -> None:
-    team = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
+    team = different("ABC", "AC BC", 2)
     said = replies(agent(team, "RB"), ("RC", Nogood({"RA": ((1,),)}, ((1,),))))
     assert said == [("RA", AddLink()), ("RC", ok(2))]
     assert replies(agent(team, "RA"), ("RB", AddLink())) == [("RB", ok(1, 2))]
-
-
-def test_without_a_value_left_whatever_others_propose_there_is_no_solution() -> None:
-    robot = agent(triangle(1), "RA")
-    assert replies(robot, ("RB", Nogood({}, ((1,),)))) == []
-    assert robot.verdict is Verdict.NO_SOLUTION
 
 
 def test_of_an_n_ary_constraint_the_lowest_robot_with_a_choice_is_asked() -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from functools import partial
 
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from tests.support.agents import replies, robot_of, started, started_robot, value
-from tests.support.problems import team_of
-from tests.support.small_teams import differ, triangle
+from tests.support.small_teams import different, odd_triple, triangle
 
 agent = partial(started_robot, ABT)
 
@@ -28,8 +26,7 @@ def test_process_info_changes_a_value_that_the_view_forbids_and_keeps_one_that_i
 
 
 def test_the_view_is_checked_once_a_packet_has_been_read() -> None:
-    abt = agent(triangle(3), "RC")
-    assert replies(abt, ("RA", Ok((1,))), ("RB", Ok((2,)))) == [("RD", Ok((3,)))]
+    assert replies(agent(triangle(3), "RC"), ("RA", Ok((1,))), ("RB", Ok((2,)))) == [("RD", Ok((3,)))]
 
 
 def test_backtrack_sends_the_nogood_to_the_lowest_robot_in_it_and_forgets_its_value() -> None:
@@ -61,10 +58,8 @@ def test_resolve_conflict_answers_an_obsolete_nogood_about_the_present_value_and
 
 
 def test_check_add_link_asks_unknown_robots_of_the_left_side_and_believes_it() -> None:
-    strangers = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
-    abt = agent(strangers, "RB")
-    said = replies(abt, ("RC", Nogood({"RA": (1,)}, (1,))))
-    assert said == [("RA", AddLink()), ("RC", Ok((2,)))]
+    abt = agent(different("ABC", "AC BC", 2), "RB")
+    assert replies(abt, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RA", AddLink()), ("RC", Ok((2,)))]
     assert abt.view == {"RA": (1,)}
 
 
@@ -75,25 +70,20 @@ def test_set_link_tells_the_value_to_the_new_child_now_and_later_once() -> None:
     assert replies(abt, ("RB", Nogood({}, (1,)))).count(("RD", Ok((2,)))) == 1
 
 
-def test_nogoods_go_when_their_left_side_no_longer_stands() -> None:
+def test_nogoods_go_when_their_left_side_no_longer_stands_and_of_two_the_one_with_the_higher_robot_is_kept() -> None:
     abt = agent(triangle(), "RB")
     replies(abt, ("RA", Ok((2,))), ("RC", Nogood({"RA": (2,)}, (1,))))
     replies(abt, ("RA", Ok((1,))))
     assert all(lhs == {"RA": (1,)} for lhs in abt.store)
+    abt = agent(triangle(3), "RC")
+    replies(abt, ("RB", Ok((1,))), ("RA", Ok((1,))))
+    assert list(abt.store) == [{"RA": (1,)}]
 
 
 def test_an_n_ary_constraint_is_checked_when_all_its_robots_are_known() -> None:
-    odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1)))
-    team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
-    abt = agent(team, "RC")
+    abt = agent(odd_triple(), "RC")
     assert replies(abt, ("RA", Ok((1,)))) == []
     assert abt.problem.checks == 0
     replies(abt, ("RB", Ok((1,))))
     assert value(abt) == (2,)
     assert list(abt.store) == [{"RA": (1,), "RB": (1,)}]
-
-
-def test_of_two_conflicts_the_one_with_the_highest_lowest_robot_is_kept() -> None:
-    abt = agent(triangle(3), "RC")
-    replies(abt, ("RB", Ok((1,))), ("RA", Ok((1,))))
-    assert list(abt.store) == [{"RA": (1,)}]

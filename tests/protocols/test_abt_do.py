@@ -11,13 +11,13 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Event, Sent
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.abt_do import ABTDORetro, CurrentOrder
 from robochoc.protocols.satisfaction.messages.abt_do import AddLink, Counters, Nogood, Ok, Order
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.cases import cases, looped
 from tests.support.problems import random_team, team_of
-from tests.support.small_teams import differ
+from tests.support.small_teams import differ, different, odd_triple
 
 
 def clique(values: int = 3) -> Team:
@@ -55,12 +55,15 @@ def test_ok_tells_how_many_values_are_left_and_a_value_that_the_view_allows_is_k
     assert value(abt) == (1,)
 
 
-def test_backtrack_tells_the_lowest_robot_and_how_many_values_are_left_without_it() -> None:
+def test_backtrack_tells_the_lowest_robot_at_present_and_how_many_values_are_left_without_it() -> None:
     abt = agent(clique(), "RD")
-    said = replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1)))
-    assert said == [("RC", Nogood({"RA": (1,), "RB": (2,)}, (3,), 1))]
+    packet = [("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1))]
+    assert replies(abt, *packet) == [("RC", Nogood({"RA": (1,), "RB": (2,)}, (3,), 1))]
     assert "RC" not in abt.view
     assert value(abt) == (3,)
+    abt = agent(clique(), "RD")
+    replies(abt, ("RC", order("CBADE", (1, "RA"))))
+    assert replies(abt, *packet) == [("RA", Nogood({"RB": (2,), "RC": (3,)}, (1,), 1))]
 
 
 def test_an_empty_nogood_ends_the_search_without_solution() -> None:
@@ -81,10 +84,8 @@ def test_an_obsolete_nogood_about_the_present_value_is_answered_once_a_packet_an
 
 
 def test_unknown_robots_of_the_left_side_are_asked_and_meanwhile_believed() -> None:
-    strangers = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
-    abt = agent(strangers, "RB")
-    said = replies(abt, ("RC", Nogood({"RA": (1,)}, (1,), 1)))
-    assert said == [("RA", AddLink()), ("RC", Ok((2,), 1))]
+    abt = agent(different("ABC", "AC BC", 2), "RB")
+    assert replies(abt, ("RC", Nogood({"RA": (1,)}, (1,), 1))) == [("RA", AddLink()), ("RC", Ok((2,), 1))]
     assert abt.view == {"RA": (1,)}
 
 
@@ -117,22 +118,16 @@ def test_of_two_orders_the_one_with_the_larger_counters_holds(older: Counters, n
 
 
 def test_an_accepted_nogood_moves_its_sender_right_below_the_receiver() -> None:
+    """It is moved above if it has fewer values left, and not at all if it is there, or higher, already."""
     abt = agent(clique(), "RA")
-    said = replies(abt, ("RC", Nogood({}, (1,), 3)))
     moved = order("ACBDE", (0, ""), (1, "RA"))
-    assert orders(said) == [("RC", moved), ("RB", moved), ("RD", moved), ("RE", moved)]
+    assert orders(replies(abt, ("RC", Nogood({}, (1,), 3)))) == [(name, moved) for name in ("RC", "RB", "RD", "RE")]
     assert value(abt) == (2,)
-
-
-def test_a_sender_that_is_there_or_higher_already_is_not_moved() -> None:
-    assert orders(replies(agent(clique(), "RA"), ("RB", Nogood({}, (1,), 3)))) == []
-    assert orders(replies(agent(clique(), "RB"), ("RA", Nogood({}, (1,), 0)))) == []
-
-
-def test_a_sender_with_fewer_values_left_is_moved_above_the_receiver() -> None:
     abt = agent(clique(), "RA")
     assert orders(replies(abt, ("RC", Nogood({}, (1,), 1))))[0] == ("RC", order("CABDE", (1, "RA")))
     assert abt.order.names == names("CABDE")
+    assert orders(replies(agent(clique(), "RA"), ("RB", Nogood({}, (1,), 3)))) == []
+    assert orders(replies(agent(clique(), "RB"), ("RA", Nogood({}, (1,), 0)))) == []
 
 
 def test_a_sender_passes_only_those_that_are_known_to_have_more_values_left() -> None:
@@ -165,12 +160,9 @@ def test_a_new_order_raises_the_counter_of_its_place_and_drops_those_below() -> 
     assert current.moved("RE", 4, "RC") == order("ABCDE", (7, "RA"), (4, "RA"), (2, "RC"), (1, "RB"), (1, "RC"))
 
 
-def test_who_adopts_an_order_tells_its_value_to_those_newly_lower() -> None:
-    abt = agent(clique(), "RC")
-    assert replies(abt, ("RA", order("CABDE", (1, "RA")))) == [("RA", Ok((1,), 3)), ("RB", Ok((1,), 3))]
-
-
-def test_who_adopts_an_order_drops_nogoods_that_rest_on_lower_robots() -> None:
+def test_who_adopts_an_order_tells_its_value_to_those_newly_lower_and_drops_nogoods_that_rest_on_them() -> None:
+    said = replies(agent(clique(), "RC"), ("RA", order("CABDE", (1, "RA"))))
+    assert said == [("RA", Ok((1,), 3)), ("RB", Ok((1,), 3))]
     abt = agent(clique(), "RC")
     replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 3)))
     assert value(abt) == (3,)
@@ -185,21 +177,11 @@ def test_only_robots_that_are_higher_at_present_are_looked_at() -> None:
     assert replies(abt, ("RA", Ok((1,), 3))) == []
     assert value(abt) == (1,)
     assert ("RA", Ok((2,), 2)) in replies(abt, ("RB", Ok((1,), 3)))
-
-
-def test_a_value_heard_under_another_order_counts_as_soon_as_its_robot_is_higher() -> None:
     abt = agent(clique(), "RB")
     replies(abt, ("RC", Ok((1,), 3)))
     assert value(abt) == (1,)
     replies(abt, ("RA", order("CABDE", (1, "RA"))))
-    assert value(abt) == (2,)
-
-
-def test_backtrack_picks_the_lowest_robot_of_the_present_order() -> None:
-    abt = agent(clique(), "RD")
-    replies(abt, ("RC", order("CBADE", (1, "RA"))))
-    said = replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 2)), ("RC", Ok((3,), 1)))
-    assert said == [("RA", Nogood({"RB": (2,), "RC": (3,)}, (1,), 1))]
+    assert value(abt) == (2,), "the value counts as soon as its robot is higher"
 
 
 def test_a_nogood_that_rests_on_a_robot_that_is_lower_at_present_is_answered() -> None:
@@ -210,9 +192,7 @@ def test_a_nogood_that_rests_on_a_robot_that_is_lower_at_present_is_answered() -
 
 
 def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None:
-    odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
-    team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
-    abt = agent(team, "RA")
+    abt = agent(odd_triple(), "RA")
     replies(abt, ("RB", Ok((1,), 2)), ("RC", Ok((1,), 2)), ("RB", order("BAC", (1, "RB"))))
     assert abt.problem.checks == 0
     replies(abt, ("RB", order("CBA", (2, "RB"))))

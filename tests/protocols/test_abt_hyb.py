@@ -42,13 +42,10 @@ def test_after_a_nogood_the_view_stays_no_value_is_taken_and_no_second_nogood_is
     assert robot.awaited == "RB"
 
 
-def test_whoever_waits_drops_nogoods_and_sends_no_value_along_a_new_link() -> None:
+def test_whoever_waits_drops_nogoods_and_sends_no_value_along_a_new_link_until_a_change_frees_a_value() -> None:
     robot = waiting()
     assert replies(robot, ("RD", Nogood({}, (2,))), ("RD", AddLink())) == []
     assert all("RD" not in lhs for lhs in robot.store)
-
-
-def test_a_change_elsewhere_that_frees_a_value_ends_the_wait() -> None:
     robot = waiting()
     assert replies(robot, ("RA", Ok((2,)))) == [("RD", Ok((1,)))]
     assert robot.awaited is None
@@ -59,13 +56,10 @@ def test_another_value_of_the_nogoods_receiver_ends_the_wait_and_the_same_one_br
     assert replies(waiting(), ("RB", Ok((2,)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
 
 
-def test_an_obsolete_nogood_about_the_present_value_is_answered() -> None:
+def test_an_obsolete_nogood_about_the_present_value_is_answered_and_an_empty_one_ends_the_search() -> None:
     robot = agent(triangle(), "RB")
     replies(robot, ("RA", Ok((2,))))
     assert replies(robot, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", Ok((1,)))]
-
-
-def test_an_empty_nogood_ends_the_search() -> None:
     robot = agent(triangle(1), "RA")
     assert replies(robot, ("RB", Nogood({}, (1,)))) == []
     assert robot.verdict is Verdict.NO_SOLUTION

@@ -47,20 +47,14 @@ def test_a_cost_bounds_the_child_s_subtree_for_the_value_in_its_context_unless_t
     assert adopt.context == context(A=(2, 2), Z=1)
 
 
-def test_a_cost_tells_values_of_robots_further_up_and_newer_ones_of_neighbours() -> None:
+def test_a_cost_tells_values_of_robots_further_up_and_newer_ones_of_neighbours_but_no_older_ones() -> None:
     adopt = informed()
-    replies(adopt, ("RC", Cost(context(B=1, X=1, A=(2, 2)), 4, 7)))
-    assert adopt.context == context(A=(2, 2), Z=1, X=1)
+    replies(adopt, ("RC", Cost(context(B=1, X=(1, 2), A=(2, 2)), 4, 7)))
+    assert adopt.context == context(A=(2, 2), Z=1, X=(1, 2))
     assert list(adopt.lower) == [5, 1]
-
-
-def test_an_older_value_does_not_come_back() -> None:
-    adopt = informed()
-    replies(adopt, ("RC", Cost(context(B=1, X=(1, 2)), 4, 7)))
     replies(adopt, ("RD", Cost(context(B=1, X=(2, 1)), 5, 7)))
     assert adopt.context["RX"] == ((1,), 2)
-    assert adopt.bounds["RC"].lb == [4, 0]
-    assert adopt.bounds["RD"].lb == [0, 0]
+    assert (adopt.bounds["RC"].lb, adopt.bounds["RD"].lb) == ([4, 0], [0, 0])
 
 
 def test_a_changed_value_voids_the_bounds_that_rest_on_it_and_the_same_value_again_none() -> None:
@@ -76,7 +70,8 @@ def test_a_changed_value_voids_the_bounds_that_rest_on_it_and_the_same_value_aga
     assert to("RA", said) == [Cost(context(A=(1, 3), Z=1), 4, INFINITE)]
 
 
-def test_a_value_is_left_once_its_lower_bound_is_above_the_threshold() -> None:
+def test_a_value_is_left_once_its_lower_bound_is_above_the_threshold_or_that_is_ub() -> None:
+    """In the second case it takes the value with the least upper bound."""
     adopt = informed()
     replies(adopt, ("RA", Threshold(4, {})))
     replies(adopt, ("RC", Cost(context(B=1), 4, 9)))
@@ -84,12 +79,8 @@ def test_a_value_is_left_once_its_lower_bound_is_above_the_threshold() -> None:
     said = replies(adopt, ("RC", Cost(context(B=1), 5, 9)))
     assert value(adopt) == (2,)
     assert to("RC", said)[0] == Value((2,), 2)
-
-
-def test_a_threshold_that_is_ub_makes_the_robot_take_the_value_with_the_least_upper_bound() -> None:
     adopt = informed()
-    packet = [(child, Cost(context(B=2), 0, 1)) for child in ("RC", "RD")]
-    replies(adopt, ("RA", Threshold(9, {})), *packet)
+    replies(adopt, ("RA", Threshold(9, {})), *((child, Cost(context(B=2), 0, 1)) for child in ("RC", "RD")))
     assert adopt.threshold == adopt.ub == 6
     assert value(adopt) == (2,)
 
@@ -117,16 +108,11 @@ def test_a_threshold_in_another_context_waits_until_it_fits() -> None:
 def test_the_threshold_is_split_among_the_children_within_their_bounds() -> None:
     adopt = informed()
     replies(adopt, ("RC", Cost(context(B=1), 1, 3)), ("RD", Cost(context(B=1, A=1), 2, 9)))
-    said = replies(adopt, ("RA", Threshold(8, {})))
-    assert said == [("RC", Threshold(3, {})), ("RD", Threshold(5, {"RA": (1,)}))]
-    said = replies(adopt, ("RA", Threshold(4, {})))
-    assert said == [("RC", Threshold(1, {})), ("RD", Threshold(3, {"RA": (1,)}))]
-
-
-def test_a_child_s_threshold_is_never_below_what_it_costs_at_least() -> None:
+    for threshold, left, right in ((8, 3, 5), (4, 1, 3)):
+        said = replies(adopt, ("RA", Threshold(threshold, {})))
+        assert said == [("RC", Threshold(left, {})), ("RD", Threshold(right, {"RA": (1,)}))]
     adopt = root(ADOPT)
-    said = replies(adopt, ("RD", Cost(context(B=1), 1, 9)))
-    assert said == [("RD", Threshold(1, {}))]
+    assert replies(adopt, ("RD", Cost(context(B=1), 1, 9))) == [("RD", Threshold(1, {}))]
     assert adopt.t == {"RC": [0, 0], "RD": [1, 0]}
 
 
@@ -139,7 +125,7 @@ def test_nothing_is_told_twice_and_what_is_paid_is_looked_up_only_when_a_neighbo
     assert adopt.problem.checks == checks
 
 
-def test_another_robot_ends_only_after_its_parent_with_the_last_values_above() -> None:
+def test_another_robot_ends_only_after_its_parent_with_the_last_values_above_when_its_bounds_meet() -> None:
     adopt = informed()
     replies(adopt, *((child, Cost(context(B=1), 1, 1)) for child in ("RC", "RD")), ("RA", Threshold(2, {})))
     assert adopt.threshold == adopt.ub == 2
@@ -147,16 +133,12 @@ def test_another_robot_ends_only_after_its_parent_with_the_last_values_above() -
     said = replies(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
     assert said == [(child, Terminate(context(Z=1, A=1, X=2, B=1))) for child in ("RC", "RD")]
     assert replies(adopt, ("RA", Value((2,), 2))) == []
-
-
-def test_a_robot_goes_on_after_its_parent_s_end_until_its_bounds_meet_and_tells_it_nothing() -> None:
     adopt = informed()
     said = replies(adopt, ("RA", Threshold(1, {})), ("RA", Terminate(context(Z=1, A=(2, 2)))))
-    assert to("RA", said) == []
     assert list(adopt.lower) == [1, 1]
-    said = replies(adopt, *((child, Cost(context(B=1, A=(2, 2)), 0, 0)) for child in ("RC", "RD")))
-    assert said[-2:] == [(child, Terminate(context(Z=1, A=(2, 2), B=1))) for child in ("RC", "RD")]
-    assert to("RA", said) == []
+    more = replies(adopt, *((child, Cost(context(B=1, A=(2, 2)), 0, 0)) for child in ("RC", "RD")))
+    assert more[-2:] == [(child, Terminate(context(Z=1, A=(2, 2), B=1))) for child in ("RC", "RD")]
+    assert to("RA", [*said, *more]) == [], "nothing is told to a parent that has ended"
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:

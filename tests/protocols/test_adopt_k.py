@@ -59,15 +59,12 @@ def test_a_value_is_left_when_its_lower_bound_is_the_best_known_cost() -> None:
     assert (robot.lb, robot.ub, value(robot)) == (4, 8, (2,))
 
 
-def test_the_first_threshold_stays_between_lb_and_ub() -> None:
+def test_the_first_threshold_stays_between_lb_and_ub_and_is_ub_for_the_value_with_the_least_upper_bound() -> None:
     for allowance, bound in ((1, 4), (99, 18)):
         robot = informed(9, allowance=allowance)
         assert robot.allowance == allowance
         replies(robot, *((child, Cost(context(B=1), 3, 9)) for child in ("RC", "RD")))
         assert (robot.lb, robot.ub, robot.allowance) == (4, 18, bound)
-
-
-def test_a_first_threshold_that_is_ub_makes_the_robot_take_the_value_with_the_least_upper_bound() -> None:
     robot = informed(9, allowance=9)
     replies(robot, *((child, Cost(context(B=2), 0, 1)) for child in ("RC", "RD")))
     assert (robot.lb, robot.ub, value(robot)) == (0, 6, (2,))
@@ -83,16 +80,13 @@ def test_the_first_threshold_is_split_among_the_children_within_their_bounds() -
     ]
 
 
-def test_what_is_split_is_no_less_than_the_value_costs() -> None:
-    """It may cost more than the first threshold, by less than k."""
+def test_what_is_split_is_no_less_than_the_value_costs_and_a_lower_share_is_told_but_no_higher_one() -> None:
+    """The value may cost more than the first threshold, by less than k."""
     robot = informed(9)
     replies(robot, ("RC", Cost(context(B=1), 3, 9)), ("RD", Cost(context(B=1), 2, 9)))
     assert value(robot) == (1,)
     assert robot.allowance == robot.lb == 4
     assert [t[0] for t in robot.t.values()] == [3, 2]
-
-
-def test_with_the_same_value_a_lower_share_is_told_and_no_higher_one() -> None:
     robot = informed(9)
     assert replies(robot, ("RA", Value((1,), 1, INFINITE, 5))) == []
     replies(robot, ("RC", Cost(context(B=1), 0, INFINITE, True)))

@@ -108,18 +108,14 @@ def test_a_child_s_threshold_is_what_is_left_when_the_others_cost_the_least() ->
     assert said == [("RC", Value((1,), 1, 8)), ("RD", Value((1,), 1, 5))]
 
 
-def test_pseudo_children_get_no_threshold() -> None:
-    adopt = informed(threshold=6)
-    said = replies(adopt, ("RZ", Value((2,), 2)), ("RA", Value((2,), 2, 6)))
-    assert [message.threshold for message in to("RE", said) if isinstance(message, Value)] == [INFINITE]
-    assert [message.threshold for message in to("RC", said) if isinstance(message, Value)] == [6]
-
-
-def test_a_threshold_that_comes_with_the_change_is_not_asked_for() -> None:
+def test_a_threshold_that_comes_with_the_change_is_not_asked_for_and_pseudo_children_get_none() -> None:
     adopt = informed(threshold=9)
     said = replies(adopt, ("RA", Value((2,), 2, 7)))
     assert adopt.threshold == 7
     assert to("RA", said) == [Cost(context(A=(2, 2), Z=1), 1, INFINITE)]
+    said = replies(adopt, ("RZ", Value((2,), 2)), ("RA", Value((2,), 3, 6)))
+    assert to("RE", said) == [Value((2,), 2)]
+    assert to("RC", said) == [Value((2,), 2, 6)]
 
 
 def test_a_child_that_asks_for_its_threshold_is_told_it_again_and_a_higher_one_though_the_value_is_the_same() -> None:
@@ -145,7 +141,7 @@ def test_the_last_value_goes_to_all_neighbours_below() -> None:
     assert to("RC", said)[-1] == Terminate(context(B=(2, 2)))
 
 
-def test_another_robot_ends_only_after_its_parent() -> None:
+def test_another_robot_ends_only_after_its_parent_when_its_bounds_meet_and_tells_it_nothing() -> None:
     adopt = informed()
     replies(adopt, *both(Cost(context(B=1), 1, 1)))
     assert adopt.lb == adopt.ub == 2
@@ -153,26 +149,19 @@ def test_another_robot_ends_only_after_its_parent() -> None:
     said = replies(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
     assert said == [(child, Terminate(context(Z=1, A=1, X=2, B=1))) for child in ("RC", "RD")]
     assert replies(adopt, ("RA", Value((2,), 2))) == []
-
-
-def test_a_robot_goes_on_after_its_parent_s_end_until_its_bounds_meet_and_tells_it_nothing() -> None:
     adopt = informed(threshold=1)
     said = replies(adopt, ("RA", Terminate(context(Z=1, A=(2, 2)))))
-    assert adopt.threshold == INFINITE
-    assert not adopt.terminated
+    assert (adopt.threshold, adopt.terminated) == (INFINITE, False)
     said += replies(adopt, *both(Cost(context(B=1, A=(2, 2)), 0, 0)))
     assert to("RA", said) == []
     assert said[-2:] == [(child, Terminate(context(Z=1, A=(2, 2), B=1))) for child in ("RC", "RD")]
 
 
-def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:
+def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all_and_another_robot_says_so() -> None:
     adopt = root(BnBADOPT)
     replies(adopt, ("RC", Cost(context(B=2), INFINITE, INFINITE)))
     assert replies(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE))) == []
     assert adopt.verdict is Verdict.NO_SOLUTION
-
-
-def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
     adopt = informed(threshold=5)
     said = replies(adopt, *both(*(Cost(context(B=number), INFINITE, INFINITE, True) for number in (1, 2))))
     assert to("RA", said) == [Cost(context(A=1, Z=1), INFINITE, INFINITE)]

@@ -158,17 +158,13 @@ def test_nothing_is_moved_twice_and_a_value_that_a_robot_above_has_not_told_befo
 
 
 def test_delta_is_what_is_paid_with_what_was_moved_here_and_without_what_was_moved_up() -> None:
-    robot = informed()
-    # With A and Z at 1: 4 + 5 + 0 + 0 and 1 + 3 + 1 + 3, of which 7 and 1 were moved up.
-    assert list(robot.delta) == [9 - 8, 8 - 8]
-
-
-def test_of_a_robot_above_whose_value_is_unknown_only_what_was_put_in_is_missing() -> None:
+    """Of a robot above whose value is unknown only what was put in is missing."""
     robot = moved()
     assert robot.costs_in({}) == robot.unary == [1, 0]
     replies(robot, ("RA", Value((1,), 1)))
     assert list(robot.delta) == [1, 0]
-    assert list(informed().delta) == [1, 0]
+    # With A and Z at 1: 4 + 5 + 0 + 0 and 1 + 3 + 1 + 3, of which 7 and 1 were moved up.
+    assert list(informed().delta) == [9 - 8, 8 - 8]
 
 
 def test_with_a_value_above_with_which_nothing_goes_all_own_values_cost_infinity() -> None:
@@ -189,16 +185,12 @@ def test_nothing_is_told_before_the_parent_has_a_value() -> None:
     assert to("RC", said) == [Value((2,), 1)]
 
 
-def test_bounds_and_thresholds_are_on_what_is_left() -> None:
+def test_bounds_and_thresholds_are_on_what_is_left_and_the_end_is_bnb_adopt_s() -> None:
     robot = informed()
     said = replies(robot, ("RC", Cost(context(B=2), 0, 2)), ("RD", Cost(context(B=2), 0, 0, True)))
     assert to("RA", said) == [Cost(context(Z=1, A=1), 0, 2)]
     assert to("RD", said) == [Value((2,), 1, 2)]
-
-
-def test_the_end_is_bnb_adopt_s() -> None:
-    robot = informed()
-    replies(robot, ("RC", Cost(context(B=2), 0, 0)), ("RD", Cost(context(B=2), 0, 0)))
+    replies(robot, ("RC", Cost(context(B=2), 0, 0)))
     said = replies(robot, ("RA", Terminate(context(Z=1, A=1))))
     assert said == [(child, Terminate(context(Z=1, A=1, B=2))) for child in ("RC", "RD")]
 

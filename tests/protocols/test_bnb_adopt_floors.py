@@ -11,7 +11,7 @@ from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
-from tests.support.agents import replies, value
+from tests.support.agents import replies, sent, value
 from tests.support.cases import looped
 from tests.support.pseudo_trees import context, placed, priced
 from tests.support.spent import spent
@@ -37,11 +37,14 @@ def middle(kind: type[BnBADOPT] = WithFloors) -> BnBADOPT:
     return placed(kind, TEAM, "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"])
 
 
-def test_children_are_asked_with_the_own_values_and_nothing_else_is_said_before_they_answer() -> None:
+def test_children_are_asked_with_the_own_values_and_lower_bounds_begin_at_their_floors() -> None:
+    """Nothing else is said before they answer. The first value is the best by the floors."""
     robot = middle()
-    assert robot.outbox == [("RC", Domain([(1,), (2,)])), ("RD", Domain([(1,), (2,)]))]
-    robot.outbox.clear()
+    assert sent(robot) == [("RC", Domain([(1,), (2,)])), ("RD", Domain([(1,), (2,)]))]
     assert replies(robot, ("RZ", Value((1,), 1)), ("RC", Floor([0, 0]))) == []
+    robot = middle()
+    replies(robot, ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
+    assert (list(robot.lower), value(robot)) == ([5, 2], (2,))
 
 
 def test_the_floor_is_the_least_of_what_is_paid_with_the_parent_and_of_the_children_s_floors() -> None:
@@ -51,27 +54,15 @@ def test_the_floor_is_the_least_of_what_is_paid_with_the_parent_and_of_the_child
     assert said[0] == ("RA", Floor([min(5 + 5, 3 + 2), min(1 + 5, 2 + 2)]))
 
 
-def test_lower_bounds_begin_at_the_floors_and_the_first_value_is_the_best_by_them() -> None:
-    robot = middle()
-    replies(robot, ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
-    assert list(robot.lower) == [5, 2]
-    assert value(robot) == (2,)
-
-
-def test_a_changed_value_voids_bounds_down_to_the_floors() -> None:
-    robot = middle()
-    replies(robot, ("RA", Value((1,), 1)), ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
-    replies(robot, ("RC", Cost(context(B=1, A=1), 9, 9)), ("RA", Value((2,), 2)))
-    assert (robot.bounds["RC"].lb, robot.bounds["RC"].ub) == ([4, 0], [INFINITE, INFINITE])
-
-
-def test_shares_of_the_threshold_begin_at_the_floors() -> None:
-    robot = middle(WithShares)
-    assert isinstance(robot, ADOPTk)
-    replies(robot, ("RA", Value((1,), 1)), ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
-    assert robot.t == {"RC": [4, 0], "RD": [1, 2]}
-    replies(robot, ("RC", Cost(context(B=1, A=1), 9, 9)), ("RA", Value((2,), 2)))
-    assert robot.t == {"RC": [4, 0], "RD": [1, 2]}
+def test_a_changed_value_voids_bounds_and_shares_of_the_threshold_down_to_the_floors() -> None:
+    for kind in (WithFloors, WithShares):
+        robot = middle(kind)
+        shares = [robot.t] if isinstance(robot, ADOPTk) else []
+        replies(robot, ("RA", Value((1,), 1)), ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
+        assert all(share == {"RC": [4, 0], "RD": [1, 2]} for share in shares)
+        replies(robot, ("RC", Cost(context(B=1, A=1), 9, 9)), ("RA", Value((2,), 2)))
+        assert (robot.bounds["RC"].lb, robot.bounds["RC"].ub) == ([4, 0], [INFINITE, INFINITE])
+        assert all(share == {"RC": [4, 0], "RD": [1, 2]} for share in shares)
 
 
 @looped(

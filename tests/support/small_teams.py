@@ -35,6 +35,12 @@ def triangle(values: int = 2) -> Team:
     return different("ABCD", "AB AC BC CD", values)
 
 
+def odd_triple() -> Team:
+    """Return three robots of the values 1 and 2: exactly one of them must have 2."""
+    odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
+    return team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
+
+
 def pair(*events: ScenarioEvent, values: int = 1) -> Team:
     """Return two robots that must take different values, and what happens to them."""
     team = team_of(dict.fromkeys("AB", range(1, values + 1)), [differ("A", "B")])
