@@ -82,18 +82,15 @@ def test_the_next_robot_adds_a_value_and_answers_and_each_assignment_raises_the_
     assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0]))
 
 
-def test_values_are_tried_the_cheapest_first() -> None:
+def test_values_are_tried_the_cheapest_first_and_none_with_which_the_cpa_costs_as_much_as_b() -> None:
     robot = agent(chain(), "RC")
     said = replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
     assert value(robot) == (2,)  # 2, and not 4
     assert said[0] == ("RD", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 2, 2]))
-
-
-def test_a_value_with_which_the_cpa_costs_as_much_as_b_is_not_assigned() -> None:
+    given_back = [("RB", back((1, 1), (2, 1), bound=2))]
+    assert replies(robot, ("RD", solution(2, 1, 2, 2, 1))) == given_back, "b falls"
     robot = agent(chain(), "RC")
-    assert replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0], bound=2))) == [
-        ("RB", back((1, 1), (2, 1), bound=2))
-    ]
+    assert replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0], bound=2))) == given_back
     assert value(robot) is None
 
 
@@ -111,21 +108,28 @@ def test_a_cpa_that_costs_as_much_as_b_goes_back_without_a_look_at_any_value() -
 
 
 def test_an_estimate_is_what_the_cheapest_value_costs_with_each_beginning_of_the_cpa() -> None:
+    """The part that a CPA has in common with the last one is not priced again."""
     robot = agent(chain(), "RC")
+    replies(robot, ("RA", asks((1, 1))))
+    before = robot.problem.checks
     assert replies(robot, ("RB", asks((1, 1), (2, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 2]))]
     assert value(robot) is None
+    assert robot.problem.checks == before + 2
+    replies(robot, ("RB", asks((1, 1), (2, 1))), ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    assert robot.problem.checks == before + 2
 
 
-def test_what_lower_robots_cost_at_least_is_in_the_estimate() -> None:
+def test_what_lower_robots_cost_at_least_is_in_the_estimate_unless_they_may_step_aside() -> None:
     """B pays 3 to C at least for its first value, 1 for its second, whatever C takes."""
     constraints = [priced("BC", {(1, 1): 4, (1, 2): 3, (2, 1): 1, (2, 2): 2}), priced("AB", {(1, 2): 7})]
     team = team_of(dict.fromkeys("ABC", (1, 2)), constraints)
-    robot = agent(team, "RB")
-    assert replies(robot, ("RA", cpa((1, 1), least=[0, 0]))) == [
+    assert replies(agent(team, "RB"), ("RA", cpa((1, 1), least=[0, 0]))) == [
         ("RC", cpa((1, 1), (1, 1), least=[1, 3, 0])),
         ("RA", FBEstimate([1], [1, 3])),
     ]
     assert agent(team, "RC").costs.estimates == [0]
+    team = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {}, 5)])
+    assert agent(team, "RA", parameters=RunParameters(withdrawal_cost=9)).costs.estimates == [0]
 
 
 def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
@@ -137,21 +141,6 @@ def test_an_n_ary_constraint_is_in_one_estimate_only() -> None:
         cpa((1, 1), (1, 1), least=[5, 0, 0]),
     )
     assert replies(agent(team, "RC"), ("RB", asks((1, 1), (1, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 5]))]
-
-
-def test_of_a_robot_that_may_step_aside_nothing_is_expected() -> None:
-    team = team_of(dict.fromkeys("AB", (1, 2)), [priced("AB", {}, 5)])
-    assert agent(team, "RA", parameters=RunParameters(withdrawal_cost=9)).costs.estimates == [0]
-
-
-def test_what_a_cpa_has_in_common_with_the_last_one_is_not_priced_again() -> None:
-    robot = agent(chain(), "RC")
-    replies(robot, ("RA", asks((1, 1))))
-    before = robot.problem.checks
-    replies(robot, ("RB", asks((1, 1), (2, 1))))
-    assert robot.problem.checks == before + 2
-    replies(robot, ("RB", asks((1, 1), (2, 1))), ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
-    assert robot.problem.checks == before + 2
 
 
 def test_who_has_nothing_new_to_say_is_silent() -> None:
@@ -170,26 +159,18 @@ def test_a_robot_is_asked_only_when_its_estimate_may_have_changed() -> None:
 
 
 def test_the_cpa_and_estimates_that_cost_as_much_as_b_make_the_next_value_be_taken_wherever_the_cpa_is() -> None:
+    """An estimate for another CPA counts so far as the CPA is still the same; the own value is another one."""
+    packet = [("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0]))]
     robot = agent(chain(), "RB")
-    replies(robot, ("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0])))
+    replies(robot, *packet)
     assert replies(robot, ("RC", FBEstimate([1, 1], [0, 0, 3]))) == []
     said = replies(robot, ("RD", FBEstimate([1, 1], [0, 3])))
     assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0], bound=6))
-
-
-def test_an_estimate_for_another_cpa_says_what_stands_of_it() -> None:
-    """So far as the CPA is still the same; the own value is another one."""
     robot = agent(chain(), "RB")
-    replies(robot, ("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0])))
+    replies(robot, *packet)
     replies(robot, ("RC", back((1, 1), (1, 1))))
     assert replies(robot, ("RC", FBEstimate([1, 1], [0, 0, 9]))) == []
     assert replies(robot, ("RD", FBEstimate([1, 1], [0, 6]))) == [("RA", back((1, 1), bound=6))]
-
-
-def test_b_that_falls_makes_the_next_value_be_taken_too() -> None:
-    robot = agent(chain(), "RC")
-    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
-    assert replies(robot, ("RD", solution(2, 1, 2, 2, 1))) == [("RB", back((1, 1), (2, 1), bound=2))]
 
 
 # Back
@@ -259,15 +240,12 @@ def test_every_cpa_tells_b() -> None:
     assert value(robot) == (1,)
 
 
-def test_the_first_robot_ends_the_search_when_it_has_no_value_left() -> None:
+def test_the_first_robot_ends_the_search_when_it_has_no_value_left_without_solution_if_nobody_has_told_b() -> None:
     robot = agent(chain(), "RA")
     replies(robot, ("RD", solution(5, 1, 2, 2, 1)), ("RB", back((1, 1), bound=5)))
     said = replies(robot, ("RB", back((2, 2), bound=5)))
-    assert said == [("RB", Terminate()), ("RC", Terminate()), ("RD", Terminate())]
+    assert said == [(name, Terminate()) for name in ("RB", "RC", "RD")]
     assert value(robot) == (1,)
-
-
-def test_there_is_no_solution_when_nobody_has_told_b() -> None:
     robot = agent(team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): INFINITE})]), "RA")
     assert replies(robot, ("RB", back((1, 1)))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
@@ -281,15 +259,13 @@ def test_whoever_knows_that_nothing_is_better_with_any_beginning_ends_the_search
 
 
 def test_who_is_told_the_end_takes_its_value_in_the_best_solution_and_is_silent() -> None:
+    """The news of the solution may come after the end."""
     robot = agent(chain(), "RB")
     replies(robot, ("RA", cpa((1, 1), least=[0, 0])), ("RD", solution(5, 1, 2, 2, 1)))
     assert replies(robot, ("RA", Terminate()), ("RA", cpa((2, 2), least=[0, 0])), ("RC", back((1, 1), (1, 1)))) == []
     assert value(robot) == (2,)
-
-
-def test_the_news_of_the_best_solution_may_come_after_the_end() -> None:
     robot = agent(chain(), "RB")
-    replies(robot, ("RA", Terminate()))
+    assert replies(robot, ("RA", Terminate())) == []
     assert robot.value is None
     assert replies(robot, ("RD", solution(5, 1, 2, 2, 1))) == []
     assert value(robot) == (2,)
@@ -302,15 +278,13 @@ def test_a_robot_alone_solves_its_problem_in_silence_and_one_with_an_empty_domai
 
 
 def test_the_best_solution_and_a_bound_are_found_before_the_end() -> None:
+    """The bound counts the expected cost of the present value until its CPA is back."""
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("A", {(1,): 2, (2,): 3}), priced("AB", {(1, 1): 4, (1, 2): 6})])
     robot = agent(team, "RA")
     assert robot.findings == Findings(bound=3)
     replies(robot, ("RB", FBEstimate([1], [0, 0])), ("RB", solution(9, 1, 2)))
     assert robot.findings == Findings(best=Incumbent(9, {"RA": (1,), "RB": (2,)}), bound=3)
     assert agent(team, "RB").findings == Findings()
-
-
-def test_the_bound_counts_what_the_present_value_is_expected_to_cost_until_its_cpa_is_back() -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("A", {(1,): 2, (2,): 5}), priced("AB", {(1, 1): 1})])
     robot = agent(team, "RA")
     replies(robot, ("RB", FBEstimate([1], [0, 2])))

@@ -8,7 +8,7 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.afc import AFC, FilteredDomain
 from robochoc.protocols.satisfaction.messages.afc import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
@@ -18,7 +18,7 @@ from tests.support.agents import robot_of
 from tests.support.brute_force import solutions
 from tests.support.cases import cases
 from tests.support.problems import random_team, team_of
-from tests.support.small_teams import differ
+from tests.support.small_teams import differ, odd_triple
 from tests.support.spent import spent
 
 
@@ -68,10 +68,15 @@ def test_assign_cpa_counts_a_step_and_sends_the_cpa_to_the_next_robot_and_copies
     assert told(afc, CPA(values(1), 1)) == [("RC", CPA(((1,), ()), 2))], "B has no constraint, and shows no variable"
 
 
-def test_the_last_robot_concludes_that_a_solution_stands() -> None:
+def test_the_last_robot_concludes_that_a_solution_stands_and_one_with_an_empty_domain_that_there_is_none() -> None:
     afc = agent(square(4), "RE")
     assert told(afc, CPA(values(1, 2, 3, 4), 4)) == []
     assert (afc.verdict, afc.assignment) == (Verdict.SOLUTION, {"E": 3})
+    alone = agent(team_of({"A": (1, 2)}, []), "RA")
+    assert (alone.verdict, alone.assignment) == (Verdict.SOLUTION, {"A": 1}), "it is the first and the last"
+    afc = agent(team_of({"A": (1, 2), "B": (), "C": (1,)}, []), "RB")
+    assert afc.verdict is Verdict.NO_SOLUTION
+    assert told(afc, CPA(values(1), 1)) == []
 
 
 # receive_CPA
@@ -87,11 +92,13 @@ def test_backtrack_cpa_makes_the_robot_take_its_next_value_at_a_later_step_witho
 
 
 def test_a_value_once_tried_is_tried_again_only_under_another_cpa() -> None:
+    """Also if the last one was never brought back: some robot below sent it back to A, past this robot."""
     afc = agent(square(), "RB")
     told(afc, CPA(values(1), 1))
     assert told(afc, BacktrackCPA(values(1, 2), 2))[0] == ("RC", CPA(values(1, 3), 3))
     assert told(afc, BacktrackCPA(values(1, 3), 3)) == [("RA", BacktrackCPA(values(1), 3))]
     assert told(afc, CPA(values(2), 4))[0] == ("RC", CPA(values(2, 1), 5))
+    assert told(afc, CPA(values(3), 6))[0] == ("RC", CPA(values(3, 1), 7))
 
 
 def test_a_robot_that_has_tried_all_its_values_backtracks_to_the_robot_before() -> None:
@@ -118,10 +125,16 @@ def test_the_first_robot_concludes_that_there_is_none_when_its_domain_is_exhaust
 
 
 def test_who_gets_a_cpa_that_is_known_to_be_inconsistent_sends_it_back_without_a_check() -> None:
+    """A `NotOk` in the packet of the CPA is read first. A CPA that does not go on from it is taken up."""
     afc = agent(square(), "RD")
     told(afc, NotOk(values(1, 2), 2))
     assert told(afc, CPA(values(1, 2, 3), 3)) == [("RB", BacktrackCPA(values(1, 2), 3))]
     assert afc.problem.checks == 0
+    said = told(agent(square(), "RD"), CPA(values(1, 2, 3), 3), NotOk(values(1), 3))
+    assert said == [("RA", BacktrackCPA(values(1), 3))]
+    afc = agent(square(4), "RC")
+    told(afc, NotOk(values(1), 1))
+    assert told(afc, CPA(values(2, 1), 3))[0] == ("RD", CPA(values(2, 1, 3), 4))
 
 
 def test_who_gets_a_cpa_back_that_is_known_to_be_inconsistent_above_sends_it_on() -> None:
@@ -131,31 +144,18 @@ def test_who_gets_a_cpa_back_that_is_known_to_be_inconsistent_above_sends_it_on(
     assert told(afc, BacktrackCPA(values(1, 2, 3), 4)) == [("RA", BacktrackCPA(values(1), 4))]
 
 
-def test_a_cpa_that_does_not_go_on_from_an_inconsistent_one_is_taken_up() -> None:
-    afc = agent(square(4), "RC")
-    told(afc, NotOk(values(1), 1))
-    assert told(afc, CPA(values(2, 1), 3))[0] == ("RD", CPA(values(2, 1, 3), 4))
-
-
-def test_a_not_ok_in_the_packet_of_the_cpa_is_heard_first() -> None:
-    afc = agent(square(), "RD")
-    assert told(afc, CPA(values(1, 2, 3), 3), NotOk(values(1), 3)) == [("RA", BacktrackCPA(values(1), 3))]
-
-
-def test_a_new_cpa_lets_all_values_be_tried_though_the_last_one_was_never_brought_back() -> None:
-    """Somebody below sent it back to A, past this robot."""
-    afc = agent(square(4), "RB")
-    told(afc, CPA(values(1), 1))
-    assert told(afc, CPA(values(2), 4))[0] == ("RC", CPA(values(2, 1), 5))
-
-
 # forward_check
 
 
-def test_forward_check_says_nothing_while_a_value_is_left() -> None:
-    afc = agent(square(), "RE")
-    assert told(afc, FcCPA(values(1, 2), 2)) == []
-    assert afc.problem.checks == 3 + 2  # B is asked only about what A leaves
+def test_forward_check_says_nothing_while_a_value_is_left_and_checks_only_what_may_matter() -> None:
+    for packets, checks in (
+        ([[FcCPA(values(1, 2), 2)]], 3 + 2),  # B is asked only about the values that A leaves
+        ([[FcCPA(values(1), 1), FcCPA(values(2), 7)]], 3),  # of the copies in a packet only the latest
+        ([[NotOk(values(1), 1)], [FcCPA(values(1, 2), 2)]], 0),  # it goes on from an inconsistent one
+    ):
+        afc = agent(square(), "RE")
+        assert [told(afc, *packet) for packet in packets] == [[]] * len(packets)
+        assert afc.problem.checks == checks
 
 
 def test_forward_check_tells_all_robots_without_a_value_in_the_shortest_inconsistent_assignment() -> None:
@@ -189,20 +189,7 @@ def test_a_copy_of_a_later_step_takes_the_own_value_and_a_late_copy_does_not() -
     assert afc.assignment == {}
 
 
-def test_of_the_copies_in_a_packet_only_the_latest_is_checked() -> None:
-    afc = agent(square(), "RE")
-    told(afc, FcCPA(values(1), 1), FcCPA(values(2), 7))
-    assert afc.problem.checks == 3
-
-
 # process_Not_OK
-
-
-def test_a_not_ok_stops_forward_checking_of_what_goes_on_from_it() -> None:
-    afc = agent(square(), "RE")
-    told(afc, NotOk(values(1), 1))
-    assert told(afc, FcCPA(values(1, 2), 2)) == []
-    assert afc.problem.checks == 0
 
 
 def test_a_not_ok_of_an_earlier_step_is_believed_when_the_view_goes_on_from_it() -> None:
@@ -235,21 +222,11 @@ def test_of_two_inconsistent_assignments_the_shorter_one_is_kept() -> None:
 # Ends
 
 
-def test_a_robot_with_an_empty_domain_says_so_at_once_and_a_robot_alone_is_the_first_and_the_last() -> None:
-    afc = agent(team_of({"A": (1, 2), "B": (), "C": (1,)}, []), "RB")
-    assert afc.verdict is Verdict.NO_SOLUTION
-    assert told(afc, CPA(values(1), 1)) == []
-    afc = agent(team_of({"A": (1, 2)}, []), "RA")
-    assert (afc.verdict, afc.assignment) == (Verdict.SOLUTION, {"A": 1})
-
-
 # What is checked, and what it costs
 
 
 def test_an_n_ary_constraint_is_checked_once_the_cpa_names_all_its_other_robots() -> None:
-    rows = Relation("one", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
-    scope = ("A", "B", "C")
-    afc = agent(team_of(dict.fromkeys("ABCD", (1, 2)), [Constraint("E", rows, scope, scope)]), "RC")
+    afc = agent(odd_triple(), "RC")
     told(afc, FcCPA(values(1), 1))
     assert afc.problem.checks == 0
     assert told(afc, CPA(values(2, 2), 5)) == [("RB", BacktrackCPA(values(2, 2), 5))]

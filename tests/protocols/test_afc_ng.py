@@ -11,14 +11,14 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, Value, encode
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.model.problem import Constraint
 from robochoc.protocols.satisfaction.afc_ng import AFCng, first_difference
 from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import random_team, team_of
-from tests.support.small_teams import DIFFERENT, different, triangle
+from tests.support.small_teams import DIFFERENT, different, odd_triple, triangle
 
 agent = partial(started_robot, AFCng)
 
@@ -85,6 +85,9 @@ def test_nogoods_that_agree_with_the_new_view_stay_and_are_not_checked_again() -
     replies(afc, ("RB", cpa((1, 1), (3, 2))))
     assert list(afc.store) == [{"RA": (1,)}, {"RB": (3,)}]
     assert afc.problem.checks == checks + 2  # two values are left, and only RB's value is new
+    afc = agent(triangle(3), "RC")
+    assert replies(afc, ("RA", cpa((1, 1))), ("RB", cpa((1, 1), (2, 1))), ("RA", cpa((2, 2)))) == []
+    assert afc.problem.checks == 3, "a packet is revised by its strongest CPA alone"
 
 
 def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_changed() -> None:
@@ -98,23 +101,19 @@ def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_chan
     assert afc.problem.checks == checks + 1
 
 
-def test_a_packet_is_revised_by_its_strongest_cpa_alone() -> None:
-    afc = agent(triangle(3), "RC")
-    packet = (("RA", cpa((1, 1))), ("RB", cpa((1, 1), (2, 1))), ("RA", cpa((2, 2))))
-    assert replies(afc, *packet) == []
-    assert afc.problem.checks == 3
-
-
-def test_of_two_conflicts_the_one_with_the_highest_lowest_robot_is_kept() -> None:
+def test_the_better_of_two_nogoods_for_a_value_is_kept() -> None:
+    """Of two conflicts that is the one with the highest lowest robot."""
     afc = agent(different("ABC", "AC BC", 3), "RC")
     replies(afc, ("RB", cpa((1, 1), (1, 1))))
+    assert list(afc.store) == [{"RA": (1,)}]
+    afc = agent(different("ABCD", "AD BD CD", 3), "RC")
+    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    replies(afc, ("RD", Nogood({"RA": (1,)}, (3,))), ("RD", Nogood({"RA": (1,), "RB": (2,)}, (3,))))
     assert list(afc.store) == [{"RA": (1,)}]
 
 
 def test_an_n_ary_constraint_is_checked_when_all_its_robots_are_known() -> None:
-    odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1)))
-    team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
-    afc = agent(team, "RC")
+    afc = agent(odd_triple(), "RC")
     replies(afc, ("RA", cpa((1, 1))))
     assert afc.problem.checks == 0
     replies(afc, ("RB", cpa((1, 1), (1, 1))))
@@ -122,12 +121,10 @@ def test_an_n_ary_constraint_is_checked_when_all_its_robots_are_known() -> None:
     assert list(afc.store) == [{"RA": (1,), "RB": (1,)}]
 
 
-def test_backtrack_tells_the_lowest_cause_before_the_cpa_has_come() -> None:
+def test_backtrack_tells_the_lowest_cause_and_forgets_it_and_all_below_it_but_not_their_counters() -> None:
     afc = agent(different("ABCD", "AD BD CD", 2), "RD")
-    assert replies(afc, ("RB", cpa((1, 1), (2, 1)))) == [("RB", Nogood({"RA": (1,)}, (2,)))]
-
-
-def test_backtrack_forgets_the_cause_and_all_below_it_but_not_their_counters() -> None:
+    said = replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    assert said == [("RB", Nogood({"RA": (1,)}, (2,)))], "before the CPA has come"
     afc = agent(different("ABCD", "AD BD CD", 2), "RD")
     replies(afc, ("RC", cpa((1, 1), (2, 1), (1, 3))))
     assert afc.view == {"RA": (1,)}
@@ -155,13 +152,6 @@ def test_a_nogood_that_does_not_agree_with_the_view_is_ignored() -> None:
         assert list(afc.store) == before
 
 
-def test_the_better_of_two_nogoods_for_a_value_is_kept() -> None:
-    afc = agent(different("ABCD", "AD BD CD", 3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 1))))
-    replies(afc, ("RD", Nogood({"RA": (1,)}, (3,))), ("RD", Nogood({"RA": (1,), "RB": (2,)}, (3,))))
-    assert list(afc.store) == [{"RA": (1,)}]
-
-
 def test_an_empty_nogood_or_domain_ends_the_search_without_solution() -> None:
     afc = agent(triangle(1), "RA")
     assert replies(afc, ("RB", Nogood({}, (1,)))) == []
@@ -174,18 +164,14 @@ def test_a_robot_alone_solves_its_problem_in_silence() -> None:
     assert (started(afc), afc.assignment) == ([], {"A": 4})
 
 
-def test_the_last_robot_s_value_makes_a_solution_and_all_are_told() -> None:
-    afc = agent(triangle(3), "RD")
+def test_the_last_robot_s_value_makes_a_solution_and_who_is_told_it_takes_its_value_and_is_silent() -> None:
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (3,), "RD": (1,)}
-    said = replies(afc, ("RC", cpa((1, 1), (2, 1), (3, 1))))
+    said = replies(agent(triangle(3), "RD"), ("RC", cpa((1, 1), (2, 1), (3, 1))))
     assert said == [(name, Solved(solution)) for name in ("RA", "RB", "RC")]
-
-
-def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
     afc = agent(triangle(3), "RB")
     replies(afc, ("RA", cpa((1, 1))))
-    packet = (("RD", Solved({"RA": (1,), "RB": (3,), "RC": (2,), "RD": (1,)})), ("RA", cpa((2, 2))))
-    assert replies(afc, *packet, ("RC", Nogood({}, (3,)))) == []
+    told = ("RD", Solved({**solution, "RB": (3,), "RC": (2,)}))
+    assert replies(afc, told, ("RA", cpa((2, 2))), ("RC", Nogood({}, (3,)))) == []
     assert value(afc) == (3,)
 
 

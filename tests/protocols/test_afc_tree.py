@@ -61,18 +61,14 @@ def test_a_cpa_holds_the_values_of_one_branch_only() -> None:
     assert said == [("RC", Accept([1, 1], {"RD": (1,)}))]
 
 
-def test_only_the_tree_parent_s_cpa_lets_a_robot_assign() -> None:
+def test_only_the_tree_parent_s_cpa_lets_a_robot_assign_and_all_children_assign_at_once() -> None:
     afc = agent(fork(), "RE")
     assert replies(afc, ("RA", cpa((1, 1)))) == []
     assert list(afc.store) == [{"RA": (1,)}]
     replies(afc, ("RC", cpa((1, 1), (2, 1))))
     assert value(afc) == (3,)
-
-
-def test_all_children_of_a_robot_assign_at_once() -> None:
-    team = fork()
     for name in ("RB", "RC"):
-        afc = agent(team, name)
+        afc = agent(fork(), name)
         assert replies(afc, ("RA", cpa((1, 1))))
         assert value(afc) == (2,)
 
@@ -91,12 +87,8 @@ def test_constraints_with_ancestors_that_have_not_moved_are_not_checked_again() 
     assert afc.problem.checks == checks + 2
 
 
-def test_a_leaf_accepts_the_cpa_that_it_has_a_value_for() -> None:
-    said = replies(agent(fork(), "RB"), ("RA", cpa((1, 4))))
-    assert said == [("RA", Accept([4], {"RB": (2,)}))]
-
-
-def test_a_robot_accepts_once_all_its_children_have() -> None:
+def test_a_leaf_accepts_the_cpa_that_it_has_a_value_for_and_others_once_all_their_children_have() -> None:
+    assert replies(agent(fork(), "RB"), ("RA", cpa((1, 4)))) == [("RA", Accept([4], {"RB": (2,)}))]
     afc = agent(fork(), "RC")
     replies(afc, ("RA", cpa((1, 1))))
     assert replies(afc, ("RD", Accept([1, 1], {"RD": (1,)}))) == []
@@ -122,20 +114,16 @@ def test_a_new_value_needs_new_accepts() -> None:
     assert replies(afc, ("RD", Accept([1, 2], {"RD": (1,)}))) != []
 
 
-def test_a_root_with_all_accepts_tells_its_part_the_solution() -> None:
+def test_a_root_with_all_accepts_tells_its_part_the_solution_and_who_is_told_it_takes_its_value() -> None:
     afc = agent(fork(), "RA")
     replies(afc, ("RB", Accept([1], {"RB": (2,)})))
     said = replies(afc, ("RC", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)})))
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (2,), "RD": (1,), "RE": (3,)}
     assert said == [(name, Solved(solution)) for name in ("RB", "RC", "RD", "RE")]
-
-
-def test_who_is_told_a_solution_takes_its_value_and_is_silent() -> None:
     afc = agent(fork(), "RC")
     replies(afc, ("RA", cpa((1, 1))))
-    solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (3,), "RD": (1,), "RE": (2,)}
-    packet = (("RA", Solved(solution)), ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Accept([1, 1], {"RE": (3,)})))
-    assert replies(afc, *packet, ("RA", cpa((2, 2)))) == []
+    packet = [("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Accept([1, 1], {"RE": (3,)})), ("RA", cpa((2, 2)))]
+    assert replies(afc, ("RA", Solved({**solution, "RC": (3,), "RE": (2,)})), *packet) == [], "it is silent"
     assert value(afc) == (3,)
 
 

@@ -11,7 +11,7 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.agile_abt import AgileABT
@@ -28,8 +28,8 @@ from robochoc.protocols.satisfaction.messages.agile_abt import AddLink, Ok, Orde
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from tests.support.agents import replies, robot_of, value
 from tests.support.examples import count, examples
-from tests.support.problems import random_team, team_of
-from tests.support.small_teams import differ, triangle
+from tests.support.problems import random_team
+from tests.support.small_teams import different, odd_triple, triangle
 
 
 def begun(team: Team, name: str) -> AgileABT:
@@ -175,9 +175,7 @@ def test_a_value_that_those_above_allow_is_kept_and_those_below_are_not_heeded()
 
 
 def test_the_lowest_robot_at_present_checks_an_n_ary_constraint() -> None:
-    odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (2, 1, 1)))
-    team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", odd, tuple("ABC"), tuple("ABC"))])
-    agile = agent(team, "RA", ("RB", ok(1)), ("RC", ok(1)))
+    agile = agent(odd_triple(), "RA", ("RB", ok(1)), ("RC", ok(1)))
     assert agile.problem.checks == 0
     replies(agile, ("RB", Order((1, 2, 0), (1, 1, 1))))
     assert value(agile) == (2,)
@@ -240,24 +238,19 @@ def test_a_dead_end_tells_all_a_smaller_order_before_it_sends_the_nogood() -> No
 
 
 def test_of_all_robots_in_the_conflict_the_one_with_the_smallest_vector_is_blamed() -> None:
-    agile = agent(triangle(), "RC")
-    said = replies(agile, ("RA", ok(1)), ("RB", ok(2, 1, RA=1)))
-    # RB's explanation keeps it below RA, whose blame would set it free: (2, 1, 1, ..) against (2, 0, 1, ..).
-    assert said[0] == ("RA", order("ABCD", 2, 0, 1, UNKNOWN))
-    assert said[3] == ("RB", Nogood({"RA": (1,)}, (2,)))
-
-
-def test_a_robot_whose_explanation_falls_has_its_whole_domain_left() -> None:
-    agile = agent(triangle(), "RC")
-    said = replies(agile, ("RA", ok(1, 3, 3)), ("RB", ok(2, 1, RA=1)))
-    assert said[0] == ("RA", order("BCAD", 2, 1, 2, UNKNOWN))
-    assert said[3] == ("RA", Nogood({"RB": (2,)}, (1,)))
+    """A robot whose explanation falls has its whole domain left."""
+    for size, smaller, blamed in (
+        # RB's explanation keeps it below RA, whose blame would set it free: (2, 1, 1, ..) against (2, 0, 1, ..).
+        (2, order("ABCD", 2, 0, 1, UNKNOWN), ("RB", Nogood({"RA": (1,)}, (2,)))),
+        (3, order("BCAD", 2, 1, 2, UNKNOWN), ("RA", Nogood({"RB": (2,)}, (1,)))),
+    ):
+        said = replies(agent(triangle(), "RC"), ("RA", ok(1, size, size)), ("RB", ok(2, 1, RA=1)))
+        assert (said[0], said[3]) == (("RA", smaller), blamed)
 
 
 def test_without_a_smaller_vector_the_lowest_robot_is_blamed_in_the_present_order() -> None:
     agile = agent(triangle(), "RC", ("RD", order("BACD", 1, 1, 1, 1)))
-    said = replies(agile, ("RA", ok(1)), ("RB", ok(2, left=1)))
-    assert said == [("RA", Nogood({"RB": (2,)}, (1,)))]
+    assert replies(agile, ("RA", ok(1)), ("RB", ok(2, left=1))) == [("RA", Nogood({"RB": (2,)}, (1,)))]
     assert "RA" not in agile.view
 
 
@@ -305,13 +298,10 @@ def test_resolve_conflict_answers_an_obsolete_nogood_about_the_value_it_has_told
     assert list(agile.store) == [{"RA": (1,)}]
 
 
-def test_a_nogood_that_rests_on_robots_below_is_obsolete() -> None:
+def test_a_nogood_that_rests_on_robots_below_is_obsolete_and_its_sender_is_told_once_it_is_below() -> None:
     agile = agent(triangle(), "RB", ("RA", ok(2)), ("RD", order("BACD", 1, 1, 1, 1)))
     assert replies(agile, ("RC", Nogood({"RA": (2,)}, (1,)))) == [("RC", ok(1))]
     assert list(agile.store) == []
-
-
-def test_a_robot_above_that_has_forgotten_the_value_is_told_once_it_is_below() -> None:
     agile = agent(triangle(), "RB", ("RD", order("CBAD", 2, 2, 2, 2)))
     assert replies(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
     assert replies(agile, ("RD", order("BCAD", 1, 2, 2, 2))) == [("RC", ok(1))]
@@ -321,8 +311,7 @@ def test_a_robot_above_that_has_forgotten_the_value_is_told_once_it_is_below() -
 
 
 def test_check_add_link_asks_unknown_robots_of_the_left_side_and_believes_it() -> None:
-    strangers = team_of(dict.fromkeys("ABC", (1, 2)), [differ("A", "C"), differ("B", "C")])
-    agile = agent(strangers, "RB")
+    agile = agent(different("ABC", "AC BC", 2), "RB")
     assert replies(agile, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RA", AddLink()), ("RC", ok(2, 1, RA=1))]
     assert agile.view == {"RA": (1,)}
     assert replies(agile, ("RC", Nogood({"RA": (2,)}, (2,)))) == [("RC", ok(2, 1, RA=1))]

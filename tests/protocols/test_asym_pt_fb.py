@@ -48,32 +48,25 @@ def leaf() -> AsymPTFB:
     return robot
 
 
-def test_what_the_own_side_charges_at_least_counts_from_the_beginning() -> None:
+def test_the_least_cost_of_the_own_side_counts_from_the_beginning_and_the_rest_is_told_when_asked() -> None:
     robot = top()
-    assert robot.least == {"RB": [3, 0], "RC": [0, 0]}
-    assert robot.local == [3, 0]
-
-
-def test_before_it_searches_a_robot_asks_those_above_for_their_sides() -> None:
-    robot = middle()
-    assert replies(robot, ("RA", CPA(INFINITE, {}))) == [("RA", RowRequest([(1,), (2,)]))]
-    assert not robot.searching
-
-
-def test_a_robot_above_tells_what_its_side_adds_with_the_value_that_is_searched() -> None:
-    robot = top()
+    assert (robot.least, robot.local) == ({"RB": [3, 0], "RC": [0, 0]}, [3, 0])
     replies(robot, ("RB", Report(0)), ("RC", Report(0)))
     assert replies(robot, ("RC", RowRequest([(1,), (2,)]))) == [("RC", Row([0, INFINITE]))]
     replies(robot, ("RB", Result(7, {"RB": (1,), "RC": (1,)})), ("RB", Report(0)), ("RC", Report(0)))
     assert replies(robot, ("RB", RowRequest([(1,), (2,)]))) == [("RB", Row([0, 5]))]
 
 
-def test_the_search_begins_when_all_sides_are_known_and_counts_them() -> None:
+def test_before_it_searches_a_robot_asks_those_above_for_their_sides_and_then_counts_them() -> None:
     robot = middle()
-    replies(robot, ("RA", CPA(INFINITE, {})))
+    assert replies(robot, ("RA", CPA(INFINITE, {}))) == [("RA", RowRequest([(1,), (2,)]))]
+    assert not robot.searching
     assert replies(robot, ("RA", Row([0, 5]))) == [("RC", Request((1,)))]
-    assert robot.searching
     assert robot.local == [1, 5]
+    robot = middle()
+    replies(robot, ("RA", CPA(INFINITE, {})), ("RA", Reduce(1)))
+    said = replies(robot, ("RA", Row([0, 5])))
+    assert said == [("RA", Result(INFINITE, {}))], "the bound fell while sides were asked for"
 
 
 def test_a_side_is_asked_for_once_for_each_value_above() -> None:
@@ -93,27 +86,18 @@ def test_a_leaf_asks_before_it_returns_its_cost_and_answers_its_parent_with_it_a
     assert replies(robot, ("RB", Request((1,)))) == [("RB", Result(2, {"RC": (2,)}))]
 
 
-def test_a_bound_that_falls_while_sides_are_asked_for_is_kept() -> None:
-    robot = middle()
-    replies(robot, ("RA", CPA(INFINITE, {})), ("RA", Reduce(1)))
-    assert replies(robot, ("RA", Row([0, 5]))) == [("RA", Result(INFINITE, {}))]
-
-
 def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
     robot = middle()
     with pytest.raises(ValueError, match="has not asked for"):
         replies(robot, ("RA", Row([1, 2])))
     replies(robot, ("RA", CPA(INFINITE, {})))
-    with pytest.raises(ValueError, match="is asking for sides already"):
-        replies(robot, ("RA", CPA(INFINITE, {})))
-    with pytest.raises(ValueError, match="has not asked for"):
-        replies(robot, ("RA", Row([1])))
-    with pytest.raises(ValueError, match="is not known to be below"):
-        replies(robot, ("RA", RowRequest([(1,)])))
-    with pytest.raises(ValueError, match="was asked nothing"):
-        replies(robot, ("RC", RowRequest([(1,)])))
-
-
-def test_a_request_with_a_value_that_cannot_be_is_refused() -> None:
+    for sender, message, why in (
+        ("RA", CPA(INFINITE, {}), "is asking for sides already"),
+        ("RA", Row([1]), "has not asked for"),
+        ("RA", RowRequest([(1,)]), "is not known to be below"),
+        ("RC", RowRequest([(1,)]), "was asked nothing"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            replies(robot, (sender, message))
     with pytest.raises(ValueError, match="RB"):
         replies(top(), ("RB", RowRequest([(3,)])))

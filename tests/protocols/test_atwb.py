@@ -69,16 +69,12 @@ def test_a_robot_before_tells_what_its_side_adds_to_a_value_that_can_be() -> Non
             replies(robot, ("RC", SideRequest(wrong, 5, 1)))
 
 
-def test_what_it_pays_in_any_case_is_in_the_cpa_already() -> None:
+def test_what_it_pays_in_any_case_is_in_the_cpa_already_unless_robots_may_withdraw() -> None:
     robot = agent("RA")
     said = replies(robot, ("RB", CPA(assigned((1, 1)), math.inf, [])))
     assert said[0] == ("RB", cpa((2, 2), least=[0, 2]))
     assert replies(robot, ("RC", SideRequest((1,), 5, 2))) == [("RC", Side(5, 3))]
-
-
-def test_of_robots_that_may_withdraw_nothing_is_expected() -> None:
-    robot = agent("RA", RunParameters(withdrawal_cost=9))
-    assert robot.least == {"RC": [0, 0, 0]}
+    assert agent("RA", RunParameters(withdrawal_cost=9)).least == {"RC": [0, 0, 0]}
 
 
 def test_what_its_side_forbids_is_infinite_and_a_request_about_a_value_that_was_given_up_is_dropped() -> None:
@@ -90,11 +86,12 @@ def test_what_its_side_forbids_is_infinite_and_a_request_about_a_value_that_was_
     assert replies(robot, ("RC", SideRequest((1,), 5, 1))) == []
 
 
-def test_the_cpa_goes_on_with_its_exact_cost_when_all_sides_are_known() -> None:
+def test_the_cpa_goes_on_with_its_exact_cost_when_all_sides_are_known_and_they_are_in_the_estimate() -> None:
     robot = holder()
     assert replies(robot, ("RA", Side(1, 7))) == []
-    (on,) = replies(robot, ("RB", Side(1, 0)))
-    assert on == ("RD", cpa((1, 1), (2, 1), (1, 1), least=[0, 1, 1, 8]))
+    assert replies(robot, ("RB", Side(1, 0))) == [("RD", cpa((1, 1), (2, 1), (1, 1), least=[0, 1, 1, 8]))]
+    said = replies(robot, ("RA", FBCPA(assigned((1, 1)))))
+    assert said == [("RA", FBEstimate([1], [0, 2]))]  # before: 1
 
 
 def test_the_next_value_is_taken_as_soon_as_the_sum_reaches_b() -> None:
@@ -122,13 +119,6 @@ def test_a_side_is_asked_for_once() -> None:
     said = replies(robot, ("RD", CPA(assigned((1, 1), (1, 2), (2, 2)), math.inf, [])))
     assert said[0] == ("RB", SideRequest((1,), 3, 2))
     assert said[1][0] == "RD"
-
-
-def test_what_is_known_of_a_side_is_in_the_estimate() -> None:
-    robot = holder()
-    replies(robot, ("RA", Side(1, 7)), ("RB", Side(1, 0)))
-    said = replies(robot, ("RA", FBCPA(assigned((1, 1)))))
-    assert said == [("RA", FBEstimate([1], [0, 2]))]  # before: 1
 
 
 def test_a_robot_that_shares_nothing_above_sends_the_cpa_on_at_once() -> None:

@@ -14,7 +14,7 @@ from tests.support.agents import replies, robot_of, started, started_robot, valu
 from tests.support.cases import looped
 from tests.support.complex_problems import complex_team
 from tests.support.problems import team_of
-from tests.support.small_teams import differ, triangle
+from tests.support.small_teams import differ, odd_triple, triangle
 
 agent = partial(started_robot, AWC)
 
@@ -46,16 +46,12 @@ def test_the_view_is_checked_once_a_packet_has_been_read() -> None:
 
 
 def test_of_the_allowed_values_the_one_with_fewest_conflicts_with_lower_robots_is_taken() -> None:
-    awc = agent(triangle(3), "RB")
-    replies(awc, ("RC", Ok((2,), 0)), ("RA", Ok((1,), 0)))
-    assert value(awc) == (3,)
-
-
-def test_a_nogood_with_lower_robots_counts_as_a_conflict() -> None:
-    awc = agent(triangle(3), "RB")
-    replies(awc, ("RC", Ok((1,), 0)), ("RC", nogood({"RB": (2,), "RC": (1,)})))
-    replies(awc, ("RA", Ok((1,), 0)))
-    assert value(awc) == (3,)
+    """A nogood with lower robots counts as a conflict."""
+    for packet in ([("RC", Ok((2,), 0))], [("RC", Ok((1,), 0)), ("RC", nogood({"RB": (2,), "RC": (1,)}))]):
+        awc = agent(triangle(3), "RB")
+        replies(awc, *packet)
+        replies(awc, ("RA", Ok((1,), 0)))
+        assert value(awc) == (3,)
 
 
 def test_backtrack_tells_the_nogood_to_all_robots_in_it_and_goes_above_all_neighbours() -> None:
@@ -101,18 +97,15 @@ def test_a_robot_that_is_not_the_lowest_of_a_nogood_keeps_to_it_only_once_it_is(
     assert replies(awc, ("RB", Ok((2,), 1))) == [("RB", Ok((3,), 0)), ("RC", Ok((3,), 0))]
 
 
-def test_a_nogood_with_a_robot_that_is_no_neighbour_makes_it_one_and_is_believed() -> None:
+def test_a_nogood_with_a_robot_that_is_no_neighbour_makes_it_one_and_only_then_is_believed() -> None:
+    awc = agent(triangle(), "RA")
+    replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RB": ((2,), 4)})))
+    assert awc.view == {}
     awc = agent(triangle(), "RA")
     said = replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RD": ((2,), 4)})))
     assert said[:2] == [("RD", AddLink()), ("RD", Ok((1,), 0))]
     assert said[2:] == [(name, Ok((2,), 0)) for name in ("RB", "RC", "RD")]
     assert (awc.view["RD"], awc.priorities["RD"]) == ((2,), 4)
-
-
-def test_what_a_nogood_says_of_a_neighbour_is_not_believed() -> None:
-    awc = agent(triangle(), "RA")
-    replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RB": ((2,), 4)})))
-    assert awc.view == {}
 
 
 def test_add_link_tells_the_value_to_the_new_neighbour_now_and_later_once() -> None:
@@ -123,9 +116,7 @@ def test_add_link_tells_the_value_to_the_new_neighbour_now_and_later_once() -> N
 
 
 def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None:
-    odd = Relation("R", 3, Semantics.SUPPORTS, ((1, 1, 2), (1, 2, 1), (2, 1, 1)))
-    team = team_of(dict.fromkeys("ABC", range(1, 3)), [Constraint("C", odd, ("A", "B", "C"), ("A", "B", "C"))])
-    awc = agent(team, "RA")
+    awc = agent(odd_triple(), "RA")
     assert replies(awc, ("RB", Ok((1,), 0)), ("RC", Ok((1,), 1))) == []
     assert awc.problem.checks == 0
     assert replies(awc, ("RB", Ok((1,), 1))) == [("RB", Ok((2,), 0)), ("RC", Ok((2,), 0))]
