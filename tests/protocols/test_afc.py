@@ -148,11 +148,12 @@ def test_who_gets_a_cpa_back_that_is_known_to_be_inconsistent_above_sends_it_on(
 
 
 def test_forward_check_says_nothing_while_a_value_is_left_and_checks_only_what_may_matter() -> None:
-    for packets, checks in (
+    forward_checks: list[tuple[list[list[Message]], int]] = [
         ([[FcCPA(values(1, 2), 2)]], 3 + 2),  # B is asked only about the values that A leaves
         ([[FcCPA(values(1), 1), FcCPA(values(2), 7)]], 3),  # of the copies in a packet only the latest
         ([[NotOk(values(1), 1)], [FcCPA(values(1, 2), 2)]], 0),  # it goes on from an inconsistent one
-    ):
+    ]
+    for packets, checks in forward_checks:
         afc = agent(square(), "RE")
         assert [told(afc, *packet) for packet in packets] == [[]] * len(packets)
         assert afc.problem.checks == checks

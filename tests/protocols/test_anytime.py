@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import deque
 from collections.abc import Iterator
 from random import Random
@@ -30,7 +31,7 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import Objective, withdrawal_cost
-from tests.support.agents import robot_of, sent, started
+from tests.support.agents import assert_refused, robot_of, sent, started
 from tests.support.cases import cases, looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
@@ -213,45 +214,32 @@ def ready() -> DSA:
 
 
 def test_the_search_begins_once_the_tree_is_complete() -> None:
-    assert robot().cycle == -1
-    assert ready().cycle == 0
+    assert (robot().cycle, ready().cycle) == (-1, 0)
+
+
+def priced_step() -> DSA:
+    """The same, when it has reported to X00 how much a step costs."""
+    it = ready()
+    it.receive("RX00", Step((1,)))
+    assert it.outbox == []
+    it.receive("RX02", Paid(4))
+    ((receiver, paid),) = sent(it)
+    assert (receiver, type(paid)) == ("RX00", Paid)
+    return it
 
 
 def test_what_a_step_costs_goes_up_and_the_best_comes_down() -> None:
-    for best in (0, 7):
-        it = ready()
-        it.receive("RX00", Step((1,)))
-        assert it.outbox == []
-        it.receive("RX02", Paid(4))
-        ((receiver, paid),) = sent(it)
-        assert (receiver, type(paid)) == ("RX00", Paid)
-        if best:
-            with pytest.raises(ValueError, match="neither the last one nor the one before"):
-                it.receive("RX00", Best(best))
-        else:
-            it.receive("RX00", Best(best))
-            assert it.outbox == [("RX02", Best(best))]
+    it = priced_step()
+    it.receive("RX00", Best(0))
+    assert it.outbox == [("RX02", Best(0))]
 
 
-@looped(
-    ("sender", "message"),
-    [
-        ("RX00", Best(0)),
-        ("RX02", Best(0)),
-        ("RX02", Step((1,))),
-        ("RX02", Paid(-1)),
-        ("RX02", Paid(float("nan"))),
-    ],
-)
-def test_what_cannot_be_is_refused(sender: str, message: Message) -> None:
-    with pytest.raises(ValueError, match=f"{sender} has told {type(message).__name__} where it cannot"):
-        ready().receive(sender, message)
-
-
-def test_a_place_in_no_tree_and_reports_that_are_not_asked_for_are_refused() -> None:
-    for place in (Place("nobody", 0, None, None, None), Place("RX00", 3, None, None, None)):
-        with pytest.raises(ValueError, match="RX00 has told a place that no tree of this team has"):
-            robot().receive("RX00", place)
+def test_what_cannot_be_is_refused() -> None:
+    wrong = [("RX00", Best(0)), ("RX02", Best(0)), ("RX02", Step((1,))), ("RX02", Paid(-1)), ("RX02", Paid(math.nan))]
+    assert_refused(ready, wrong, r"RX0[02] has told (Best|Step|Paid) where it cannot")
+    assert_refused(priced_step, [("RX00", Best(7))], "neither the last one nor the one before")
+    places = [Place("nobody", 0, None, None, None), Place("RX00", 3, None, None, None)]
+    assert_refused(robot, [("RX00", place) for place in places], "RX00 has told a place that no tree of this team has")
     it = robot(anytime="no")
     with pytest.raises(ValueError, match="--set anytime=yes"):
         it.receive("RX00", Step((1,)))

@@ -12,7 +12,7 @@ from robochoc.protocols.asymmetric.atwb import ATWB
 from robochoc.protocols.asymmetric.messages.atwb import Side, SideRequest
 from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
-from tests.support.agents import replies, started_robot, value
+from tests.support.agents import assert_refused, replies, started_robot, value
 from tests.support.asymmetric_problems import priced_part, two_valued
 
 
@@ -126,6 +126,4 @@ def test_a_robot_that_shares_nothing_above_sends_the_cpa_on_at_once() -> None:
 
 
 def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
-    for message in (Side(1, 3), SideRequest((1,), 1, 1)):
-        with pytest.raises(ValueError, match=r"has not asked for|is not below"):
-            replies(holder(), ("RD", message))
+    assert_refused(holder, [("RD", Side(1, 3)), ("RD", SideRequest((1,), 1, 1))], r"has not asked for|is not below")

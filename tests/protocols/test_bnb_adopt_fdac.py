@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.optimization import bnb_adopt_fdac
@@ -13,8 +14,7 @@ from robochoc.protocols.optimization.bnb_adopt_fdac import BnBADOPTFDAC
 from robochoc.protocols.optimization.messages.bnb_adopt_fdac import Cost, Domain, Moved, Value
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.protocols.optimization.settings.bnb_adopt_fdac import BnBADOPTFDACSettings
-from tests.support.agents import replies, value
-from tests.support.cases import looped
+from tests.support.agents import assert_refused, replies, value
 from tests.support.pseudo_trees import context, placed, priced, to
 from tests.support.spent import spent
 
@@ -130,28 +130,14 @@ def test_a_robot_that_has_no_value_left_ends_the_search_of_all() -> None:
     assert robot.verdict is Verdict.NO_SOLUTION
 
 
-@looped(
-    ("sender", "message"),
-    [
-        ("RC", DOMAIN),
-        ("RA", Domain([])),
-        ("RA", Domain([(9,)])),
-        ("RA", Moved([0, 0])),
-        ("RC", Moved([0])),
-        ("RC", Moved([0, -1])),
-        ("RC", Moved([0, float("nan")])),
-    ],
-)
-def test_what_cannot_be_is_refused(sender: str, message: Message) -> None:
-    with pytest.raises(ValueError, match=r"R[AC]"):
-        replies(middle(), (sender, message))
-
-
-def test_nothing_is_moved_twice_and_a_value_that_a_robot_above_has_not_told_before_is_refused() -> None:
-    wrong: list[tuple[str, Message, str]] = [("RA", DOMAIN, "RA"), ("RC", Moved([0, 0]), "RC")]
-    for sender, message, why in (*wrong, ("RA", Value((9,), 1), "RA has no such value")):
-        with pytest.raises(ValueError, match=why):
-            replies(moved(), (sender, message))
+def test_what_cannot_be_is_refused() -> None:
+    """Also what is moved twice, and a value that a robot above has not told before."""
+    costs: list[list[float]] = [[0], [0, -1], [0, math.nan]]
+    domains = [("RC", DOMAIN), ("RA", Domain([])), ("RA", Domain([(9,)]))]
+    assert_refused(middle, [*domains, ("RA", Moved([0, 0])), *(("RC", Moved(one)) for one in costs)], r"R[AC]")
+    assert_refused(moved, [("RA", DOMAIN)], "RA")
+    assert_refused(moved, [("RC", Moved([0, 0]))], "RC")
+    assert_refused(moved, [("RA", Value((9,), 1))], "RA has no such value")
 
 
 # The search

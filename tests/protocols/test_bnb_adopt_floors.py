@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt_k import ADOPTk
@@ -11,7 +9,7 @@ from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
-from tests.support.agents import replies, sent, value
+from tests.support.agents import assert_refused, replies, sent, value
 from tests.support.cases import looped
 from tests.support.pseudo_trees import context, placed, priced
 from tests.support.spent import spent
@@ -64,19 +62,15 @@ def test_a_changed_value_voids_bounds_and_shares_of_the_threshold_down_to_the_fl
         assert not isinstance(robot, ADOPTk) or robot.t == {"RC": [4, 0], "RD": [1, 2]}
 
 
-@looped(
-    ("sender", "message"),
-    [
+def test_what_cannot_be_is_refused() -> None:
+    wrong = [
         ("RZ", Domain([(1,)])),
         ("RA", Domain([])),
         ("RA", Domain([(9,)])),
         ("RA", Floor([0, 0])),
         ("RC", Floor([0])),
-    ],
-)
-def test_what_cannot_be_is_refused(sender: str, message: Domain | Floor) -> None:
-    with pytest.raises(ValueError, match=r"R[ABCZ]"):
-        replies(middle(), (sender, message))
+    ]
+    assert_refused(middle, wrong, r"R[ABCZ]")
 
 
 @looped("seed", range(3))

@@ -23,7 +23,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.solver import exact_costs
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
-from tests.support.agents import replies, started_robot
+from tests.support.agents import assert_refused, replies, started_robot
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team, random_tree, with_costs
 from tests.support.examples import count
@@ -225,9 +225,8 @@ def test_a_run_says_optimal_where_the_result_meets_the_bound(teams: int) -> None
 
 
 def test_what_cannot_be_is_refused() -> None:
-    for wrong, why in ((Dependency(float("nan"), []), "weighs nan"), (Dependency(1, [1, 2, 3]), "has not 1 rows of 2")):
-        with pytest.raises(ValueError, match=why):
-            replies(robot(pair(), "RA"), ("RB", wrong))
+    assert_refused(lambda: robot(pair(), "RA"), [("RB", Dependency(float("nan"), []))], "weighs nan")
+    assert_refused(lambda: robot(pair(), "RA"), [("RB", Dependency(1, [1, 2, 3]))], "has not 1 rows of 2 entries")
 
 
 def test_costs_that_floats_do_not_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

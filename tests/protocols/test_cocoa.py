@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from itertools import pairwise
 from random import Random
 
-import pytest
-
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
 from robochoc.model.message import Value
@@ -23,10 +21,9 @@ from robochoc.protocols.local_search.messages.cocoa import (
     SetValue,
 )
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import replies, robot_of, started, started_robot, value
+from tests.support.agents import assert_refused, replies, robot_of, started, started_robot, value
 from tests.support.asymmetric_problems import divided_pair as divided
 from tests.support.asymmetric_problems import random_asymmetric_team
-from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, domains_of
@@ -103,16 +100,11 @@ def test_who_waits_asks_again_when_a_neighbour_has_chosen() -> None:
 def test_who_waits_accepts_more_equally_good_values_when_nobody_around_goes_on() -> None:
     robot = active(0.9)
     replies(robot, ("RC", Costs([(0, 0), (0, 3)])))
+    replies(robot, ("RC", Inquiry(TWO, {})))
+    assert (robot.state, robot.bound) == (State.HOLD, 1), "a neighbour is active"
     assert replies(robot, ("RC", Hold())) == [("RC", Inquiry(TWO, {"RA": (1,)}))]
     assert robot.bound == 2
     assert replies(robot, ("RC", Costs([(0, 0), (0, 3)]))) == [("RC", SetValue((2,)))]
-
-
-def test_who_waits_does_not_go_on_while_a_neighbour_is_active_or_idle() -> None:
-    robot = active()
-    replies(robot, ("RC", Costs([(0, 0), (0, 3)])))
-    replies(robot, ("RC", Inquiry(TWO, {})))
-    assert (robot.state, robot.bound) == (State.HOLD, 1)
 
 
 def test_an_answer_of_one_that_has_chosen_meanwhile_is_not_used() -> None:
@@ -142,21 +134,21 @@ def test_an_n_ary_constraint_counts_once_when_all_but_two_have_values() -> None:
     assert replies(robot, asked) == [("RC", Costs([(0, 1), (0, 1)]))]
 
 
-@looped(
-    ("sender", "message"),
-    [("RC", Costs([(0, 0)])), ("RA", Costs([(0, 0), (0, 0)])), ("RZ", Hold()), ("RZ", SetValue((1,)))],
-)
-def test_what_cannot_be_is_refused(sender: str, message: Costs | Hold | SetValue) -> None:
-    with pytest.raises(ValueError, match=r"has not asked for|is no neighbour"):
-        replies(active(), (sender, message))
-
-
-def test_nobody_answers_twice() -> None:
+def answered() -> CoCoA:
+    """B, which A has answered."""
     robot = idle("RB")
     replies(robot, ("RA", Hold()))
     replies(robot, ("RA", Costs([(0, 0), (0, 0)])))
-    with pytest.raises(ValueError, match="RA tells costs that RB has not asked for"):
-        replies(robot, ("RA", Costs([(0, 0), (0, 0)])))
+    return robot
+
+
+def test_what_cannot_be_is_refused() -> None:
+    wrong = [("RC", Costs([(0, 0)])), ("RA", Costs([(0, 0), (0, 0)])), ("RZ", Hold()), ("RZ", SetValue((1,)))]
+    assert_refused(active, wrong, r"has not asked for|is no neighbour")
+    assert_refused(answered, [("RA", Costs([(0, 0), (0, 0)]))], "RA tells costs that RB has not asked for")
+    values: list[list[Value]] = [[(1,)], [(1,), (9,)], [(1,), (1, 1)]]
+    sides = [CostsAt([(0, 0)], [(1,), (1,)]), *(CostsAt([(0, 0), (0, 0)], one) for one in values)]
+    assert_refused(asking, [("RB", one) for one in (*sides, FinalSide([(0, 0), (0, 0)]))], "RB")
 
 
 # Asymmetric costs
@@ -191,38 +183,19 @@ def test_who_is_done_tells_what_its_side_charges_with_its_value() -> None:
 
 
 def test_a_neighbour_with_a_part_that_is_done_is_asked_and_its_side_counts() -> None:
-    """With A's 2, B's own 1 costs it 5, and 2 costs 9: not if A pays 7 for 1."""
-    robot = idle("RB", team=divided())
-    assert replies(robot, ("RA", SetValue((2,)))) == [("RA", Inquiry(TWO, {"RA": (2,)}))]
-    assert value(robot) is None
-    replies(robot, ("RA", FinalSide([(0, 7), (0, 0)])))
-    assert value(robot) == (2,)
+    """With A's 2, B's own 1 costs it 5, and 2 costs 9: not if A pays 7 for 1.
 
-
-def test_who_has_answered_before_it_took_its_value_is_asked_again_at_once() -> None:
-    robot = robot_of(CoCoA, divided(), "RB")
-    started(robot)
-    replies(robot, ("RA", Hold()))
-    assert robot.state is State.ACTIVE
-    robot.receive("RA", CostsAt([(0, 1), (0, 1)], [(1,), (2,)]))
-    assert replies(robot, ("RA", SetValue((2,)))) == [("RA", Inquiry(TWO, {"RA": (2,)}))]
-    replies(robot, ("RA", FinalSide([(0, 0), (0, 0)])))
-    assert value(robot) == (1,)
-
-
-@looped(
-    "wrong",
-    [
-        CostsAt([(0, 0)], [(1,), (1,)]),
-        CostsAt([(0, 0), (0, 0)], [(1,)]),
-        CostsAt([(0, 0), (0, 0)], [(1,), (9,)]),
-        CostsAt([(0, 0), (0, 0)], [(1,), (1, 1)]),
-        FinalSide([(0, 0), (0, 0)]),
-    ],
-)
-def test_sides_that_cannot_be_are_refused(wrong: CostsAt | FinalSide) -> None:
-    with pytest.raises(ValueError, match="RB"):
-        replies(asking(), ("RB", wrong))
+    A neighbour that answered before it took its value is asked again at once.
+    """
+    for has_answered, side, own in ((False, 7, 2), (True, 0, 1)):
+        robot = idle("RB", team=divided())
+        if has_answered:
+            replies(robot, ("RA", Hold()))
+            robot.receive("RA", CostsAt([(0, 1), (0, 1)], [(1,), (2,)]))
+        assert replies(robot, ("RA", SetValue((2,)))) == [("RA", Inquiry(TWO, {"RA": (2,)}))]
+        assert value(robot) is None
+        replies(robot, ("RA", FinalSide([(0, side), (0, 0)])))
+        assert value(robot) == (own,)
 
 
 def kinds_sent(team: Team, chance: Random, seed: int) -> dict[str, list[str]]:

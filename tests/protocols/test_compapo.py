@@ -27,8 +27,7 @@ from robochoc.protocols.satisfaction.messages.compapo import (
     Wait,
 )
 from robochoc.run import Options, Runtime, solve
-from tests.support.agents import replies, robot_of, started, value
-from tests.support.cases import looped
+from tests.support.agents import assert_refused, replies, robot_of, started, value
 from tests.support.examples import count
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import graph_team, triangle
@@ -48,9 +47,9 @@ def agent(team: Team, name: str) -> CompAPO:
     return robot
 
 
-def session() -> CompAPO:
-    """RA, whose session with RB of a pair begins."""
-    robot = agent(graph_team(["AB"]), "RA")
+def session(*edges: str, domains: dict[str, int] | None = None) -> CompAPO:
+    """RA, whose session with the other robots begins."""
+    robot = agent(graph_team(edges or ("AB",), domains), "RA")
     robot.repairs = 9
     replies(robot)
     return robot
@@ -84,17 +83,12 @@ def test_check_agent_view_repairs_a_conflict_by_the_own_value_if_it_is_the_highe
     assert value(robot) == (1,)
 
 
-def test_an_old_value_does_not_replace_a_new_one() -> None:
-    robot = agent(triangle(3), "RB")
-    replies(robot, ("RC", Ok((3,), 2)), ("RC", Ok((2,), 1)))
-    assert robot.view["RC"] == (3,)
-
-
 def test_a_robot_repairs_no_more_often_than_its_good_list_has_robots() -> None:
     robot = agent(graph_team(["AB"]), "RA")
     replies(robot)
     assert replies(robot, ("RB", Ok((2,), 1))) == [("RB", Ok((1,), 2))]
-    assert replies(robot, ("RB", Ok((1,), 2))) == [("RB", Evaluate(1, 2, tables=True))]
+    assert replies(robot, ("RB", Ok((1,), 2)), ("RB", Ok((2,), 1))) == [("RB", Evaluate(1, 2, tables=True))]
+    assert robot.view["RB"] == (1,), "an old value does not replace a new one"
 
 
 def test_a_session_also_holds_the_robots_around_the_good_list() -> None:
@@ -113,26 +107,19 @@ def test_a_good_list_without_a_solution_ends_the_search() -> None:
 
 
 def test_choose_solution_tells_each_its_value_and_its_neighbours_new_ones() -> None:
-    robot = agent(graph_team(["AB", "BC"]), "RA")
-    robot.repairs = 9
-    replies(robot)
-    assert replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB"))))) == [
-        ("RC", Evaluate(1, 2, tables=False))
-    ]
+    robot = session("AB", "BC")
+    tables = (table("RA", "RB"), table("RC", "RB"))
+    assert replies(robot, ("RB", Evaluation(1, 0, 0, tables))) == [("RC", Evaluate(1, 2, tables=False))]
     assert replies(robot, ("RC", Evaluation(1, 1, 4, ()))) == [("RB", Assign(0, {"RA": (1, 1)})), ("RC", Release({}))]
     assert value(robot) == (2,)
 
 
 def test_robots_outside_that_are_in_conflict_with_the_solution_join_the_good_list() -> None:
-    robot = agent(graph_team(["AB", "BC"], {"A": 1}), "RA")
-    robot.repairs = 9
-    replies(robot)
+    robot = session("AB", "BC", domains={"A": 1})
     one = Table(("RA", "RB"), (1, 2), bytes([0b10]))
     replies(robot, ("RB", Evaluation(1, 0, 0, (one, table("RC", "RB")))))
-    assert replies(robot, ("RC", Evaluation(1, 1, 1, ()))) == [
-        ("RB", Assign(1, {})),
-        ("RC", Release({"RB": (1, 1)})),
-    ]
+    said = replies(robot, ("RC", Evaluation(1, 1, 1, ())))
+    assert said == [("RB", Assign(1, {})), ("RC", Release({"RB": (1, 1)}))]
     assert robot.good_list == {"RA", "RB", "RC"}
 
 
@@ -157,16 +144,12 @@ def test_accept_takes_the_value() -> None:
     assert (value(robot), robot.count, robot.holder) == ((2,), 1, None)
 
 
-def test_a_request_of_lower_priority_is_refused_and_told_when_this_robot_is_free() -> None:
+def test_a_request_of_lower_priority_is_told_when_this_robot_is_free_and_a_higher_one_waits_for_its_turn() -> None:
     robot = agent(triangle(), "RB")
     replies(robot, ("RC", Ok((2,), 1)), ("RA", Evaluate(1, 3, tables=False)))
     assert replies(robot, ("RC", Evaluate(4, 3, tables=False))) == [("RC", Wait(4))]
     assert replies(robot, ("RA", Release({}))) == [("RC", Free())]
-
-
-def test_a_request_of_higher_priority_waits_for_its_turn() -> None:
-    robot = agent(triangle(), "RB")
-    replies(robot, ("RC", Ok((2,), 1)), ("RC", Evaluate(4, 3, tables=False)))
+    replies(robot, ("RC", Evaluate(5, 3, tables=False)))
     assert replies(robot, ("RD", Evaluate(1, 4, tables=False)), ("RA", Evaluate(2, 3, tables=False))) == []
     assert replies(robot, ("RC", Release({}))) == [("RD", Evaluation(1, 0, 0, ())), ("RA", Wait(2))]
 
@@ -179,30 +162,15 @@ def test_a_mediator_that_is_refused_releases_all_and_asks_again_when_the_other_i
     assert replies(robot, ("RB", Free())) == again
 
 
-@looped(
-    "message",
-    [
-        Evaluation(1, 0, 0, ()),
-        Evaluation(1, 0, 0, (table("RA", "RC"),)),
-        Evaluation(1, 0, 0, (table("RB", "Nobody"),)),
-        Evaluation(1, 7, 0, (table("RA", "RB"),)),
-        Evaluation(1, -1, 0, (table("RA", "RB"),)),
-        Assign(0, {}),
-        Release({"RZ": (0, 1)}),
-        Init(()),
-    ],
-)
-def test_what_cannot_be_is_refused(message: Message) -> None:
-    robot = session()
-    with pytest.raises(ValueError, match=r"."):
-        replies(robot, ("RB", message))
-
-
-def test_a_table_says_what_it_holds() -> None:
-    wrong = (((2, 2), b"\x00\x00"), ((2, 2), b""), ((2,), b"\x00"), ((0, 2), b""), ((2**40, 2), b"\x01"))
-    for sizes, allowed in wrong:
+def test_what_cannot_be_is_refused() -> None:
+    tables = ((0, 0, ()), (0, 0, (table("RA", "RC"),)), (0, 0, (table("RB", "Nobody"),)), (7, 0, (table("RA", "RB"),)))
+    wrong: list[Message] = [*(Evaluation(1, *one) for one in tables), Evaluation(1, -1, 0, (table("RA", "RB"),))]
+    wrong += [Assign(0, {}), Release({"RZ": (0, 1)}), Init(())]
+    assert_refused(session, [("RB", message) for message in wrong], r".")
+    sizes = (((2, 2), b"\x00\x00"), ((2, 2), b""), ((2,), b"\x00"), ((0, 2), b""), ((2**40, 2), b"\x01"))
+    for each, allowed in sizes:
         with pytest.raises(ValueError, match="a table"):
-            Table(("RA", "RB"), sizes, allowed)
+            Table(("RA", "RB"), each, allowed)
 
 
 def random_tables(chance: Random, names: str) -> list[Table]:

@@ -11,7 +11,6 @@ import pytest
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.formats.result import result_json
-from robochoc.model.message import Message
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.wording import Wording
@@ -23,7 +22,7 @@ from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Withdrawal
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
-from tests.support.agents import replies
+from tests.support.agents import assert_refused, replies
 from tests.support.brute_force import priced_solutions
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
@@ -75,10 +74,10 @@ def test_a_leaf_tells_the_bits_of_its_numbers_with_its_sizes() -> None:
 def test_costs_are_followed_by_numbers() -> None:
     robot = robot_of(products("AB", "AB"), "RB", "A")
     robot.outbox.clear()
-    assert replies(robot, ("RA", Proceed(["RA"]))) == [
-        ("RA", UTIL(1, bytes([1, 2, 3]))),
-        ("RA", Counts(1, bytes([1, 1, 1]))),
-    ]
+    counts = Counts(1, bytes([1, 1, 1]))
+    assert replies(robot, ("RA", Proceed(["RA"]))) == [("RA", UTIL(1, bytes([1, 2, 3]))), ("RA", counts)]
+    said = Counts(2, bytes(4)).in_words(Wording("RA", "RB"))
+    assert said == "in how many ways my subtree attains the costs of my table: 2 cells, of 2 bytes"
 
 
 def test_numbers_of_equal_least_cost_are_added_and_those_of_dearer_values_are_not() -> None:
@@ -106,30 +105,22 @@ def test_without_any_solution_there_are_none() -> None:
     assert robot.count == 0
 
 
-@looped(
-    ("message", "why"),
-    [
-        (Counts(1, bytes([1])), None),
+def test_numbers_that_cannot_be_are_refused() -> None:
+    def with_costs() -> CountDPOP:
+        robot = root()
+        replies(robot, ("RB", UTIL(1, bytes([4, 5]))))
+        return robot
+
+    assert replies(with_costs(), ("RB", Counts(1, bytes([1])))) == []
+    for wrong, why in (
         (Counts(1, bytes([1, 0])), "a cost without an assignment"),
         (Counts(1, bytes([4, 1])), "larger than 2\\^2"),
         (Counts(2, bytes([1, 0, 1, 0])), "no piece"),
         (Counts(1, bytes([1, 1, 1])), "no piece"),
         (Counts(1, b""), "no piece"),
-    ],
-)
-def test_numbers_that_cannot_be_are_refused(message: Message, why: str | None) -> None:
-    robot = root()
-    replies(robot, ("RB", UTIL(1, bytes([4, 5]))))
-    if why is None:
-        assert replies(robot, ("RB", message)) == []
-        return
-    with pytest.raises(ValueError, match=why):
-        replies(robot, ("RB", message))
-
-
-def test_numbers_before_their_costs_are_refused() -> None:
-    with pytest.raises(ValueError, match="its costs have not come"):
-        replies(root(), ("RB", Counts(1, bytes([1, 1]))))
+    ):
+        assert_refused(with_costs, [("RB", wrong)], why)
+    assert_refused(root, [("RB", Counts(1, bytes([1, 1])))], "its costs have not come")
 
 
 def test_numbers_that_could_be_too_long_end_the_run_and_they_are_part_of_the_memory_need() -> None:
@@ -139,11 +130,6 @@ def test_numbers_that_could_be_too_long_end_the_run_and_they_are_part_of_the_mem
     equip(robot, {"memory": "100000"})
     with pytest.raises(TooLargeError, match="needs"):
         replies(robot, ("RB", CountDimensions({"RA": 2}, 9, 1, Need(1, "RB"), MOST_BITS - 9)))
-
-
-def test_what_is_said_of_numbers_in_words() -> None:
-    said = Counts(2, bytes(4)).in_words(Wording("RA", "RB"))
-    assert said == "in how many ways my subtree attains the costs of my table: 2 cells, of 2 bytes"
 
 
 # The run
@@ -166,14 +152,11 @@ def free_team(robots: int) -> Team:
     return team_of({f"X{number:03}": (1, 2, 3) for number in range(robots)}, [])
 
 
-def test_unconnected_parts_are_multiplied_and_may_need_more_than_64_bits() -> None:
+def test_unconnected_parts_are_multiplied_and_the_number_is_written_whatever_its_length() -> None:
     outcome = solve(free_team(50), IN_SIMULATOR)
     assert outcome.count == 3**50
     assert f'"count":{3**50}'.encode() in result_json(outcome)
     assert f"{3**50:,} solutions" in outcome_report(free_team(50), outcome)
-
-
-def test_the_number_is_written_whatever_its_length() -> None:
     outcome = Outcome("t", "count-dpop", "simulator", 0, Verdict.OPTIMAL, count=10**5000, cost=7)
     assert b"1" + b"0" * 5000 in result_json(outcome)
     assert "0,000 optima of cost 7" in outcome_report(free_team(1), outcome)

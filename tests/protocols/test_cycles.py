@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from random import Random
@@ -53,31 +54,27 @@ def chain(*, names: str = "ABC", values: int = 3) -> Team:
 
 
 def test_a_phase_is_over_when_all_neighbours_have_been_heard() -> None:
+    """A message ahead of its phase is kept for that; a packet may end two phases."""
     robot = robot_of(DSA, chain(), "RB")
     assert started(robot) == [("RA", Value((1,))), ("RC", Value((1,)))]
-    assert replies(robot, ("RA", Value((1,)))) == []
-    assert robot.cycle == 0
-    assert replies(robot, ("RC", Value((1,)))) == [("RA", Value((2,))), ("RC", Value((2,)))]
-    assert robot.cycle == 1
-
-
-def test_what_a_neighbour_says_ahead_is_kept_for_its_phase() -> None:
-    robot = started_robot(DSA, chain(), "RB")
-    assert replies(robot, ("RA", Value((2,))), ("RA", Value((1,)))) == []
-    assert replies(robot, ("RC", Value((2,)))) == [("RA", Value((1,))), ("RC", Value((1,)))]
-    assert replies(robot, ("RC", Value((2,)))) == [("RA", Value((3,))), ("RC", Value((3,)))]
+    for packet, own, cycle in (
+        ([("RA", Value((1,)))], None, 0),
+        ([("RC", Value((1,)))], 2, 1),
+        ([("RA", Value((3,))), ("RA", Value((2,)))], None, 1),
+        ([("RC", Value((2,)))], 1, 2),
+        ([("RC", Value((1,)))], 3, 3),
+    ):
+        assert replies(robot, *packet) == ([] if own is None else [("RA", Value((own,))), ("RC", Value((own,)))])
+        assert robot.cycle == cycle
     replies(robot, *((name, Value((1,))) for name in ("RA", "RA", "RC", "RC")))
-    assert robot.cycle == 4, "a packet may end two phases"
+    assert robot.cycle == 5
 
 
-def test_the_trail_has_an_entry_for_each_change() -> None:
+def test_the_trail_has_an_entry_for_each_change_and_after_so_many_cycles_a_robot_is_silent() -> None:
     robot = started_robot(DSA, chain(names="AB"), "RB")
     for value in (1, 1, 3, 2):
         replies(robot, ("RA", Value((value,))))
     assert robot.findings.trail == Trail([(0, 0), (1, 1), (4, 0)], 4)
-
-
-def test_after_so_many_cycles_a_robot_is_silent() -> None:
     robot = robot_of(DSA, chain(names="AB"), "RB")
     robot.settings = settings_of(DSA, {"cycles": "2"})  # type: ignore[assignment, misc]
     started(robot)
@@ -97,14 +94,6 @@ def test_a_robot_without_neighbours_takes_its_cheapest_value_at_once_or_ends_the
     pair = [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))]
     robot = robot_of(protocol, team_of({"A": (1,), "B": ()}, pair), "RB")
     assert (started(robot), robot.verdict) == ([], Verdict.NO_SOLUTION)
-
-
-@ALL
-def test_parts_of_the_team_that_know_nothing_of_each_other_end_with_the_same_cycle(
-    protocol: type[CycleProtocol],
-) -> None:
-    result = played(chain(), protocol, Concurrent(0), cycles=7)
-    assert {found.trail.cycle for found in result.findings.values() if found.trail} == {7}
 
 
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in (1, 2))])
@@ -156,28 +145,27 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
     assert aside > teams // 4
 
 
-def test_that_all_was_in_vain_is_said() -> None:
+def test_where_no_cycle_is_a_solution_that_is_said_or_robots_withdraw() -> None:
+    """Settings are not those of the protocol that says which robots withdraw."""
     team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
-    outcome = solve(team, Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}))
+    options = Options(protocol="maxsum", runtime=Runtime.SIMULATOR, settings={"cycles": "3"})
+    outcome = solve(team, replace(options, protocol="dsa"))
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.reason == "dsa has come to its end, and all that it came by breaks a hard constraint"
+    outcome = solve(team, replace(options, withdraw=Withdrawal.MAXIMAL))
+    assert outcome.verdict is Verdict.SOLUTION
+    assert len(outcome.withdrawn) == 1
 
 
 @ALL
-def test_there_is_at_least_one_cycle(protocol: type[CycleProtocol]) -> None:
+def test_there_is_at_least_one_cycle_and_unconnected_parts_of_the_team_end_with_the_same(
+    protocol: type[CycleProtocol],
+) -> None:
     for cycles, why in (("0", "cycles is 0; it must be 1 or more"), ("-1", "cycles is -1; it must be 1"), ("x", "int")):
         with pytest.raises(SettingsError, match=why):
             settings_of(protocol, {"cycles": cycles})
-
-
-def test_what_is_set_is_not_set_of_the_protocol_that_says_who_steps_aside() -> None:
-    team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
-    options = Options(
-        protocol="maxsum", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}, withdraw=Withdrawal.MAXIMAL
-    )
-    outcome = solve(team, options)
-    assert outcome.verdict is Verdict.SOLUTION
-    assert len(outcome.withdrawn) == 1
+    result = played(chain(), protocol, Concurrent(0), cycles=7)
+    assert {found.trail.cycle for found in result.findings.values() if found.trail} == {7}
 
 
 def test_the_docs_name_all_that_go_through_cycles() -> None:

@@ -93,18 +93,13 @@ def test_of_several_best_values_one_is_drawn() -> None:
     assert value(it) == (3,)
 
 
-def test_the_counter_counts_while_nobody_near_violates_anything() -> None:
+def test_the_counter_counts_while_nobody_near_violates_anything_and_at_the_largest_distance_it_stops() -> None:
     it = middle()
     assert hears(it, 2, 2).counter == 0
     is_told(it, Improve(0, 0, 0), Improve(0, 0, 5))
     assert hears(it, 2, 2).counter == 1
     is_told(it, Improve(0, 0, 1), Improve(0, 1, 0))
-    assert it.counter == 0
-    assert not it.over
-
-
-def test_at_the_largest_distance_it_stops() -> None:
-    it = middle()
+    assert (it.counter, it.over) == (0, False)
     hears(it, 2, 2)
     is_told(it, Improve(0, 0, 0), Improve(0, 0, 0))
     hears(it, 2, 2)

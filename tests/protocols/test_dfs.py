@@ -259,14 +259,11 @@ def test_every_robot_stands_for_election() -> None:
     assert greeter.findings == Findings()
 
 
-def test_a_robot_alone_is_its_own_tree_and_says_nothing() -> None:
+def test_a_robot_alone_is_its_own_tree_and_says_nothing_or_without_values_ends_the_search() -> None:
     greeter = robot_of(Greeter, graph("AB", ""), "RA")
     assert started(greeter) == []
     assert (greeter.begun, greeter.decided) == (1, 1)
     assert greeter.findings.place == PseudoTreeNode(None)
-
-
-def test_a_robot_without_values_ends_the_search() -> None:
     greeter = started_robot(Greeter, team_of({"A": (), "B": (1,)}, []), "RA")
     assert greeter.verdict is Verdict.NO_SOLUTION
     assert replies(greeter, ("RB", Wave(1, "RB"))) == []
@@ -287,10 +284,9 @@ def test_back_from_all_neighbours_a_wave_goes_back_to_who_told_it_first() -> Non
 
 
 def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_the_token() -> None:
-    greeter = agent("RB")
+    greeter, own = agent("RB"), Wave(3, "RB")
     others = (("RA", Wave(1, "RA")), ("RC", Wave(2, "RC")), ("RD", Wave(3, "RD")))
     assert replies(greeter, *others) == []
-    own = Wave(3, "RB")
     assert replies(greeter, ("RA", own), ("RC", own)) == []
     assert replies(greeter, ("RD", own)) == [("RD", Token({"RB": 2}))]
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Iterable
 from typing import TypeVar
+
+import pytest
 
 from robochoc.model.message import Message, Value
 from robochoc.model.problem import Team
@@ -11,6 +14,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
+from tests.support.cases import cases
 
 P = TypeVar("P", bound=Protocol)
 
@@ -54,6 +58,14 @@ def replies(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Me
         robot.receive(sender, message)
     robot.settle()
     return sent(robot)
+
+
+def assert_refused(make: Callable[[], Protocol], wrong: Iterable[tuple[str, Message]], match: str) -> None:
+    """Check that a new robot raises `ValueError` for each of the packets `wrong`, one message each."""
+    with cases() as each:
+        for sender, message in wrong:
+            with each(message), pytest.raises(ValueError, match=match):
+                replies(make(), (sender, message))
 
 
 def value(robot: Protocol) -> Value | None:
