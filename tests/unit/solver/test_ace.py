@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from random import Random
@@ -85,14 +85,6 @@ def wait_for_the_search(folder: Path) -> None:
 
 
 @pytest.fixture
-def warm(warm_ace: None) -> Iterator[AceProcess]:
-    """A process that is shared by all tests that leave it in good health."""
-    del warm_ace
-    with AceProcess(always=True) as solver:
-        yield solver
-
-
-@pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where the processes that the test starts keep their files; they do not find programs, so no Java of others."""
     monkeypatch.setenv("PATH", "/nonexistent")
@@ -121,23 +113,23 @@ def rows(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
-def test_forbidden_tuples_and_a_single_value_are_counted_right(warm: AceProcess, strategy: Strategy) -> None:
-    answer = warm.solve(MISCOUNTED, strategy=strategy)
+def test_forbidden_tuples_and_a_single_value_are_counted_right(ace: AceProcess, strategy: Strategy) -> None:
+    answer = ace.solve(MISCOUNTED, strategy=strategy)
     assert (answer.found, answer.complete) == (4, True)
     assert sorted(answer.solutions) == brute_force(MISCOUNTED)
 
 
-def test_ace_alone_still_counts_wrongly(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ace_alone_still_counts_wrongly(ace: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once this fails, ACE has been mended, and `propagate` has less to do."""
     monkeypatch.setattr(front, "propagate", lambda network: network)
-    assert warm.solve(MISCOUNTED).found == 6
+    assert ace.solve(MISCOUNTED).found == 6
 
 
 @pytest.mark.slow
-def test_ace_alone_still_dies_of_an_emptied_table(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ace_alone_still_dies_of_an_emptied_table(ace: AceProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(front, "propagate", lambda network: network)  # see above
     with pytest.raises(SolverLostError):
-        warm.solve(EMPTIED)
+        ace.solve(EMPTIED)
 
 
 @pytest.mark.parametrize("longest", TABLES_AT_MOST)
@@ -164,7 +156,7 @@ def test_what_is_propagated_keeps_its_solutions(longest: int, monkeypatch: pytes
 @pytest.mark.parametrize("networks", [20, pytest.param(200, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("longest", TABLES_AT_MOST)
 def test_both_strategies_find_what_brute_force_finds(
-    warm: AceProcess, longest: int, networks: int, monkeypatch: pytest.MonkeyPatch
+    ace: AceProcess, longest: int, networks: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(propagation, "MAX_ALLOWED_ROWS", longest)
     chance = Random(f"strategies {longest}")
@@ -173,7 +165,7 @@ def test_both_strategies_find_what_brute_force_finds(
         network = random_network(chance)
         expected = brute_force(network)
         for strategy in STRATEGIES:
-            answer = warm.solve(network, strategy=strategy)
+            answer = ace.solve(network, strategy=strategy)
             assert sorted(answer.solutions) == expected, network
             assert (answer.found, answer.complete) == (len(expected), True)
         found += len(expected)
@@ -181,43 +173,43 @@ def test_both_strategies_find_what_brute_force_finds(
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
-def test_a_limit_ends_the_search(warm: AceProcess, strategy: Strategy) -> None:
+def test_a_limit_ends_the_search(ace: AceProcess, strategy: Strategy) -> None:
     board = queens_network(6)
     every = brute_force(board)
     for limit in range(1, len(every)):
-        answer = warm.solve(board, limit=limit, strategy=strategy)
+        answer = ace.solve(board, limit=limit, strategy=strategy)
         assert (answer.found, answer.complete, len(set(answer.solutions))) == (limit, False, limit)
         assert set(answer.solutions) <= set(every)
-    assert warm.solve(board, limit=len(every), strategy=strategy).found == len(every)
-    answer = warm.solve(board, limit=len(every) + 1, strategy=strategy)
+    assert ace.solve(board, limit=len(every), strategy=strategy).found == len(every)
+    answer = ace.solve(board, limit=len(every) + 1, strategy=strategy)
     assert (answer.found, answer.complete, sorted(answer.solutions)) == (len(every), True, every)
 
 
 @pytest.mark.parametrize("longest_s", [0.0, 1e6])
 def test_any_limit_of_time_can_be_waited_for(
-    warm: AceProcess, longest_s: float, monkeypatch: pytest.MonkeyPatch
+    ace: AceProcess, longest_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("robochoc.solver.ace.LONGEST_WAIT_S", longest_s)
     for limit_s in (1e300, math.inf):
-        answer = warm.solve(queens_network(6), limit=1000, deadline=time.monotonic() + limit_s)
+        answer = ace.solve(queens_network(6), limit=1000, deadline=time.monotonic() + limit_s)
         assert (answer.found, answer.complete) == (len(brute_force(queens_network(6))), True)
 
 
-def test_solutions_can_be_counted_only(warm: AceProcess) -> None:
+def test_solutions_can_be_counted_only(ace: AceProcess) -> None:
     for strategy in STRATEGIES:
-        answer = warm.solve(queens_network(8), count_only=True, strategy=strategy)
+        answer = ace.solve(queens_network(8), count_only=True, strategy=strategy)
         assert (answer.found, answer.complete, answer.solutions) == (92, True, ())
 
 
-def test_variables_that_no_table_looks_at_take_every_value_in_their_places(warm: AceProcess) -> None:
+def test_variables_that_no_table_looks_at_take_every_value_in_their_places(ace: AceProcess) -> None:
     network = Network(
         ((7, 8), (0, 1), (4,), (0, 1), (2, 5, 6)), (Table((1, 3), allowed=True, rows=((0, 0), (0, 1), (1, 0))),)
     )
-    answer = warm.solve(network)
+    answer = ace.solve(network)
     assert (answer.found, answer.complete) == (18, True)
     assert sorted(answer.solutions) == brute_force(network)
-    assert warm.solve(network, count_only=True).found == 18
-    cut_off = warm.solve(network, limit=10)
+    assert ace.solve(network, count_only=True).found == 18
+    cut_off = ace.solve(network, limit=10)
     assert (cut_off.found, cut_off.complete, len(set(cut_off.solutions))) == (10, False, 10)
     assert set(cut_off.solutions) <= set(answer.solutions)
 
@@ -286,7 +278,7 @@ def test_processes_go_and_the_next_task_has_another(temporary: Path, monkeypatch
 
 
 def test_a_judge_out_of_time_leaves_a_lent_solver_fit_for_the_next_task(
-    warm: AceProcess, monkeypatch: pytest.MonkeyPatch
+    ace: AceProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The time is over once ACE has been searching for a while."""
     clock = MovedClock()
@@ -295,8 +287,8 @@ def test_a_judge_out_of_time_leaves_a_lent_solver_fit_for_the_next_task(
     chain = [Constraint("C", PREDEFINED["neq"], pair, pair) for pair in itertools.pairwise(names)]
     team = complex_team({f"R{name}": [name] for name in names}, {name: range(4) for name in names}, chain)
     options = Options(protocol="central", count=True, timeout=HANG_S, cache=False)
-    assert solve(team, options, solver=warm, progress=lambda _: clock.end()).verdict is Verdict.UNKNOWN
-    assert warm.solve(SMALL_NETWORK, deadline=time.monotonic() + HANG_S).found == 3
+    assert solve(team, options, solver=ace, progress=lambda _: clock.end()).verdict is Verdict.UNKNOWN
+    assert ace.solve(SMALL_NETWORK, deadline=time.monotonic() + HANG_S).found == 3
 
 
 def test_a_process_that_is_killed_before_its_task_is_told_too(temporary: Path) -> None:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -109,13 +109,6 @@ def cache(tmp_path: Path) -> SolutionCache:
     return SolutionCache(tmp_path / "cache")
 
 
-@pytest.fixture
-def solver(warm_ace: None) -> Iterator[AceProcess]:
-    del warm_ace
-    with AceProcess(always=True) as process:
-        yield process
-
-
 @pytest.fixture(scope="module")
 def row() -> Robot:
     """A robot with private constraints that need a solver, and two local solutions."""
@@ -132,9 +125,9 @@ def rows(warm_ace: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     return folder
 
 
-def compiled(robot: Robot, cache: SolutionCache, solver: AceProcess) -> Compilation:
+def compiled(robot: Robot, cache: SolutionCache, ace: AceProcess) -> Compilation:
     """What compiling `robot` comes to, its time apart."""
-    with Compiler(cache=cache, solver=solver) as compiler:
+    with Compiler(cache=cache, solver=ace) as compiler:
         return replace(compiler.compile(robot), seconds=0)
 
 
@@ -183,17 +176,17 @@ def test_every_bit_of_a_file_counts(cache: SolutionCache) -> None:
 
 @pytest.mark.parametrize("damage", ["empty", "cut off", "another solution", "garbage", "of another network"])
 def test_a_robot_is_compiled_again_when_its_file_is_damaged(
-    cache: SolutionCache, solver: AceProcess, row: Robot, damage: str
+    cache: SolutionCache, ace: AceProcess, row: Robot, damage: str
 ) -> None:
-    first = compiled(row, cache, solver)
+    first = compiled(row, cache, ace)
     assert (first.source, first.domain.total) == (CompiledFrom.ACE, 2)
-    assert compiled(row, cache, solver) == replace(first, source=CompiledFrom.CACHE)
+    assert compiled(row, cache, ace) == replace(first, source=CompiledFrom.CACHE)
     (path,) = cache.files()
     whole = path.read_bytes()
     path.write_bytes(DAMAGES[damage](path))
-    assert compiled(row, cache, solver) == first
+    assert compiled(row, cache, ace) == first
     assert path.read_bytes() == whole
-    assert compiled(row, cache, solver).source is CompiledFrom.CACHE
+    assert compiled(row, cache, ace).source is CompiledFrom.CACHE
 
 
 def test_another_version_has_other_files(cache: SolutionCache, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -232,25 +225,25 @@ def test_what_is_too_large_is_not_kept(cache: SolutionCache, monkeypatch: pytest
 
 @pytest.mark.parametrize("place", ["file", "file/below"])
 def test_a_folder_that_cannot_be_written_is_done_without(
-    tmp_path: Path, solver: AceProcess, row: Robot, place: str
+    tmp_path: Path, ace: AceProcess, row: Robot, place: str
 ) -> None:
     (tmp_path / "file").write_text("in the way")
     cache = SolutionCache(tmp_path / place)
     cache.put(SMALL_NETWORK, SMALL_SOLUTIONS)
     assert cache.get(SMALL_NETWORK) is None
     for _ in range(2):
-        found = compiled(row, cache, solver)
+        found = compiled(row, cache, ace)
         assert (found.source, found.domain.total) == (CompiledFrom.ACE, 2)
     assert (list(cache.files()), cache.clear()) == ([], 0)
     assert (tmp_path / "file").read_text() == "in the way"
 
 
-def test_a_folder_in_the_place_of_a_file_is_done_without(cache: SolutionCache, solver: AceProcess, row: Robot) -> None:
-    compiled(row, cache, solver)
+def test_a_folder_in_the_place_of_a_file_is_done_without(cache: SolutionCache, ace: AceProcess, row: Robot) -> None:
+    compiled(row, cache, ace)
     (path,) = cache.files()
     path.unlink()
     path.mkdir()
-    assert [compiled(row, cache, solver).source for _ in range(2)] == [CompiledFrom.ACE] * 2
+    assert [compiled(row, cache, ace).source for _ in range(2)] == [CompiledFrom.ACE] * 2
     assert [found.name for found in cache.folder.iterdir()] == [path.name]
 
 

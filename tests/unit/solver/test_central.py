@@ -35,14 +35,6 @@ from tests.support.xcsp3_solvers import read_document, run_java, solver_jar
 pytestmark = pytest.mark.usefixtures("shared_solvers")
 
 
-@pytest.fixture(params=[False, True], ids=["enumerated", "by ACE"])
-def solver(request: pytest.FixtureRequest, warm_ace: None) -> Iterator[AceProcess]:
-    """A solver that enumerates what is small, and one that asks ACE always."""
-    del warm_ace
-    with AceProcess(always=request.param) as one:
-        yield one
-
-
 def random_network(chance: Random, names: Sequence[str], images: Sequence[Symmetry]) -> Network:
     """Random binary tables, each with all that `images` make of it: a network that has these symmetries."""
     codes = tuple(range(chance.choice((2, 3))))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -51,14 +50,6 @@ pytestmark = pytest.mark.usefixtures("shared_solvers")
 CENTRAL = Options(protocol="central")
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.MINIMUM)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]
-
-
-@pytest.fixture(params=[False, True], ids=["enumerated", "by ACE"])
-def solver(request: pytest.FixtureRequest, warm_ace: None) -> Iterator[AceProcess]:
-    """A solver that enumerates what is small, and one that asks ACE always."""
-    del warm_ace
-    with AceProcess(always=request.param) as one:
-        yield one
 
 
 def any_cost_team(chance: Random) -> Team:

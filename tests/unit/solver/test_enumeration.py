@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import tracemalloc
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -42,14 +41,6 @@ from tests.support.solver_networks import brute_force, queens_network, random_ne
 
 ENOUGH = 10**9
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))]
-
-
-@pytest.fixture
-def ace(warm_ace: None) -> Iterator[AceProcess]:
-    """A process that is asked always."""
-    del warm_ace
-    with AceProcess(always=True) as solver:
-        yield solver
 
 
 @pytest.fixture
