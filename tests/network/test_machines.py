@@ -13,7 +13,7 @@ from robochoc.formats import read_team
 from robochoc.model.outcome import Verdict
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import violations
-from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, finished, one_line, written
+from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, enrolled, finished, one_line, written
 from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc_within
 
@@ -82,8 +82,7 @@ def test_what_robots_keep_to_themselves(site: Deployment) -> None:
 
 @pytest.mark.more
 def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     master = site.master("--team", files)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
     master.wait_to_say("RA is there")
@@ -95,8 +94,7 @@ def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
 
 @pytest.mark.more
 def test_a_robot_that_drops_out_is_told_and_waited_for_again(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     journal = site.folder / "run.jsonl"
     master = site.master("--team", files, "--journal", journal)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
@@ -141,8 +139,7 @@ def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
 
 @pytest.mark.more
 def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> None:
-    files = written(TRIANGLE, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(TRIANGLE, site)
     (token,) = site.enrol("Watcher", "--role", "observer").values()
     late = tokens.pop("RC")
     master = site.master("--protocol", "abt", "--team", files, "--withdraw", "--json")
@@ -193,8 +190,7 @@ def test_what_a_parent_leaves_out_its_childs_constraints_say(site: Deployment) -
 
 @pytest.mark.slow
 def test_revoked_while_the_others_wait_for_it(site: Deployment) -> None:
-    files = written(TRIANGLE, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(TRIANGLE, site)
     late = tokens.pop("RC")
     master = site.master("--on-loss", "withdraw", "--json", "--gather", 60)
     robots = site.robots(files, tokens)
@@ -213,8 +209,7 @@ def test_revoked_while_the_others_wait_for_it(site: Deployment) -> None:
 
 @pytest.mark.slow
 def test_revoked_in_mid_run(site: Deployment) -> None:
-    files = written(TRIANGLE, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(TRIANGLE, site)
     endless = ("--protocol", "dsa", "--set", "cycles=1000000", "--timeout", 15)
     master = site.master("--on-loss", "withdraw", "--json", *endless)
     robots = site.robots(files, tokens, "--patience", 2)
@@ -229,8 +224,7 @@ def test_revoked_in_mid_run(site: Deployment) -> None:
 
 
 def test_ctrl_c_at_the_master_sends_everybody_home(site: Deployment) -> None:
-    files = written(TRIANGLE, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(TRIANGLE, site)
     del tokens["RC"]
     master = site.master()
     robots = site.robots(files, tokens)

@@ -19,7 +19,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from tests.support.deployments import Deployment, finished, one_line, written
+from tests.support.deployments import Deployment, enrolled, finished, one_line, written
 
 pytestmark = pytest.mark.more
 
@@ -61,8 +61,7 @@ def test_symbols_have_their_names_across_machines(site: Deployment) -> None:
 
 def test_a_function_without_bounds_is_refused_where_domains_are_not_known(site: Deployment) -> None:
     product = Function("f", ("X", "Y"), parse("mul(X,Y)", ("X", "Y"), Type.INTEGER))
-    files = written(team_with(product), site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(team_with(product), site)
     site.master("--team", files, "--protocol", "syncbb")
     robot = site.robot(files / "RB.xml", "--token", tokens["RB"])
     assert robot.status() == 2, robot.errors

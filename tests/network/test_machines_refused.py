@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from robochoc.cli.group import cli
 from robochoc.formats import write_team
 from tests.support.cases import looped
-from tests.support.deployments import LONG_S, PAIR, Deployment, ended, one_line, taken, written
+from tests.support.deployments import LONG_S, PAIR, Deployment, ended, enrolled, one_line, taken, written
 from tests.support.ports import LOOPBACK
 from tests.support.program import ROOT
 
@@ -23,8 +23,7 @@ from tests.support.program import ROOT
 
 @pytest.mark.slow
 def test_tokens_that_do_not_work(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     expired = site.enrol("Late", "--token-ttl", 1e-6)["Late"]
     write_team(PAIR, site.folder / "other")
     (site.folder / "other" / "RA.xml").rename(site.folder / "other" / "Late.xml")
@@ -50,8 +49,7 @@ def test_tokens_that_do_not_work(site: Deployment) -> None:
 
 
 def test_identities_that_do_not_fit(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     master = site.master("--gather", 60)
     nobody = site.robot(files / "RA.xml")
     assert nobody.status() == 1

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from robochoc.cli.group import cli
 from robochoc.journal.journal import read_journal
 from tests.support.cases import looped
-from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
+from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, enrolled, one_line
 from tests.support.journal_entries import entries_of
 from tests.support.limits import HANG_S, wait_until
 
@@ -40,8 +40,7 @@ def heard(site: Deployment, name: str) -> set[str]:
 
 @pytest.mark.more
 def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     sniffers = site.enrol("Early", "Late", *SNIFFER)
     spy = site.enrol("Spy", *OBSERVER)["Spy"]
     own = site.folder / "own.journal"
@@ -74,8 +73,7 @@ def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment)
 
 @pytest.mark.slow
 def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Deployment) -> None:
-    files = written(TRIANGLE, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(TRIANGLE, site)
     sniffers = site.enrol("Stopped", "Killed", "Revoked", "Whole", *SNIFFER)
     master = site.master("--sniffable", *ENDLESS, "--timeout", 10)
     robots = site.robots(files, tokens)
@@ -106,8 +104,7 @@ def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Deployment
 
 @pytest.mark.more
 def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     token = site.enrol("Sniffer", *SNIFFER)["Sniffer"]
     master = site.master("--sniffable", "--robots", 2)
     words = ("--token", token, "--journal", copy_of(site, "Sniffer"), "--patience", 3600)
@@ -132,8 +129,7 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
 
 @pytest.mark.more
 def test_in_a_private_run_only_robots_that_agreed_are_heard(site: Deployment) -> None:
-    files = written(PAIR, site)
-    tokens = site.enrol("--team", files)
+    files, tokens = enrolled(PAIR, site)
     token = site.enrol("Eye", *SNIFFER)["Eye"]
     master = site.master("--sniffable", "--private", "--robots", 2)
     eye = follow(site, "Eye", token)

@@ -12,7 +12,7 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.model.problem import Constraint
 from robochoc.run import Options, Runtime, solve
-from tests.support.deployments import CROWD, TRIANGLE, Deployment, Program, ended, written
+from tests.support.deployments import CROWD, TRIANGLE, Deployment, Program, ended, enrolled
 from tests.support.journal_entries import entries_of
 from tests.support.namespaces import DELAY_S, LOSS, TUN, Link, bad_line, namespaces, route, veth, why_not
 from tests.support.problems import PREDICATES, team_of
@@ -59,8 +59,7 @@ def test_three_machines_that_only_cables_join(tmp_path: Path, warm: WarmPrograms
         veth((hill, f"{HILL}/24"), (east, f"{FIELD}/24"))
         veth((hill, "10.77.2.1/24"), (west, "10.77.2.2/24"))
         route(west, "10.77.1.0/24", "10.77.2.1")
-        files = written(TRIANGLE, site)
-        tokens = site.enrol("--team", files)
+        files, tokens = enrolled(TRIANGLE, site)
         master = site.master("--team", files, "--json", inside=hill)
         crew = {
             name: site.robot(files / f"{name}.xml", "--token", token, inside=where)
@@ -142,8 +141,7 @@ def test_a_line_that_delays_and_loses(apart: Apart) -> None:
 @pytest.mark.parametrize("apart", [0.1], indirect=True)
 @pytest.mark.parametrize("protocol", ["abt", "dpop", "mgm"])
 def test_one_packet_in_ten_lost_makes_no_verdict_wrong_and_nobody_wait_for_ever(apart: Apart, protocol: str) -> None:
-    files = written(TRIANGLE, apart.site)
-    tokens = apart.site.enrol("--team", files)
+    files, tokens = enrolled(TRIANGLE, apart.site)
     words = ("--team", files, "--protocol", protocol, "--set", "cycles=10") if protocol == "mgm" else (
         "--team", files, "--protocol", protocol,
     )  # fmt: skip

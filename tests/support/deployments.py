@@ -232,6 +232,12 @@ def written(team: Team, site: Deployment) -> Path:
     return folder
 
 
+def enrolled(team: Team, site: Deployment) -> tuple[Path, dict[str, str]]:
+    """Return the files of the team, and the tokens of its robots."""
+    files = written(team, site)
+    return files, site.enrol("--team", files)
+
+
 def one_line(program: Program) -> str:
     """All that a program says that did not get far."""
     assert program.errors.count("\n") == 1, program.errors
