@@ -132,7 +132,7 @@ def test_every_word_comes_as_it_was_sent(kind: type[ControlMessage]) -> None:
     sender, receiver = ("R1", MASTER) if kind in WORDS[0] else (MASTER, "R1") if kind in WORDS[1] else ("R1", "R2")
 
     @given(word=some(kind))
-    @examples(15)
+    @examples(8)
     def arrives(word: ControlMessage) -> None:
         writer, reader = pair(sender, receiver)
         opened = reader.read(sender, writer.write(receiver, word))

@@ -25,6 +25,7 @@ from tests.support.brute_force import least_cost, solutions
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
 from tests.support.limits import HANG_S
 from tests.support.paused_abt import CHAIN, CrashingABT, OverloadedABT, PausedABT
 from tests.support.pkc_problems import random_pkc_team
@@ -85,27 +86,27 @@ def test_more_random_problems(protocol: str, batch: int) -> None:
     agrees(team, protocol, chance.choice([(), ("signed",), ("sealed",), ("signed", "sealed")]))
 
 
-def test_partially_known_constraints() -> None:
-    agrees(random_pkc_team(Random(3)), "disfc")
+@count("many", 1, 20)
+def test_partially_known_constraints(many: int) -> None:
+    for number in range(many):
+        agrees(random_pkc_team(Random(3 + number)), ("disfc", "abt")[number % 2])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize("protocol", ["disfc", "abt"])
-def test_more_partially_known_constraints(protocol: str, seed: int) -> None:
-    agrees(random_pkc_team(Random(100 + seed)), protocol)
+@count("many", 1, 8)
+def test_complex_robots(many: int) -> None:
+    for number in range(many):
+        agrees(random_complex_team(Random(f"network {number}")), "abt", ("signed", "sealed"))
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
-def test_complex_robots(seed: int) -> None:
-    team = random_complex_team(Random(f"network {seed}"))
-    agrees(team, "abt", ("signed", "sealed"))
-
-
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
 @pytest.mark.parametrize("protocol", ["dpop", "sfb", pytest.param("adopt", marks=pytest.mark.slow)])
-def test_costs(protocol: str, seed: int) -> None:
-    team = random_cost_team(Random(f"network {seed}"), n_ary=protocol_named(protocol).traits.n_ary)
+@count("many", 1, 6)
+def test_costs(protocol: str, many: int) -> None:
+    for number in range(many):
+        chance = Random(f"network {number}")
+        assert_least_cost(random_cost_team(chance, n_ary=protocol_named(protocol).traits.n_ary), protocol)
+
+
+def assert_least_cost(team: Team, protocol: str) -> None:
     result, checked = run_over_network(team, protocol)
     least = least_cost(team)
     if least == INFINITE:
