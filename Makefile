@@ -63,9 +63,9 @@ test-more: $(READY)  ## whole programs: pages in a browser, networks, vehicles
 
 test-all: test test-more test-slow
 
-# One of PART slow tests, the same ones with the same problems each time: what CI has time for (six minutes, 2 cores).
+# One of PART slow tests, the same ones with the same problems each time. CI runs PART=64.
 PART ?= 16
-test-part: $(READY)  ## a fixed part of the slow tests, for CI
+test-part: $(READY)  ## a fixed part of the slow tests
 	$(PYTEST) -m slow -p tests.support.parts --part $(PART)
 
 # A wheel with compiled modules, in an environment of its own that has what `make test` has. An editable install is always
