@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from click.testing import Result
 
+from robochoc.formats.result import read_result
 from tests.support.maps import write_map
 from tests.support.octomaps import FREE, write_octomap
 from tests.support.solve_ros import messages, ran
@@ -136,3 +137,50 @@ def test_what_is_wrong_with_a_map_is_said_with_its_file(team: Path, result: Path
     refused = ran("fly", result, "--team", team)
     assert refused.exit_code == 1
     assert "has no way around the walls from (1.00, " in refused.stderr
+
+
+# `robochoc solve` says where on the map of a team its values are
+
+
+def output_of(*words: object) -> str:
+    done = ran(*words)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+@pytest.fixture
+def open_ground(tmp_path: Path) -> Path:
+    folder = tmp_path / "team"
+    at = ("--at", "1,1 1,2", "--anchor", "2,1.5", "--cell", "0.5", "--radius", "0", "--spacing", "1")
+    output_of("generate", "formation", "--map", write_map(tmp_path, ["......"] * 6), *at, "-o", folder)
+    return folder
+
+
+HOW = ("--runtime", "simulator", "--protocol", "dpop")
+
+
+def test_the_report_has_metres_beside_values(open_ground: Path) -> None:
+    said = output_of("solve", open_ground, *HOW)
+    assert "Robot1: V1 = 18 (2,1 m)" in said
+    assert "Robot2: V2 = 32 (2,2 m)" in said
+
+
+def test_json_has_places_beside_the_assignment(open_ground: Path) -> None:
+    said = output_of("solve", open_ground, *HOW, "--json")
+    found = json.loads(said)
+    assert found["assignment"] == {"V1": 18, "V2": 32}
+    assert found["places"] == {"V1": [2.0, 1.0], "V2": [2.0, 2.0]}
+    assert read_result(said.encode()).assignment == found["assignment"]
+
+
+def test_every_optimum_that_is_listed_has_its_places(open_ground: Path) -> None:
+    said = output_of("solve", open_ground, "--runtime", "simulator", "--protocol", "list-dpop", "--set", "limit=9")
+    assert "Robot1: V1 = 18 (2,1 m)" in said
+    assert said.count(" m)") == said.count("V1 = ") + said.count("V2 = ")
+
+
+def test_without_a_map_that_says_so_nothing_is_told(open_ground: Path) -> None:
+    for content in ("{", '{"columns": 7, "rows": 7}', None):
+        (open_ground / "map.json").unlink() if content is None else (open_ground / "map.json").write_text(content)
+        assert " m)" not in output_of("solve", open_ground, *HOW)
+        assert "places" not in json.loads(output_of("solve", open_ground, *HOW, "--json"))

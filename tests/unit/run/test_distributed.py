@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from random import Random
 
 import pytest
 
 from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.model.cost_units import Cost
-from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Withdrawal
 from robochoc.run.distributed import Deployment, solve_distributed
-from robochoc.run.evaluation import CheckedAssignment, Search
+from robochoc.run.evaluation import Answer, CheckedAssignment, Search
 from robochoc.run.withdrawal import Phase
+from tests.support.random_outcomes import drawn
 
 HEADER = Outcome("team", "abt", "simulator", 0, Verdict.UNKNOWN)
 SPENT = Metrics(messages={"Ok": 2}, checks=5)
@@ -134,3 +136,23 @@ def test_why_there_is_no_verdict() -> None:
     ]:
         outcome = solve_distributed(MadeUp(options, [result]), DSA if options.protocol == "dsa" else ABT, HEADER)
         assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, reason)
+
+
+# Answers of searches become outcomes and epochs without loss
+
+
+ANSWER = {one.name for one in fields(Answer)}
+
+
+def test_no_field_of_an_answer_is_dropped() -> None:
+    chance = Random(4)
+    header = Outcome("team", "abt", "simulator", 1, Verdict.UNKNOWN, order="dfs", channel="wifi")
+    for _ in range(100):
+        answer = drawn(Answer, chance)
+        outcome, epoch = answer.as_outcome(header, ("gone",)), answer.as_epoch(("a", "b"), "a loss", ("gone",))
+        for kind, made in ((Outcome, outcome), (EpochOutcome, epoch)):
+            for name in ANSWER & {one.name for one in fields(kind)} - {"withdrawn"}:
+                assert getattr(made, name) == getattr(answer, name), name
+        assert outcome.withdrawn == ("gone", *answer.withdrawn)
+        assert (outcome.team, outcome.order, outcome.channel) == ("team", "dfs", "wifi")
+        assert (epoch.robots, epoch.opened_by, epoch.lost) == (("a", "b"), "a loss", ("gone",))
