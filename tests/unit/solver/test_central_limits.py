@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +16,7 @@ from robochoc.generators.coloring import coloring
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import central
@@ -34,10 +35,18 @@ from tests.support.problems import team_of
 from tests.support.solver_networks import queens_network
 
 CENTRAL = Options(protocol="central")
-HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
-"""Hours would not do."""
-SMALL = random_csp(3, 3, 1, 0, 1, max_cost=9)
 SOON_S = 0.05
+
+
+@cache
+def hard() -> Team:
+    """Return a problem for which hours would not do."""
+    return random_csp(30, 8, 0.3, 0, 1, max_cost=100)
+
+
+@cache
+def small() -> Team:
+    return random_csp(3, 3, 1, 0, 1, max_cost=9)
 
 
 def endless(*_: object, **__: object) -> None:
@@ -74,10 +83,10 @@ def over_with_a_best(warm: AceProcess, monkeypatch: pytest.MonkeyPatch) -> Calla
 
 
 def test_when_the_time_is_over_the_best_so_far_is_told(warm: AceProcess, over_with_a_best: Callable[..., None]) -> None:
-    outcome = solve(HARD, replace(CENTRAL, timeout=HANG_S), solver=warm, progress=over_with_a_best)
+    outcome = solve(hard(), replace(CENTRAL, timeout=HANG_S), solver=warm, progress=over_with_a_best)
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.bound is not None
-    assert outcome.cost == assignment_cost(HARD, outcome.assignment) > outcome.bound
+    assert outcome.cost == assignment_cost(hard(), outcome.assignment) > outcome.bound
     assert outcome.verified
 
 
@@ -97,7 +106,7 @@ def test_without_an_answer_until_then_there_is_a_bound(monkeypatch: pytest.Monke
 @pytest.mark.parametrize("step", ["weighted.components", "weighted.propagate", "weighted.costs_by_scope"])
 def test_preparation_without_an_end_ends_with_the_time(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(f"robochoc.solver.{step}", endless)
-    outcome = solve(SMALL, replace(CENTRAL, timeout=SOON_S))
+    outcome = solve(small(), replace(CENTRAL, timeout=SOON_S))
     assert outcome.verdict is Verdict.UNKNOWN
 
 
@@ -110,7 +119,7 @@ def test_preparation_without_costs_ends_with_the_time(step: str, monkeypatch: py
 
 def test_compilation_without_an_end_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.solver.compile.compile_domain", endless)
-    outcome = solve(SMALL, Options(protocol="dpop", timeout=SOON_S))
+    outcome = solve(small(), Options(protocol="dpop", timeout=SOON_S))
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.reason == "the time was over while Robot1 was compiled"
 
@@ -125,7 +134,7 @@ def test_a_step_of_a_robot_without_an_end_ends_with_the_time(step: str, monkeypa
 
 def test_the_choice_of_a_protocol_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.run.orchestrator.decided", endless)
-    outcome = solve(SMALL, Options(protocol="auto", runtime=Runtime.SIMULATOR, timeout=SOON_S))
+    outcome = solve(small(), Options(protocol="auto", runtime=Runtime.SIMULATOR, timeout=SOON_S))
     assert (outcome.verdict, outcome.protocol) == (Verdict.UNKNOWN, "sfb")
     assert outcome.chosen == {"protocol": "there was no time to analyse the team"}
 
@@ -143,14 +152,14 @@ def test_a_process_that_does_not_read_its_task_is_given_up(tmp_path: Path, monke
 
 def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
     """And it is no solution of the task before."""
-    (part,) = weighted_components(HARD.variables.values(), list(HARD.constraints()))
+    (part,) = weighted_components(hard().variables.values(), list(hard().constraints()))
     warm.begin(part.network, costs=part.costs)
     wait_for_a_best(warm)
     with pytest.raises(SolverTimeoutError) as over:
         warm.answer(time.monotonic())
     best = over.value.best
     assert best is not None
-    assert part.cost(best) == assignment_cost(HARD, part.decoded(best))
+    assert part.cost(best) == assignment_cost(hard(), part.decoded(best))
 
 
 def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
@@ -158,7 +167,7 @@ def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
     network = Network(((0, 1, 2), (0, 1, 2), (0, 1, 2)), (Table((0, 1, 2), allowed=True, rows=rows),))
     assert warm.begin(network, costs=((2, 1),))
     assert warm.answer().solutions[0] in rows
-    (part,) = weighted_components(HARD.variables.values(), list(HARD.constraints()))
+    (part,) = weighted_components(hard().variables.values(), list(hard().constraints()))
     assert warm.begin(part.network, costs=part.costs)
     best = warm.give_up().best
     assert best is None or part.cost(best) < INFINITE
