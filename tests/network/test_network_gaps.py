@@ -83,7 +83,6 @@ def test_a_robots_gap_is_its_loss(tmp_path: Path) -> None:
     assert [lost.robot for lost in run.losses] == ["RX3"]
 
 
-@pytest.mark.more
 def test_a_gap_between_robots_that_is_none_is_told_and_ends_nothing(tmp_path: Path) -> None:
     with watched(tmp_path) as run:
         with run.transport("RX3") as transport:
@@ -105,7 +104,6 @@ def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> No
             run.let_go()
 
 
-@pytest.mark.more
 def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
     """B uses the source of A: where each sender has a subscriber of its own, A's frames come all the same."""
     household = InMemoryAuthority(("A", "B", "C"))
@@ -136,7 +134,6 @@ def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
         router.close()
 
 
-@pytest.mark.more
 def test_why_a_robot_fails_reaches_other_owners_as_plain_text(tmp_path: Path) -> None:
     with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
         transport.send(MASTER, frame(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))

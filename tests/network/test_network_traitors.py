@@ -37,7 +37,6 @@ from tests.support.paused_abt import CHAIN, TRIANGLE
 # Revoked in the middle of a run
 
 
-@pytest.mark.more
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
 def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filters: tuple[str, ...]) -> None:
     with NetworkRun(tmp_path, settings=NetworkSettings(filters, survive=True, patience_s=HANG_S)) as run:
@@ -106,7 +105,6 @@ def told(transport: Transport, incarnation: str) -> bool:
     return False
 
 
-@pytest.mark.more
 def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path) -> None:
     boastful = changed(profile_of(CHAIN["RX3"]), topics=("x" * 10_000, *map(str, range(200))))
     with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
@@ -120,7 +118,6 @@ def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path
 # Whoever carries the frames
 
 
-@pytest.mark.more
 @pytest.mark.parametrize(
     "filters", [("sealed",), *(pytest.param(f, marks=pytest.mark.slow) for f in (("signed",), ("signed", "sealed")))]
 )
