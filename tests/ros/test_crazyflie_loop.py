@@ -9,13 +9,7 @@ import pytest
 
 pytest.importorskip("cflib")
 
-from robochoc.ros.autopilots.crazyflie import CrazyflieSource
-from robochoc.ros.closed_loop import drones_of
-from robochoc.ros.report_decoder import ReportDecoder
-from robochoc.ros.source import ReceivedMessage
 from tests.support.crazyflie_teams import crazyflie_field, solve
-from tests.support.limits import HANG_S
-from tests.support.mavlink_teams import four_drones
 
 WAIT_S = "1"
 """The run is over when nothing has changed for so long after all are there."""
@@ -42,7 +36,6 @@ def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("trouble", "why"),
     [
-        ({"refuses": {"arm"}}, "it did not arm (command denied)"),
         ({"refuses": {"goto"}}, "it did not fly to its place (command denied)"),
         ({"silent_above": 0.5}, "its link has been silent for 5 s"),
         ({"tumbled": True}, "it does not stand upright"),
@@ -56,26 +49,3 @@ def test_who_falls_out_leaves_and_the_others_decide_anew(tmp_path: Path, trouble
         assert "-RB" in done.stdout
         assert f"3 landed, RB is out of order: {why}" in done.stderr
         vehicles.wait_until_safe()
-
-
-@pytest.mark.slow
-def test_places_and_batteries_are_reported(tmp_path: Path) -> None:
-    with crazyflie_field(tmp_path) as (vehicles, fleet), CrazyflieSource(str(fleet)) as source:
-        decoder = ReportDecoder(drones_of(four_drones()), "map")
-        source.assign(decoder.namespaces)
-        source.listen(decoder.topics)
-        place = _heard(source, "/RC/pose").fields["pose"]["position"]
-        assert place == pytest.approx({"x": 4, "y": 0, "z": 0}, abs=0.01)
-        assert _heard(source, "/RC/battery").fields["percentage"] == 1
-        vehicles[2].battery = 0.5
-        assert _heard(source, "/RC/battery").fields["percentage"] == pytest.approx(0.5)
-        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
-
-
-def _heard(source: CrazyflieSource, topic: str) -> ReceivedMessage:
-    """The next message on `topic`."""
-    while True:
-        received = source.next(HANG_S)
-        assert received is not None
-        if received.topic == topic:
-            return received

@@ -174,18 +174,6 @@ def test_every_waypoint_of_the_queens_arrives(domain: int, tmp_path: Path) -> No
     assert heard == recorded(tmp_path / "run.mcap")
 
 
-@pytest.mark.slow
-def test_every_waypoint_of_all_epochs_of_the_hangar_arrives(domain: int, tmp_path: Path) -> None:
-    with subscriber(domain, waypoints_of(HANGAR)) as peer:
-        sinks = ("--ros", f"mcap:{tmp_path}/run.mcap", "--ros", f"dds:{domain}?{WAITS}")
-        events = ("--situation", "flight", "--fail", "Nose@3", "--protocol", "dynabt", "--runtime", "simulator")
-        done = robochoc("solve", HANGAR, *events, *sinks)
-        assert done.returncode == 0, done.stderr
-        heard = received(peer.rest())
-    assert {len(places) for places in heard.values()} >= {2}
-    assert heard == recorded(tmp_path / "run.mcap")
-
-
 @pytest.mark.parametrize(("depth", "numbers"), [(1, [4]), (3, [2, 3, 4])])
 def test_who_comes_late_receives_the_last(domain: int, depth: int, numbers: list[int]) -> None:
     with DdsSink(f"{domain}?wait=0&depth={depth}") as sink:

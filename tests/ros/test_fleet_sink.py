@@ -35,9 +35,14 @@ class Field:
     """Four vehicles on the ground below their places."""
 
     folder: Path
-    flyers: dict[str, Flyer] = field(
-        default_factory=lambda: {name: Flyer((2.0 * n, 0.0, 0.0)) for n, name in enumerate(NAMES)}
-    )
+    flyers: dict[str, Flyer] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Put new vehicles there."""
+        self.flyers.update({name: Flyer((2.0 * n, 0.0, 0.0)) for n, name in enumerate(NAMES)})
 
     def fleet(self, **settings: object) -> Path:
         return fleet_file(self.folder, PORTS, **settings)
@@ -81,7 +86,7 @@ def test_without_permission_no_vehicle_is_commanded(here: Field) -> None:
 
 @looped("end", ["hold", "land"])
 def test_at_the_end_vehicles_do_as_the_fleet_file_says(here: Field, end: str) -> None:
-    here.flyers.update({name: Flyer(one.place) for name, one in Field(here.folder).flyers.items()})
+    here.reset()
     assert here.solve(here.fleet(end=end), "--arm").returncode == 0
     assert [flown[-1] for flown in here.done] == [end] * 4
 
@@ -112,6 +117,7 @@ def test_an_order_without_a_permit_is_refused(here: Field) -> None:
     ],
 )
 def test_what_is_refused_before_anything_is_armed(here: Field, told: str, settings: dict[str, object]) -> None:
+    here.reset()
     if not settings:
         here.flyers["RB"].seen = replace(GROUND, place=(0.0, 700.0, 0.0))
     elif "fence" in settings:
@@ -148,6 +154,7 @@ def test_drones_and_vehicles_match(here: Field, names: list[str], told: str) -> 
 
 @looped(("refused", "why"), [("arm", "it did not arm"), ("rise", "it did not rise 1.4")])
 def test_who_refuses_ends_the_flight_of_all(here: Field, refused: str, why: str) -> None:
+    here.reset()
     here.flyers["RB"].refuses = {refused}
     done = here.solve(here.fleet(), "--arm")
     assert f"RB is out of order: {why}; the others are brought down" in done.stderr
@@ -184,15 +191,29 @@ def test_places_and_batteries_are_reported(here: Field) -> None:
     assert here.done == [[]] * 4
 
 
-def test_whose_battery_empties_lands_and_the_others_decide_anew(here: Field) -> None:
-    here.flyers["RB"].battery_in_the_air = 0.05
+@looped(
+    ("trouble", "value", "told"),
+    [
+        ("battery_in_the_air", 0.05, "7 waypoints, 1 landing; 4 flown, 4 landed"),
+        ("refuses", {"arm"}, "4 flown, 3 landed, RB is out of order: it did not arm"),
+        ("refuses", {"rise"}, "4 flown, 3 landed, RB is out of order: it did not rise"),
+        (
+            "seen",
+            replace(GROUND, place=(2.0, 0.0, 0.0), healthy=False),
+            "RB is out of order: its autopilot is not ready",
+        ),
+    ],
+)
+def test_who_falls_out_leaves_and_the_others_decide_anew(here: Field, trouble: str, value: object, told: str) -> None:
+    here.reset()
+    setattr(here.flyers["RB"], trouble, value)
     fleet = here.fleet()
     words = ["--protocol", "dynabt", "--situation", f"mavlink:{fleet}", "--report-timeout", "0.3", "--arm"]
     done = here.solve(fleet, *words)
     assert "-RB" in done.stdout
-    assert "7 waypoints, 1 landing; 4 flown, 4 landed" in done.stderr
+    assert told in done.stderr
     assert done.returncode == 0
-    assert here.flyers["RB"].done.count("land") == 1
+    assert trouble != "battery_in_the_air" or here.flyers["RB"].done.count("land") == 1
 
 
 def test_names_of_vehicles_are_those_of_drones(here: Field) -> None:

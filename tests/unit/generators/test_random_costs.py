@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.formats import read_team, write_team
+from robochoc.formats import read_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
-from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Relation, Semantics
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
-from tests.support.cases import looped
 from tests.support.program import robochoc_within
 
 
@@ -64,15 +63,6 @@ def test_a_graph_to_be_coloured_has_the_degree_that_was_asked_for() -> None:
     assert {one.cost for one in shared_constraints(team)} == {1}
     assert all(list(one.domain) == [1, 2, 3] for one in team.variables.values())
     assert all(constraint_graph(coloring(15, 3, 3, 7, connected=True)).values())
-
-
-@looped(
-    "team",
-    lambda: [random_csp(8, 3, 0.5, 0.2, 1, max_cost=0), random_csp(8, 3, 0.5, 0.2, 1, max_cost=50), coloring(8, 2, 3)],
-)
-def test_the_team_is_what_its_files_say(tmp_path: Path, team: Team) -> None:
-    write_team(team, tmp_path / team.name)
-    assert read_team(tmp_path / team.name) == team
 
 
 # Asymmetric costs

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.formats import read_team, write_team
+from robochoc.formats import read_team
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import Robot, Semantics
@@ -49,15 +49,6 @@ def test_a_constraint_stands_with_the_lower_robot() -> None:
             (constraint,) = parent.constraints
             assert constraint.variables == (f"V{parent.name[5:]}", f"V{robot.name[5:]}")
             assert int(parent.name[5:]) < int(robot.name[5:])
-
-
-@looped(("agents", "domain", "density", "tightness"), [size[:4] for size in SIZES])
-def test_the_team_is_what_its_files_say(
-    tmp_path: Path, agents: int, domain: int, density: float, tightness: float
-) -> None:
-    team = random_csp(agents, domain, density, tightness, 3)
-    write_team(team, tmp_path / team.name)
-    assert read_team(tmp_path / team.name) == team
 
 
 def test_a_seed_is_one_problem_everywhere() -> None:
