@@ -152,7 +152,7 @@ def test_a_port_at_which_nobody_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("trouble", "why"),
     [
-        ({"refuses": {"arm"}}, "it did not arm (command denied)"),
+        pytest.param({"refuses": {"arm"}}, "it did not arm (command denied)", marks=pytest.mark.more),
         pytest.param({"refuses": {"takeoff"}}, "it did not take off (command denied)", marks=pytest.mark.slow),
         pytest.param({"tumbled": True}, "it does not stand upright", marks=pytest.mark.slow),
         pytest.param({"locked": True}, "it is locked: restart it", marks=pytest.mark.slow),

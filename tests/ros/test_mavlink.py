@@ -122,7 +122,7 @@ def test_options_that_do_not_fit(tmp_path: Path, words: list[str], told: str) ->
 @pytest.mark.parametrize(
     ("refused", "why"),
     [
-        ("arm", "it did not arm (command denied)"),
+        pytest.param("arm", "it did not arm (command denied)", marks=pytest.mark.more),
         pytest.param("takeoff", "it did not take off (command denied)", marks=pytest.mark.slow),
     ],
 )

@@ -23,7 +23,6 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
-from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.flights_on_maps import flown_team, gaps
 from tests.support.flown_teams import FlownTeam
@@ -54,11 +53,12 @@ def sent(team: Team, ground: GroundMap, *places: tuple[int, int], withdrawn: tup
 
 # Seeds with a building, a loose map, narrow doors, large pixels, downwash; one that once led through a wall (45), and
 # one with corners so close to each other that a drone that takes no time for them overshoots (115).
-@looped("seed", [1, 4, 45, 115])
-def test_drones_fly_around_walls_and_keep_from_each_other(seed: int, tmp_path: Path) -> None:
-    made = flown_team(seed, tmp_path)
-    assert isinstance(made, FlownTeam)
-    assert made.faults() == []
+@pytest.mark.parametrize("seeds", [(45, 115), pytest.param((1, 4), marks=pytest.mark.slow)])
+def test_drones_fly_around_walls_and_keep_from_each_other(seeds: tuple[int, ...], tmp_path: Path) -> None:
+    for seed in seeds:
+        made = flown_team(seed, tmp_path)
+        assert isinstance(made, FlownTeam)
+        assert made.faults() == []
 
 
 @pytest.mark.slow

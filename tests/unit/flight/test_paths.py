@@ -89,7 +89,7 @@ def cells(draw: st.DrawFn) -> tuple[Array, Array, Array]:
     return np.array(starts[:count], float), np.array(goals[:count], float), np.array(standing, float).reshape(-1, 3)
 
 
-@examples(25)
+@examples(15, 250)
 @given(cells(), st.sampled_from((0.3, 0.5, 0.8, 1.0)), st.lists(st.sampled_from((0.0, 0.33, 2.0)), min_size=7))
 def test_in_a_grid_all_keep_their_distance(
     places: tuple[Array, Array, Array], distance: float, waits: list[float]
@@ -98,7 +98,7 @@ def test_in_a_grid_all_keep_their_distance(
     fly(starts, goals, distance, standing, np.array(waits[: len(starts)]))
 
 
-@examples(25)
+@examples(15, 250)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.integers(0, 3), st.sampled_from((0.4, 0.7)))
 def test_anywhere_all_keep_their_distance(seed: int, count: int, standing: int, distance: float) -> None:
     chance = np.random.default_rng(seed)

@@ -97,7 +97,7 @@ def test_robots_see_as_much_as_can_be(agents: int, tmp_path: Path) -> None:
         in_pairs, as_union = least(choice, seed, Fraction(3), Fraction(4))
         assert best(team) == in_pairs >= as_union
         assert agents > 2 or in_pairs == as_union
-        for protocol in ("central", "dpop", "syncbb", "afb", "bnb-adopt"):
+        for protocol in ("central", "dpop", "syncbb", "afb", "bnb-adopt") if agents == 3 else ("central", "dpop"):
             found = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
             assert found.cost is not None
             assert Fraction(found.cost) == in_pairs, protocol

@@ -322,11 +322,12 @@ def test_slots_are_where_the_shape_is(tmp_path: Path) -> None:
     path = str(write_map(tmp_path, ["." * 20] * 20, origin="[-0.25, -0.25, 0]"))
     choice = MapChoice(map=path, at="1,1 1,2 1,3 1,4", radius=0, cell=0.5)
 
+    cells = Cells(
+        read_occupancy_grid(Path(path)), Fraction(1, 2), room_on(np.ones((20, 20), dtype=np.bool_), Fraction(0))
+    )
+
     def slots(shape: str, heading: float = 0.0) -> list[tuple[float, float]]:
         team, _ = formation(choice, shape=shape, heading=heading, anchor="5,5", spacing=1)
-        cells = Cells(
-            read_occupancy_grid(Path(path)), Fraction(1, 2), room_on(np.ones((20, 20), dtype=np.bool_), Fraction(0))
-        )
         return sorted((float(x), float(y)) for x, y in map(cells.centre, team.variables["V1"].domain))
 
     assert slots("line") == [(5, 3.5), (5, 4.5), (5, 5.5), (5, 6.5)]

@@ -87,7 +87,7 @@ def test_a_robot_keeps_its_radius_from_all_that_is_not_free(sides: Voxel, first:
 
 
 @given(SIDES, FIRST, st.integers(0, 2**32), st.none() | st.integers(0, 150))
-@examples(35)
+@examples(20, 350)
 def test_ways_are_the_shortest_and_cut_no_corner(sides: Voxel, first: Voxel, seed: int, longest: int | None) -> None:
     voxels = drawn_voxels(Random(seed), sides, first, 0.35)
     if not has_free(voxels):
@@ -160,7 +160,7 @@ def test_cells_are_as_small_as_their_number_allows() -> None:
     st.sampled_from([0.0, 0.4, 0.6]),
     st.none() | st.sampled_from([1.5, 4.0]),
 )
-@examples(35)
+@examples(20, 350)
 def test_robots_reach_what_free_space_leads_to(
     sides: Voxel, first: Voxel, seed: int, agents: int, radius: float, within: float | None
 ) -> None:
