@@ -71,8 +71,8 @@ async def served_by_tornado(here: socket, look: Callable[[int], Awaitable[None]]
 def test_unfinished_requests_end_and_finished_ones_are_answered(
     serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "HEAD_S", 0.4)
-    monkeypatch.setattr(loopback, "REQUEST_S", 0.4)
+    monkeypatch.setattr(connections, "HEAD_S", 1.0)
+    monkeypatch.setattr(loopback, "REQUEST_S", 1.0)
 
     async def look(port: int) -> None:
         answers = await asyncio.gather(*(answer_to(port, content) for content in UNFINISHED))

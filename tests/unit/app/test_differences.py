@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import prod
 from random import Random
 
 import msgspec
@@ -103,6 +104,14 @@ def _sound(sketch: Sketch) -> bool:
     return not any(trouble.is_error for trouble in troubles(sketch)) and bool(sketch.robots)
 
 
+MOST_TRIED = 1_024
+"""Assignments of a team whose costs are compared."""
+
+
+def _assignments(team: Team) -> int:
+    return prod(len([*variable.domain]) for variable in team.variables.values())
+
+
 @given(st.integers(0, 10**9))
 @examples(40)
 def test_the_last_epoch_is_the_second_sketch(seed: int) -> None:
@@ -115,8 +124,10 @@ def test_the_last_epoch_is_the_second_sketch(seed: int) -> None:
         assert why
         assert why != "whatif.anew-other"
         return
-    assert priced(replace(team, scenario=())) == priced(model_of(before).team)
-    assert priced(last_epoch(team)) == priced(model_of(after).team)
+    first, last = model_of(before).team, model_of(after).team
+    assume(max(map(_assignments, (first, last))) <= MOST_TRIED)
+    assert priced(replace(team, scenario=())) == priced(first)
+    assert priced(last_epoch(team)) == priced(last)
 
 
 def _team_or_why(before: Sketch, after: Sketch) -> tuple[Team | None, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from itertools import permutations
 from random import Random
 from typing import Any
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.files import xml_sources
 from robochoc.app.sketch.palette import Applied
 from robochoc.app.sketch.rules import PALETTE
@@ -238,3 +240,31 @@ def test_the_protocol_that_is_chosen_keeps_secrets_and_is_right(seed: int) -> No
     linked = [one for rule in rules if rule.on for one in PALETTE[rule.kind].groups(sketch, rule)]
     assert outcome.protocol in ({"disfc", "abt"} if linked else {outcome.protocol})
     assert (outcome.verdict == "solution") == (next(solutions(model.team), None) is not None)
+
+
+# Near places
+
+
+def test_near_places_are_preferred_step_by_step() -> None:
+    area = Area(7, 5)
+    homes = {"A": Cell(0, 0), "B": Cell(6, 0), "C": Cell(3, 4)}
+    free = [Cell(1, 1), Cell(5, 2), Cell(3, 3), Cell(6, 4)]
+    forbidden = area.number(free[0])
+    rules = [SketchRule("R1", "different", "place"), SketchRule("R2", "never", "place", ("A",), {"value": forbidden})]
+    for name, home in homes.items():
+        settings = {"value": area.number(home), "step": 2}
+        rules.append(SketchRule(f"R{len(rules) + 1}", "rather", "place", (name,), {**settings}))
+    values = tuple(area.number(cell) for cell in [*free, *homes.values()])
+    robots = tuple(SketchRobot(name, cell) for name, cell in homes.items())
+    never_home = tuple(
+        SketchRule(f"H{number}", "never", "place", (), {"value": area.number(cell)})
+        for number, cell in enumerate(homes.values())
+    )
+    sketch = Sketch("near", area, robots, (Decision("place", Kind.PLACE, values),), (*rules, *never_home))
+    assert not [trouble for trouble in troubles(sketch) if trouble.is_error]
+    best = min(
+        sum(2 * (abs(cell.x - home.x) + abs(cell.y - home.y)) for cell, home in zip(some, homes.values(), strict=True))
+        for some in permutations(free, 3)
+        if area.number(some[0]) != forbidden
+    )
+    assert model_of(sketch).solve("syncbb", runtime="simulator").cost == best

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from random import Random
 
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import robochoc.app
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.words import listed, robot_words, sentence, short, value_words, weight_of
@@ -97,3 +101,34 @@ def test_whatever_is_drawn_has_words(seed: int) -> None:
             holes = (f"{{{name}}}" for name in ("robots", "decision", "leader", "others", *rule.settings))
             named = str(msgspec.to_builtins(sketch))
             assert not [hole for hole in holes if hole in told and hole not in named]
+
+
+# The catalogue of texts
+
+
+APP = Path(robochoc.app.__file__).parent
+_KEY = re.compile(r"""["']([a-z]+(?:[.-][a-z0-9-]+)+)["']""")
+_BUILT = re.compile(r"""f["']([a-z-]+\.(?:[a-z-]+\.)*)\{""")
+
+
+def _asked() -> tuple[set[str], set[str]]:
+    """All that looks like a key in the code, and the beginnings of those that are put together."""
+    code = "\n".join(file.read_text(encoding="utf-8") for file in APP.rglob("*.py"))
+    return set(_KEY.findall(code)), set(_BUILT.findall(code))
+
+
+def test_every_text_that_is_asked_for_is_there() -> None:
+    code = "\n".join(file.read_text(encoding="utf-8") for file in APP.rglob("*.py"))
+    said = set(re.findall(r"""say\(\s*["']([^"'{]+)["']""", code)) | set(re.findall(r"""EditError\("([^"]+)\"""", code))
+    assert said - set(catalogue()) == set()
+
+
+def test_no_text_is_there_for_nobody() -> None:
+    asked, built = _asked()
+    assert {key for key in catalogue() if key not in asked and not key.startswith(tuple(built) or "-")} == set()
+
+
+def test_what_a_text_names_is_filled_in() -> None:
+    assert say("gallery.robots", count=3) == "3 robots"
+    with pytest.raises(KeyError):
+        say("no.such.text")

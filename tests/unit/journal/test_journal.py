@@ -17,7 +17,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.journal.blocks import MAX_BLOCK_BYTES
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Received, Refused, Sent, Settled
 from robochoc.journal.journal import (
     Follower,
@@ -132,14 +131,15 @@ def test_improvements_come_at_the_end_of_each_run_that_minimises() -> None:
     assert costs == [5, 0, 7]
 
 
-def test_what_is_too_large_for_a_block_is_left_out_and_said() -> None:
-    large = "x" * (MAX_BLOCK_BYTES + 1)
+def test_what_is_too_large_for_a_block_is_left_out_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.journal.recorder.MAX_BLOCK_BYTES", 1_000)
+    large = "x" * 1_001
     sent = Sent(t=0, sender="A", receiver="B", type="Util", content={"table": large}, bytes=1, clock=0)
     given_ = Given(t=0, order=("A",), robots={"A": large})
     events = read_journal(told([settled(0), sent, given_, settled(1)], every=10)).events
     assert [type(event).__name__ for event in events] == ["Settled", "Sent", "Given", "Settled"]
-    assert "more than 67,108,864" in events[1].content["left out"]  # type: ignore[union-attr]
-    assert "more than 67,108,864" in events[2].why  # type: ignore[union-attr]
+    assert "more than 1,000" in events[1].content["left out"]  # type: ignore[union-attr]
+    assert "more than 1,000" in events[2].why  # type: ignore[union-attr]
 
 
 # While it is written

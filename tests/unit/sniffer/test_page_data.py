@@ -10,9 +10,15 @@ from typing import Any
 import msgspec
 import pytest
 
+from robochoc.formats import PREDEFINED
 from robochoc.journal.events import AnyEvent, Began, Concluded, Given, Improved, Lost, Refused, Sent, Settled
-from robochoc.journal.journal import Header, Journal
+from robochoc.journal.journal import Header, Journal, read_journal
+from robochoc.journal.recorder import JournalRecorder
+from robochoc.model.assembly import assemble
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import Constraint, Domain, Variable
+from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import solve
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.embedded import embedded_answers
@@ -212,3 +218,25 @@ def test_notes_stand_at_the_steps_that_they_belong_to() -> None:
     notes = [note for note in json.loads(PageData(trace).about())["notes"] if note["kind"] in {"lost", "refused"}]
     assert [note["kind"] for note in notes] == ["lost", "refused"]
     assert all(0 < note["step"] < len(trace.steps.t) for note in notes)
+
+
+# Symbolic domains
+
+
+COLOURS = Domain("colours", (range(2),), ("red", "green"))
+
+
+def test_decisions_and_words_have_the_names_of_symbols() -> None:
+    scope = ("x", "y")
+    team = assemble(
+        "colours",
+        {"a": [Variable("x", COLOURS)], "b": [Variable("y", COLOURS)]},
+        [Constraint("C", PREDEFINED["ne"], scope, scope)],
+    )
+    recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=0))
+    recorder.outcome = solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR), observer=recorder)
+    data = PageData(Trace.of(read_journal(recorder.content())))
+    decided = [values for _, values in json.loads(data.decisions(0, len(data.trace.decisions)))]
+    assert {"x": "red"} in decided
+    assert {"y": "green"} in decided
+    assert b"x = red" in data.details(0)

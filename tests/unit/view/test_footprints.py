@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from itertools import product
 
+import numpy as np
+import pytest
+
+from robochoc.flight.layout import Axis
+from robochoc.flight.mission import Mission
+from robochoc.flight.voxel_frame import VoxelFrame
+from robochoc.flight.walls import Walls
 from robochoc.view.footprints import Flags, few_rectangles, rectangles
 from robochoc.view.quadrotor import prisms
+from robochoc.view.voxel_faces import faces, faces_drawn
 from tests.support.examples import count
 
 
@@ -51,3 +60,66 @@ def test_blocks_face_outwards() -> None:
         a, b, c = shape.vertices[face]
         outward = np.cross(b - a, c - a)
         assert outward @ ((a + b + c) / 3 - middles[number // 10]) > 0
+
+
+# Faces of voxels
+
+
+MOVES = ((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))
+
+
+def test_an_occupied_voxel_has_a_face_towards_each_free_one() -> None:
+    chance = np.random.default_rng(3)
+    for _ in range(20):
+        kinds = chance.integers(0, 3, chance.integers(1, 5, 3))  # 0: not known, 1: free, 2: occupied
+        wanted = set()
+        for z, y, x in np.argwhere(kinds == 2).tolist():
+            for right, back, up in MOVES:
+                beside = z + up, y + back, x + right
+                inside = all(0 <= at < size for at, size in zip(beside, kinds.shape, strict=True))
+                if inside and kinds[beside] == 1:
+                    wanted.add(((x, y, z), (right, back, up)))
+        found = set()
+        for corners in faces(kinds == 2, kinds == 1):
+            normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+            move = np.rint(normal).astype(int)
+            voxel = np.floor(corners.mean(axis=0) - move / 2).astype(int)
+            found.add((tuple(voxel.tolist()), tuple(move.tolist())))
+            assert len(np.unique(corners, axis=0)) == 4
+        assert found == wanted
+
+
+def mission_with(occupied: Flags, free: Flags) -> Mission:
+    """Return a mission in a box of cells of a metre, whose map has voxels of half a metre from (1, 2, 3) on."""
+    axes = tuple(Axis(name, 1, 4, 1, 4) for name in "xyz")
+    walls = Walls(~free, occupied, VoxelFrame(0.5, (1.0, 2.0, 3.0)), 0.1, 0.5)
+    return Mission("team", (), (), (axes[0], axes[1], axes[2]), 1.0, has_volume=True, walls=walls)
+
+
+def test_faces_are_where_the_voxels_are() -> None:
+    free = np.zeros((2, 2, 2), dtype=bool)
+    occupied = free.copy()
+    free[0, 0, 0], occupied[0, 0, 1] = True, True
+    mission = mission_with(occupied, free)
+    drawn = faces_drawn(mission)
+    assert drawn is not None
+    corners = {tuple(corner) for corner in drawn.reshape(-1, 3).tolist()}
+    assert corners == {(1.5, y, z) for y, z in product((2, 2.5), (3, 3.5))}
+    assert faces_drawn(replace(mission, walls=None)) is None
+
+
+def test_many_voxels_are_drawn_as_fewer_larger_ones() -> None:
+    free = np.ones((16, 16, 15), dtype=bool)
+    free[::2, ::2, ::2] = False
+    mission = mission_with(~free, free)
+    most = 100
+    drawn = faces_drawn(mission, most)
+    assert drawn is not None
+    assert len(drawn) <= most
+    # A floor stays one, and what is behind it is seen from above.
+    free = np.ones((16, 16, 15), dtype=bool)
+    free[:4] = False
+    drawn = faces_drawn(mission_with(~free, free), most)
+    assert drawn is not None
+    assert 0 < len(drawn) <= most
+    assert drawn[:, :, 2] == pytest.approx(5)

@@ -13,6 +13,7 @@ import msgspec
 import pytest
 
 from robochoc.app.flights import state
+from robochoc.app.flights.names import file_name
 from robochoc.app.flights.state import MAX_BYTES, MOST_SAID, is_too_long, packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.runs.options import JOURNAL
@@ -199,3 +200,25 @@ def test_too_large_a_file_of_a_run_is_not_read_to_its_end(
     content = packed(run)
     monkeypatch.setitem(state.MOST_AT_ONCE, name, 10)
     assert not unpack_run(_file(tmp_path, content), tmp_path / "there")
+
+
+# Names of files
+
+
+@looped(
+    ("name", "expected"),
+    [
+        ("Cube", "Cube.zip"),
+        ("../../etc/passwd", "etc-passwd.zip"),
+        ('a"; filename="b.exe', "a-filename-b-exe.zip"),
+        ("a\r\nSet-Cookie: x", "a-Set-Cookie-x.zip"),
+        ("", "team.zip"),
+        ("...", "team.zip"),
+        ("NUL", "team.zip"),
+        ("com1", "team.zip"),
+        ("дрон", "team.zip"),
+        ("x" * 500, "x" * 60 + ".zip"),
+    ],
+)
+def test_whatever_a_team_is_called_its_file_has_a_plain_name(name: str, expected: str) -> None:
+    assert file_name(name, ".zip") == expected

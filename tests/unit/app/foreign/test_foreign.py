@@ -14,6 +14,7 @@ from robochoc.app.foreign.reading import read
 from robochoc.app.foreign.sentences import sentence
 from robochoc.app.pages.decide.answer import headline
 from robochoc.app.pages.foreign.answer import epochs_html, says_of, table_html
+from robochoc.app.pages.foreign.whatif import changes_html, moved
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Record, Run, State
@@ -140,3 +141,24 @@ def test_the_headline_counts_who_is_there_at_the_end(tmp_path: Path) -> None:
     run.result = RunResult(Verdict.OPTIMAL, assignment={"lead": 1}, cost=7)
     worth = msgspec.structs.replace(found, costs=True, maximised=True)
     assert headline(run, worth) == "All 7 decide. It is worth 7: proven the best."
+
+
+# Robots fail
+
+
+BEFORE = {"assignment": {"A": 1, "B": 2, "C": 3, "D": 1}, "robots": ["RA", "RB", "RC", "RD"]}
+AFTER = {"assignment": {"A": 1, "B": "<b>", "D": 1}, "robots": ["RA", "RB", "RD"]}
+
+
+def test_who_decides_something_else_has_moved_and_who_has_gone_has_not() -> None:
+    facts = facts_of(triangle(3))
+    assert moved(facts, BEFORE, AFTER) == ["RB"]
+    assert moved(facts, BEFORE, BEFORE) == []
+    assert moved(facts, {"assignment": 3}, {}) == []  # damaged
+
+
+def test_both_sides_are_told_and_names_are_only_text() -> None:
+    told = changes_html(facts_of(triangle(3)), BEFORE, AFTER)
+    assert told.count("<tr") == 5
+    assert '<tr class="moved"><th scope="row">RB</th><td>B</td><td>2</td><td>&lt;b&gt;</td></tr>' in told
+    assert '<th scope="row">RC</th><td>C</td><td>3</td><td></td>' in told

@@ -10,8 +10,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from random import Random
 
 import msgspec
 import pytest
@@ -19,17 +20,19 @@ import pytest
 from robochoc.app.jobs.job import Job, end_all
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.result import RunResult, decoded
 from robochoc.app.runs.run import RECORD, Record, Run, State
 from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import read_team, write_team
+from robochoc.formats.result import read_result, result_json
+from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import RemoveAgent
 from tests.support.kept_runs import kept_run
 from tests.support.limits import HANG_S, wait_until
+from tests.support.random_outcomes import random_outcome
 from tests.support.slot_sketches import slots
 from tests.support.small_teams import triangle
-
-WAIT_S = 60
 
 
 @dataclass(eq=False)
@@ -51,7 +54,7 @@ def until(run: Run, holds: Callable[[], bool]) -> None:
     """Wait for news until `holds`."""
     news = threading.Event()
     end = run.on_change(news.set)
-    limit = time.monotonic() + WAIT_S
+    limit = time.monotonic() + HANG_S
     while not holds() and time.monotonic() < limit:
         news.wait(1)
         news.clear()
@@ -277,10 +280,33 @@ class TestAfterTheServersDeath:
             os.killpg(group, 0)
             server.send_signal(signal.SIGKILL)
         ended_by = threading.Event()
-        for _ in range(WAIT_S * 10):
+        for _ in range(int(HANG_S) * 10):
             try:
                 os.killpg(group, 0)
             except ProcessLookupError:
                 return
             ended_by.wait(0.1)
         pytest.fail("there are processes left")
+
+
+# Results
+
+
+def test_no_field_is_dropped() -> None:
+    """Epochs are kept as they are in the file; decimals become floats."""
+    assert {one.name for one in fields(Outcome)} <= set(RunResult.__struct_fields__)
+    chance = Random(2)
+    encode = msgspec.json.Encoder(decimal_format="number").encode
+    for _ in range(100):
+        content = result_json(random_outcome(chance))
+        found = decoded(content + b"\n")
+        assert found is not None
+        again = read_result(encode(msgspec.structs.asdict(found)))
+        once = read_result(content)
+        assert replace(again, cost=once.cost, bound=once.bound, epochs=once.epochs) == once
+        assert msgspec.json.encode(found.epochs) == msgspec.json.encode(msgspec.json.decode(content)["epochs"])
+
+
+def test_a_result_with_many_missing_fields_is_read() -> None:
+    assert decoded(b'{"verdict":"solution"}\n') == RunResult(Verdict.SOLUTION)
+    assert decoded(b'{"verdict":"none"}\n') is None
