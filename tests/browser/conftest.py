@@ -5,21 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import pytest
 
-from robochoc.sniffer.session import SnifferSession
-from tests.support.browser_pages import chromium
+from tests.support.browser_pages import Browser, Page, chromium
 from tests.support.leftovers import shared_by_tests
-from tests.support.sniffer_pages import WHOLE, Page, shown
-from tests.support.sniffer_server import SnifferServer, sniffer_server
+
+if TYPE_CHECKING:
+    from tests.support.sniffer_server import SnifferServer
+
+
+def pytest_ignore_collect(config: pytest.Config) -> bool | None:
+    """Do not import these tests, with Playwright, numpy and Pillow, where `make test` runs none of them."""
+    markers = config.getoption("markexpr")
+    return True if "not slow" in markers and "not more" in markers else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of this folder: `make test-more` runs them."""
+    """Mark the tests of this folder that are not slow: `make test-more` runs them."""
     for item in items:
-        if item.path.is_relative_to(Path(__file__).parent):
+        if item.path.is_relative_to(Path(__file__).parent) and not item.get_closest_marker("slow"):
             item.add_marker(pytest.mark.more)
 
 
@@ -30,7 +36,7 @@ def may_stay() -> str:
 
 
 @pytest.fixture(scope="package")
-def browser() -> Iterator[Any]:
+def browser() -> Iterator[Browser]:
     """Chromium, by Playwright, for the package: tests elsewhere run event loops in the main thread, as it does."""
     with chromium() as browser:
         yield browser
@@ -47,6 +53,10 @@ def without_the_scenes_viewer() -> Iterator[None]:
 @pytest.fixture(scope="package")
 def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SnifferServer]:
     """A page of the journal `sniffer_pages.WHOLE`."""
+    from robochoc.sniffer.session import SnifferSession  # noqa: PLC0415 - heavy
+    from tests.support.sniffer_pages import WHOLE  # noqa: PLC0415 - heavy
+    from tests.support.sniffer_server import sniffer_server  # noqa: PLC0415 - heavy
+
     del without_the_scenes_viewer  # it only has to be there before the page is made
     file = tmp_path_factory.mktemp("sniffed") / "run.journal"
     file.write_bytes(WHOLE)
@@ -58,7 +68,9 @@ def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFac
 
 
 @pytest.fixture(scope="package")
-def tab(browser: Any, server: SnifferServer) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+def tab(browser: Browser, server: SnifferServer) -> Iterator[Page]:
     """A tab that shows it, in whatever state a test has left it: see `sniffer_pages.begin_again`."""
+    from tests.support.sniffer_pages import shown  # noqa: PLC0415 - heavy
+
     with shown(browser, server.url) as page:
         yield page

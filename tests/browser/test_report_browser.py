@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from lxml import etree
 
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import Browser, watched_page
 from tests.support.program import robochoc_within
 from tests.support.studies import COSTS, finished
 
@@ -26,7 +25,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_page_shows_figures_tables_and_how_to_repeat_it(results: Path, browser: Any) -> None:  # noqa: ANN401 - Playwright's
+def test_the_page_shows_figures_tables_and_how_to_repeat_it(results: Path, browser: Browser) -> None:
     page_file = results.with_name("report.html")
     with watched_page(browser, viewport={"width": 1200, "height": 800}) as (page, complaints, asked):
         page.goto(page_file.as_uri())

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from robochoc.replay.robot_states import states_of
+from tests.support.browser_pages import Page
 from tests.support.sniffer_pages import (
     ALL,
     COUNT,
     FEED,
     JOURNAL,
     TRACE,
-    Page,
     begin_again,
     choose,
     heads,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from pathlib import Path
 
 import pytest
 
 from robochoc.journal.journal import lines_of
 from robochoc.sniffer.session import SnifferSession
+from tests.support.browser_pages import Page
 from tests.support.sniffer_pages import (
     ALL,
     CONTRAST,
@@ -17,7 +18,6 @@ from tests.support.sniffer_pages import (
     JOURNAL,
     OUTCOME,
     TRACE,
-    Page,
     begin_again,
     choose,
     heads,
@@ -26,7 +26,7 @@ from tests.support.sniffer_pages import (
     text_is,
     until,
 )
-from tests.support.sniffer_server import SnifferServer, sniffer_server
+from tests.support.sniffer_server import sniffer_server
 
 IN_SIGHT = """(m) => {
   const { filter, view, chart, list } = Sniffer.page;
@@ -204,10 +204,9 @@ def test_keys_go_from_value_to_value(page: Page) -> None:
         until(lambda: page.input_value("#moment") == str(step), f"{key} goes elsewhere")  # noqa: B023
 
 
-def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Page, tmp_path: Any) -> None:  # noqa: ANN401
+def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Page, tmp_path: Path) -> None:
     file = tmp_path / "run.journal"
     file.write_bytes(b"")
-    server: SnifferServer
     with sniffer_server(SnifferSession(file, live=True)) as server:
         page = tab.context.new_page()
         page.goto(server.url)
@@ -219,12 +218,12 @@ def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Pag
     page.close()
 
 
-@pytest.mark.parametrize("width", [360, 800, 1000, 1400])
-def test_nothing_stands_beside_the_window_however_wide_it_is(page: Page, width: int) -> None:
+def test_nothing_stands_beside_the_window_however_wide_it_is(page: Page) -> None:
     usual = page.viewport_size
     try:
-        page.set_viewport_size({"width": width, "height": 700})
-        until(lambda: page.evaluate("innerWidth") == width, "the window has another size")
-        assert page.evaluate("document.documentElement.scrollWidth") == width
+        for width in (360, 800, 1000, 1400):
+            page.set_viewport_size({"width": width, "height": 700})
+            until(lambda: page.evaluate("innerWidth") == width, "the window has another size")  # noqa: B023
+            assert page.evaluate("document.documentElement.scrollWidth") == width
     finally:
         page.set_viewport_size(usual)

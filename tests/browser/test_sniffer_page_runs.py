@@ -6,7 +6,6 @@ import io
 import json
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from robochoc.journal.journal import lines_of
 from robochoc.sniffer.embedded import embedded_answers
 from robochoc.sniffer.page import sniffer_page as page_of
 from robochoc.sniffer.session import SnifferSession
+from tests.support.browser_pages import Browser, Page
 from tests.support.sniffer_pages import (
     ALL,
     CONTRAST,
@@ -23,7 +23,6 @@ from tests.support.sniffer_pages import (
     JOURNAL,
     NAMELESS,
     OUTCOME,
-    Page,
     choose,
     heads,
     rows,
@@ -42,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
 # Live, ended, broken
 
 
-def test_a_run_is_followed_until_somebody_looks_elsewhere(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+def test_a_run_is_followed_until_somebody_looks_elsewhere(browser: Browser, tmp_path: Path) -> None:
     lines = list(lines_of(JOURNAL))
     file = tmp_path / "run.journal"
     place = 600
@@ -70,7 +69,7 @@ def test_a_run_is_followed_until_somebody_looks_elsewhere(browser: Any, tmp_path
             assert page.inner_text("#verdict") == FEED.news()["verdict"]
 
 
-def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Browser, tmp_path: Path) -> None:
     file = tmp_path / "run.journal"
     file.write_bytes(b"".join(list(lines_of(JOURNAL))[:600]))
     with ExitStack() as ends:
@@ -83,7 +82,7 @@ def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_pat
             assert rows(page)
 
 
-def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+def test_damage_and_an_empty_journal_are_told(browser: Browser, tmp_path: Path) -> None:
     file = tmp_path / "run.journal"
     file.write_bytes(b"".join(list(lines_of(JOURNAL))[:300]) + b"nonsense\n")
     with sniffer_server(SnifferSession(file)) as server:
@@ -95,7 +94,7 @@ def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> N
         until(lambda: "There are no messages" in page.inner_text("#notices"), "an empty page without a notice")
 
 
-def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+def test_names_of_strangers_are_text(browser: Browser, tmp_path: Path) -> None:
     text = b"".join(lines_of(JOURNAL)).decode().replace("queens3d-4", HOSTILE)
     lines = [json.loads(line) for line in text.splitlines()]
     for line in lines:
@@ -116,7 +115,7 @@ def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # n
         assert "cannot be worked out" in page.inner_text("#notices")
 
 
-def test_an_export_needs_no_server(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
+def test_an_export_needs_no_server(browser: Browser, tmp_path: Path) -> None:
     file = tmp_path / "run.html"
     file.write_bytes(page_of("embedded", embedded_answers(FEED, JOURNAL), title="A run"))
     with shown(browser, file.as_uri()) as page:
@@ -129,7 +128,7 @@ def test_an_export_needs_no_server(browser: Any, tmp_path: Path) -> None:  # noq
 # For everybody
 
 
-def test_it_can_be_read_in_light_and_dark(browser: Any, server: SnifferServer) -> None:  # noqa: ANN401
+def test_it_can_be_read_in_light_and_dark(browser: Browser, server: SnifferServer) -> None:
     with shown(browser, server.url, color_scheme="light", reduced_motion="reduce") as page:
         until(lambda: corner(page) > 195, "it stays dark")
         choose(page, 250)
@@ -159,8 +158,7 @@ def corner(page: Page) -> int:
 
 
 def test_a_narrow_window_has_all_in_reach_and_the_toolbar_is_one_row_in_any(
-    browser: Any,  # noqa: ANN401
-    server: SnifferServer,
+    browser: Browser, server: SnifferServer
 ) -> None:
     with shown(browser, server.url, viewport={"width": 360, "height": 700}) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 360

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +12,9 @@ import pytest
 from PIL import Image
 
 from robochoc.view.page import scene_page
+from tests.support.browser_pages import Browser, Page
 from tests.support.flights import LEG_S
-from tests.support.scene_pages import END_S, HOSTILE, Page, now, opened, place, pressed, scene
+from tests.support.scene_pages import END_S, HOSTILE, now, opened, place, pressed, scene
 from tests.support.sniffer_pages import CONTRAST, NAMELESS, until
 
 
@@ -26,7 +26,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def one(browser: Any, file: Path) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+def one(browser: Browser, file: Path) -> Iterator[Page]:
     with opened(browser, file.as_uri(), reduced_motion="reduce") as page:
         yield page
 

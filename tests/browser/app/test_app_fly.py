@@ -14,8 +14,8 @@ import pytest
 from robochoc.app.sketch.sketch import Kind, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import WatchedPage, connected, watched_page
-from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided, fly_opened
+from tests.support.browser_pages import Browser, WatchedPage, app_page, connected, watched_page
+from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided
 from tests.support.kept_runs import cube, kept_run
 from tests.support.limits import wait_until
 
@@ -31,13 +31,10 @@ def _numbers(tab: WatchedPage) -> tuple[float, int, float]:
 
 
 def test_from_a_finished_run_to_scene_and_conversation_in_step(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
 ) -> None:
     team, run = decided(teams, cube(3, "Trio"))
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly", reduced_motion="reduce") as tab:
+    with app_page(browser, f"{application.url}team/{team.id}/fly", reduced_motion="reduce") as tab:
         page = tab.page
         page.wait_for_selector(READY)
         page.wait_for_selector("text=It costs 6.")
@@ -68,21 +65,23 @@ def test_from_a_finished_run_to_scene_and_conversation_in_step(
         assert (tmp_path / "flight.mcap").read_bytes().startswith(b"\x89MCAP0\r\n")
         assert {one.split("/")[2] for one in tab.asked if one.startswith("http")} == {f"127.0.0.1:{application.port}"}
     assert run.artefact("flight.html")
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly?run={run.id}#t=3.5", reduced_motion="reduce") as tab:
+    with app_page(
+        browser,
+        f"{application.url}team/{team.id}/fly?run={run.id}#t=3.5",
+        {"width": 1280, "height": 800},
+        reduced_motion="reduce",
+    ) as tab:
         tab.page.wait_for_selector(READY)
         assert _numbers(tab)[2] == 3.5
 
 
 def test_a_report_opens_by_itself_without_a_network(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
 ) -> None:
     sketch = msgspec.structs.replace(cube(2, "Duo"), story=HOSTILE)
     team, _ = decided(teams, sketch)
     report = tmp_path / "report.html"
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+    with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         tab.page.wait_for_selector(READY)
         with tab.page.expect_download() as saved:
             tab.page.click("[aria-label='Report: Save']")
@@ -95,7 +94,7 @@ def test_a_report_opens_by_itself_without_a_network(
         assert tab.page.evaluate("self.origin") == "null"
         plays = "Boolean(globalThis.Playback)"  # `wait_for_function` evaluates text, which the report does not allow
         wait_until(lambda: tab.page.frames[1].evaluate(plays), "the scene in it has not begun")
-    with fly_opened(browser, report.as_uri()) as tab:
+    with app_page(browser, report.as_uri()) as tab:
         tab.page.wait_for_selector(f"text={HOSTILE}")
         frames = tab.page.frames[1:]
         frames[0].wait_for_function("globalThis.Playback")
@@ -106,12 +105,12 @@ def test_a_report_opens_by_itself_without_a_network(
 
 
 def test_who_decides_no_place_does_not_fly_and_is_told_why(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team, _ = decided(teams, cube(2, "Slots", Kind.SLOT))
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly", 360, color_scheme="dark") as tab:
+    with app_page(
+        browser, f"{application.url}team/{team.id}/fly", {"width": 360, "height": 800}, color_scheme="dark"
+    ) as tab:
         tab.page.wait_for_selector("text=Nobody flies: this team decides neither heights nor places.")
         tab.page.wait_for_selector(READY)
         assert tab.page.locator(".stage-parts span").all_inner_texts() == ["They talk"]
@@ -121,18 +120,16 @@ def test_who_decides_no_place_does_not_fly_and_is_told_why(
         tab.page.wait_for_url("**/model")
 
 
-def test_where_nobody_says_a_word_no_page_is_waited_for(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_where_nobody_says_a_word_no_page_is_waited_for(browser: Browser, application: AppServer, teams: Store) -> None:
     never = SketchRule("R1", "never", "level", settings={"value": 1})
     team, _ = decided(teams, msgspec.structs.replace(cube(1, "Alone", Kind.SLOT), rules=(never,)))
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+    with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         tab.page.wait_for_selector(READY)
         assert tab.page.locator("text=The pages are being read.").count() == 0
 
 
 def test_a_flight_that_is_looked_at_stays_where_it_is_as_the_conversation_comes(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team, _ = decided(teams, cube(2, "Duo"))
     with watched_page(browser) as tab:
@@ -168,7 +165,7 @@ PARTS: list[tuple[list[tuple[int | None, int]], int, list[float], float, list[tu
 ]
 
 
-def test_they_talk_then_fly_epoch_by_epoch(browser: Any) -> None:  # noqa: ANN401 - Playwright's
+def test_they_talk_then_fly_epoch_by_epoch(browser: Browser) -> None:
     source = (files("robochoc.app.pages.fly") / "stage.js").read_text(encoding="utf-8")
     script = source.partition("export default")[0].replace("export function", "function")
     with watched_page(browser) as tab:
@@ -183,22 +180,19 @@ def test_they_talk_then_fly_epoch_by_epoch(browser: Any) -> None:  # noqa: ANN40
             assert [one["begins"] for one in parts[1:]] == [one["ends"] for one in parts[:-1]]
 
 
-def test_what_has_not_decided_is_sent_to_decide(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
-    with fly_opened(browser, f"{application.url}team/{teams.add(cube())}/fly") as tab:
+def test_what_has_not_decided_is_sent_to_decide(browser: Browser, application: AppServer, teams: Store) -> None:
+    with app_page(browser, f"{application.url}team/{teams.add(cube())}/fly") as tab:
         tab.page.wait_for_selector("text=Nothing has been decided yet.")
         tab.page.click("text=Go to Decide")
         tab.page.wait_for_url("**/decide")
 
 
 def test_the_state_is_opened_from_the_gallery(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
 ) -> None:
     team, _ = decided(teams, cube(2, "Moved"))
     state = tmp_path / "Moved.robochoc.zip"
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+    with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         with tab.page.expect_download() as saved:
             tab.page.click("[aria-label='All of it: Save']")
         assert saved.value.suggested_filename == state.name

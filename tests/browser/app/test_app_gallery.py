@@ -8,8 +8,6 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from robochoc.app.faults import ERRORS
 from robochoc.app.sketch import files
 from robochoc.app.sketch.examples import examples, title_of
@@ -18,7 +16,7 @@ from robochoc.app.store import Store
 from robochoc.app.texts import say
 from robochoc.system.temporary_files import temporary_folder
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import WatchedPage, connected, watched_page
+from tests.support.browser_pages import Browser, WatchedPage, app_page
 from tests.support.limits import wait_until
 
 _TEAM = re.compile(r"/team/([0-9a-f]{12})/model$")
@@ -36,25 +34,19 @@ def _sent(tab: WatchedPage, file: Path) -> None:
     tab.page.set_input_files("input[type=file]", str(file))
 
 
-def test_an_example_becomes_a_team_of_the_users_own(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+def test_an_example_becomes_a_team_of_the_users_own(browser: Browser, application: AppServer, teams: Store) -> None:
+    with app_page(browser, application.url) as tab:
         tab.page.click(f"text={title_of('charging')}")
         assert teams.load(_made(tab)).now == examples()["charging"]
-        assert tab.complaints == []
 
 
 def test_a_team_that_was_saved_comes_back_from_its_archive(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
 ) -> None:
     sketch = examples()["patrol"]
     archive = tmp_path / "patrol.zip"
     archive.write_bytes(files.zipped(sketch))
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+    with app_page(browser, application.url) as tab:
         with tab.page.expect_file_chooser() as asked:
             tab.page.click("text=From a file")
         asked.value.set_files(str(archive))
@@ -62,18 +54,14 @@ def test_a_team_that_was_saved_comes_back_from_its_archive(
 
 
 def test_files_of_another_tool_are_opened_as_what_they_are(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
 ) -> None:
     file = tmp_path / "graph.yaml"
     file.write_text(
         "name: pair\nobjective: min\ndomains: {d: {values: [0, 1]}}\nvariables: {x: {domain: d}, y: {domain: d}}\n"
         "constraints: {c: {type: intention, function: 1 if x == y else 0}}\nagents: [a, b]\n"
     )
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+    with app_page(browser, application.url) as tab:
         _sent(tab, file)
         name = _made(tab)
         tab.page.wait_for_selector("text=This team was not drawn here")
@@ -85,44 +73,30 @@ def test_files_of_another_tool_are_opened_as_what_they_are(
     assert [robot.name for robot in teams.load(name).now.robots] == sorted(one.stem for one in foreign.glob("*.xml"))
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "says"),
-    [
-        ("<img src=x onerror=alert(1)>.xml", b"<?xml", "img"),
-        ("team.zip", b"PK\x03\x04broken", "team.zip"),
-        ("empty", b"", "empty"),
-        ("billion.xml", b'<!DOCTYPE a [<!ENTITY b "b">]><instance>&b;</instance>', "billion.xml"),
-    ],
-)
-def test_what_cannot_be_read_is_told_in_one_line(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    tmp_path: Path,
-    name: str,
-    content: bytes,
-    says: str,
-) -> None:
-    file = tmp_path / name
-    file.write_bytes(content)
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
-        _sent(tab, file)
-        tab.page.wait_for_function(f"document.querySelector('.error').textContent.includes({says!r})")
-        assert str(tmp_path) not in tab.page.inner_text(".error")
-        assert tab.page.query_selector("main img") is None
+def test_what_cannot_be_read_is_told_in_one_line(browser: Browser, application: AppServer, tmp_path: Path) -> None:
+    with app_page(browser, application.url) as tab:
+        for name, content, says in (
+            ("<img src=x onerror=alert(1)>.xml", b"<?xml", "img"),
+            ("team.zip", b"PK\x03\x04broken", "team.zip"),
+            ("empty", b"", "empty"),
+            ("billion.xml", b'<!DOCTYPE a [<!ENTITY b "b">]><instance>&b;</instance>', "billion.xml"),
+        ):
+            file = tmp_path / name
+            file.write_bytes(content)
+            _sent(tab, file)
+            tab.page.wait_for_function(f"document.querySelector('.error').textContent.includes({says!r})")
+            assert str(tmp_path) not in tab.page.inner_text(".error")
+            assert tab.page.query_selector("main img") is None
 
 
 def test_an_archive_that_leads_out_of_its_folder_writes_nothing_there(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, tmp_path: Path
 ) -> None:
     name, archive = f"evil-{os.getpid()}.xml", tmp_path / "out.zip"
     with zipfile.ZipFile(archive, "w") as made:
         for depth in (1, 2, 3):
             made.writestr(f"{'../' * depth}{name}", "<instance/>")
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+    with app_page(browser, application.url) as tab:
         _sent(tab, archive)
         tab.page.wait_for_function("document.querySelector('.error').textContent.length > 0")
     folder = temporary_folder()  # the archive is unpacked in a folder two levels below it
@@ -130,10 +104,9 @@ def test_an_archive_that_leads_out_of_its_folder_writes_nothing_there(
     assert [place for place in places if place.exists()] == []
 
 
-def test_a_team_is_removed_when_that_is_confirmed(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_team_is_removed_when_that_is_confirmed(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(Sketch("unwanted"))
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+    with app_page(browser, application.url) as tab:
         tab.page.click("[aria-label='Remove unwanted']")
         tab.page.click("text=Keep it")
         tab.page.click("[aria-label='Remove unwanted']")
@@ -143,37 +116,30 @@ def test_a_team_is_removed_when_that_is_confirmed(browser: Any, application: App
     wait_until(lambda: team not in teams.ids(), "it is there still")
 
 
-@pytest.mark.parametrize("form", [{"file": "text"}, {}], ids=["text", "nothing"])
 def test_text_in_place_of_a_file_is_refused_with_a_sentence(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    tmp_path: Path,
-    form: dict[str, Any],
+    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
 ) -> None:
     wrong = tmp_path / "wrong.txt"
     wrong.write_text("no team")
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+    forms: list[dict[str, Any]] = [{"file": "text"}, {}]
+    with app_page(browser, application.url) as tab:
         with tab.page.expect_response("**/upload/*") as sent:
             _sent(tab, wrong)
         assert sent.value.ok
-        answer = tab.page.request.post(sent.value.url, multipart=form)
-        assert (answer.status, answer.json()) == (400, {"detail": say("gallery.no-file")})
+        for form in forms:
+            answer = tab.page.request.post(sent.value.url, multipart=form)
+            assert (answer.status, answer.json()) == (400, {"detail": say("gallery.no-file")})
     assert not (teams.folder / ERRORS).exists() or "upload_route" not in (teams.folder / ERRORS).read_text()
 
 
 def test_the_first_mistakes_of_a_file_are_told_each_in_its_line(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    tmp_path: Path,
+    browser: Browser, application: AppServer, tmp_path: Path
 ) -> None:
     archive = tmp_path / "trio.zip"
     with zipfile.ZipFile(archive, "w") as made:
         for number in range(5):
             made.writestr(f"R{number}.xml", "<instance")
-    with watched_page(browser) as tab:
-        connected(tab.page, application.url)
+    with app_page(browser, application.url) as tab:
         _sent(tab, archive)
         tab.page.wait_for_selector("[role=alert]:has-text('trio/R0.xml')")
         told = tab.page.locator(".mistakes").inner_text().splitlines()

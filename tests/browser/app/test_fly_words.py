@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from robochoc.app.flights.flown import FLOWN, refused
@@ -13,8 +11,8 @@ from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import watched_page
-from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided, fly_opened
+from tests.support.browser_pages import Browser, app_page, watched_page
+from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided
 from tests.support.kept_runs import STARTED, cube, kept_run
 
 SHOWN = "(id) => getComputedStyle(document.getElementById(id)).display !== 'none'"
@@ -33,12 +31,10 @@ def walled() -> Sketch:
 
 
 def test_there_is_one_line_of_time_and_the_flight_begins_on_the_map(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team, run = decided(teams, walled())
-    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+    with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         page = tab.page
         page.wait_for_selector(READY)
         page.wait_for_selector("text=All 2 robots fly to where they decided to be.")
@@ -82,15 +78,11 @@ def earlier(teams: Store, team: str, number: int, purpose: str, state: State = S
     return Run(place, record, cube())
 
 
-def test_runs_are_named_and_one_that_is_gone_is_told(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-) -> None:
+def test_runs_are_named_and_one_that_is_gone_is_told(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(cube())
     (kept_run(teams.path(team), cube()).folder / JOURNAL).unlink()
     earlier(teams, team, 2, "whatif", State.STOPPED)
-    with fly_opened(browser, f"{application.url}team/{team}/fly?run=00042", 360) as tab:
+    with app_page(browser, f"{application.url}team/{team}/fly?run=00042", {"width": 360, "height": 800}) as tab:
         page = tab.page
         page.wait_for_selector("text=The run 00042 is not kept any more")
         page.wait_for_selector("[data-ready=true]")
@@ -104,16 +96,14 @@ def test_runs_are_named_and_one_that_is_gone_is_told(
 
 
 def test_a_flight_that_was_refused_says_why_and_is_tried_again(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team = teams.add(cube())
     run = kept_run(teams.path(team), cube())
     (run.folder / JOURNAL).unlink()
     (run.folder / "flight.html").write_text("<!doctype html><title>still</title>")
     (run.folder / FLOWN).write_bytes(refused("two are in <b>one</b> place."))
-    with fly_opened(browser, f"{application.url}team/{team}/fly") as tab:
+    with app_page(browser, f"{application.url}team/{team}/fly") as tab:
         page = tab.page
         page.wait_for_selector("text=It cannot be flown: two are in <b>one</b> place.")
         page.click("text=Try again")

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from http.client import HTTPConnection
-from typing import Any
-
-import pytest
+from itertools import product
 
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.store import Store
 from robochoc.app.texts import say
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import connected, watched_page
+from tests.support.browser_pages import Browser, connected, watched_page
+from tests.support.cases import cases
 from tests.support.hostile_client import NAMES
 from tests.support.limits import HANG_S
 
@@ -41,18 +40,19 @@ def _kept(teams: Store, text: str) -> str:
     return team
 
 
-@pytest.mark.parametrize("area", ["", *AREAS])
-def test_no_name_is_executed(browser: Any, application: AppServer, teams: Store, area: str) -> None:  # noqa: ANN401 - Playwright's
-    for text in SCRIPTS:
-        team = _kept(teams, text)
-        with watched_page(browser) as tab:
-            connected(tab.page, f"{application.url}team/{team}/{area}" if area else application.url)
-            tab.page.wait_for_selector("h1, h2, .toolbar")
-            assert not tab.page.evaluate("globalThis.executed")
-            assert tab.page.locator("img").count() == 0
-            assert tab.page.title() != "painted"
-            assert [one for one in tab.complaints if "Error" in one] == []
-        teams.remove(team)
+def test_no_name_is_executed(browser: Browser, application: AppServer, teams: Store) -> None:
+    with watched_page(browser, may_complain=True) as tab, cases() as each:
+        for text, area in product(SCRIPTS, ("", *AREAS)):
+            with each((area, text)):
+                tab.complaints.clear()
+                team = _kept(teams, text)
+                connected(tab.page, f"{application.url}team/{team}/{area}" if area else application.url)
+                tab.page.wait_for_selector("h1, h2, .toolbar")
+                assert not tab.page.evaluate("globalThis.executed")
+                assert tab.page.locator("img").count() == 0
+                assert tab.page.title() != "painted"
+                assert [one for one in tab.complaints if "Error" in one] == []
+                teams.remove(team)
 
 
 def test_no_name_breaks_a_page(application: AppServer, teams: Store) -> None:

@@ -6,12 +6,10 @@ import zipfile
 from collections.abc import Callable
 from typing import Any
 
-import pytest
-
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import WatchedPage, connected, watched_page
+from tests.support.browser_pages import Browser, Page, WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
 
 HOSTILE = """<img src=x onerror="alert(1)">'"`${1}{{1}}\\"""
@@ -36,22 +34,20 @@ def becomes(teams: Store, team: str, holds: Callable[[Sketch], bool]) -> Sketch:
     return teams.load(team).now
 
 
-def click_cell(page: Any, x: int, y: int) -> None:  # noqa: ANN401 - Playwright's
+def click_cell(page: Page, x: int, y: int) -> None:
     """Click a cell of a map of 8 columns and 6 rows."""
     box = page.locator(".board .cells").bounding_box()
     page.mouse.click(box["x"] + (x + 0.5) * box["width"] / 8, box["y"] + (5.5 - y) * box["height"] / 6)
 
 
-def pick(page: Any, rule: str) -> None:  # noqa: ANN401 - Playwright's
+def pick(page: Page, rule: str) -> None:
     page.get_by_role("button", name="Add a rule").click()
     page.locator(".palette .card", has=page.get_by_text(rule, exact=True)).click()
     page.wait_for_selector(".form")
 
 
 def test_five_drones_and_five_charging_slots_are_modelled_by_clicks(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team = teams.add(Sketch("charging"))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
@@ -91,7 +87,6 @@ def test_five_drones_and_five_charging_slots_are_modelled_by_clicks(
         with zipfile.ZipFile(saved.value.path()) as archive:
             assert {f"charging/Drone{number}.xml" for number in range(1, 6)} <= {*archive.namelist()}
             assert archive.testzip() is None
-        assert tab.complaints == []
 
 
 OLD_ROBOTS = """async () => {
@@ -108,9 +103,7 @@ OLD_ROBOTS = """async () => {
 
 
 def test_keys_are_not_undone_by_updates_that_were_under_way(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     team = teams.add(Sketch("fast", robots=drones(1)))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
@@ -119,10 +112,9 @@ def test_keys_are_not_undone_by_updates_that_were_under_way(
         becomes(teams, team, lambda sketch: sketch.robots[0].at == Cell(1, 1))
         page.evaluate(OLD_ROBOTS)
         becomes(teams, team, lambda sketch: sketch.robots[0].at == Cell(2, 2))
-        assert tab.complaints == []
 
 
-def test_a_team_is_modelled_by_keys_alone(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_team_is_modelled_by_keys_alone(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(Sketch("keys"))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
         page = opened(tab, application, team)
@@ -158,10 +150,9 @@ def test_a_team_is_modelled_by_keys_alone(browser: Any, application: AppServer, 
         page.keyboard.press("Delete")
         becomes(teams, team, lambda sketch: [robot.name for robot in sketch.robots] == ["Drone2"])
         page.wait_for_function("document.activeElement.matches('[data-robot=Drone2]')")
-        assert tab.complaints == []
 
 
-def test_robots_are_dragged_and_both_tabs_stay_in_step(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_robots_are_dragged_and_both_tabs_stay_in_step(browser: Browser, application: AppServer, teams: Store) -> None:
     team = teams.add(Sketch("drag", robots=drones(2), decisions=(LEVEL,)))
     with watched_page(browser) as one, watched_page(browser) as other:
         page, there = opened(one, application, team), opened(other, application, team)
@@ -180,10 +171,9 @@ def test_robots_are_dragged_and_both_tabs_stay_in_step(browser: Any, application
         there.wait_for_function(
             "was => document.querySelector('[data-robot=Drone1]').getAttribute('transform') !== was", arg=before
         )
-        assert one.complaints + other.complaints == []
 
 
-def test_cells_under_links_can_be_clicked(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_cells_under_links_can_be_clicked(browser: Browser, application: AppServer, teams: Store) -> None:
     corners = tuple(SketchRobot(f"At{x}{y}", Cell(x, y)) for x, y in ((0, 0), (7, 0), (0, 5), (7, 5)))
     rules = (
         SketchRule("R1", "at-most", "level", (), {"value": 1, "count": 1}),
@@ -208,10 +198,9 @@ def test_cells_under_links_can_be_clicked(browser: Any, application: AppServer, 
         page.wait_for_selector(".words >> text=different")
         page.keyboard.press("Enter")
         page.wait_for_selector(".rule.opened >> text=all robots choose different values")
-        assert tab.complaints == []
 
 
-def test_what_is_wrong_is_told_where_it_is(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_what_is_wrong_is_told_where_it_is(browser: Browser, application: AppServer, teams: Store) -> None:
     rules = (SketchRule("R1", "apart", "level", (), {"gap": 9}), SketchRule("R2", "only", "level", ("Drone1",)))
     slot = Decision("slot", Kind.SLOT, (1,), ("Ghost", "Drone1"))
     blocked = Area(8, 6, frozenset({Cell(0, 0)}))
@@ -234,11 +223,10 @@ def test_what_is_wrong_is_told_where_it_is(browser: Any, application: AppServer,
         page.wait_for_selector("text='' cannot be a name")
         page.get_by_label("Columns").fill("61")
         page.wait_for_selector("text=Choose a number from 1 to 60.")
-        assert tab.complaints == []
     assert teams.load(team).now.area.columns == 8
 
 
-def test_hostile_words_stay_words(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_hostile_words_stay_words(browser: Browser, application: AppServer, teams: Store) -> None:
     task = Decision(
         "task", Kind.TASK, (HOSTILE, "```\N{LEFT-POINTING ANGLE BRACKET}", "</textarea><script>alert(1)</script>")
     )
@@ -270,11 +258,12 @@ def test_hostile_words_stay_words(browser: Any, application: AppServer, teams: S
         values.fill(f"{HOSTILE}, <svg/onload=alert(1)>")
         becomes(teams, team, lambda sketch: len(sketch.decisions[0].values) == 2)
         assert page.evaluate("document.querySelectorAll('main img, main script, main textarea').length") == 0
-        assert tab.complaints == []
     assert [robot.name for robot in teams.load(team).now.robots] == ["Drone1", "Drone2"]
 
 
-def test_121_robots_on_a_large_map_are_drawn_and_dragged(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_121_robots_on_a_large_map_are_drawn_and_dragged(
+    browser: Browser, application: AppServer, teams: Store
+) -> None:
     rules = (
         SketchRule("R1", "different", "level"),
         SketchRule("R2", "neighbours-apart", "level", (), {"radius": 3, "gap": 2}),
@@ -288,10 +277,9 @@ def test_121_robots_on_a_large_map_are_drawn_and_dragged(browser: Any, applicati
         page.locator("[data-robot=Drone121]").focus()
         page.keyboard.press("ArrowUp")
         becomes(teams, team, lambda sketch: sketch.robots[120].at == Cell(10, 11))
-        assert tab.complaints == []
 
 
-def test_a_large_table_is_clicked_together_by_keys(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+def test_a_large_table_is_clicked_together_by_keys(browser: Browser, application: AppServer, teams: Store) -> None:
     rules = (SketchRule("R1", "table", "level", ("Drone1", "Drone2"), {"rows": [[1, 1]]}),)
     levels = Decision("level", Kind.LEVEL, tuple(range(1, 101)))
     team = teams.add(Sketch("pairs", robots=drones(2), decisions=(levels,), rules=rules))
@@ -310,13 +298,10 @@ def test_a_large_table_is_clicked_together_by_keys(browser: Any, application: Ap
         page.wait_for_function("document.activeElement.matches('.head')")
         page.keyboard.press("Enter")
         becomes(teams, team, lambda sketch: len(sketch.rules[0].settings["rows"]) == 103)  # type: ignore[arg-type] # a list
-        assert tab.complaints == []
 
 
 def test_a_range_becomes_what_its_start_became_before_the_server_has_answered(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     rules = (SketchRule("R1", "table", "level", ("Drone1", "Drone2"), {"rows": [[1, 1]]}),)
     levels = Decision("level", Kind.LEVEL, tuple(range(1, 6)))
@@ -334,13 +319,10 @@ def test_a_range_becomes_what_its_start_became_before_the_server_has_answered(
         square = [[one, other] for one in (3, 4) for other in (3, 4)]
         made = becomes(teams, team, lambda sketch: len(sketch.rules[0].settings["rows"]) == 5)  # type: ignore[arg-type] # a list
         assert sorted(made.rules[0].settings["rows"]) == [[1, 1], *square]  # type: ignore[arg-type] # a list
-        assert tab.complaints == []
 
 
 def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
+    browser: Browser, application: AppServer, teams: Store
 ) -> None:
     place = Decision("place", Kind.PLACE, (40,))
     rules = (
@@ -364,32 +346,25 @@ def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
         page.locator(".rule .sentence").nth(1).click()
         page.wait_for_selector("text=Private is off: R1 costs something")
         assert page.get_by_role("switch", name="Private").get_attribute("aria-disabled") == "true"
-        assert tab.complaints == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_narrow_screen_needs_no_scrolling_to_the_side(
-    browser: Any,  # noqa: ANN401 - Playwright's
-    application: AppServer,
-    teams: Store,
-    scheme: str,
-) -> None:
+def test_a_narrow_screen_needs_no_scrolling_to_the_side(browser: Browser, application: AppServer, teams: Store) -> None:
     rules = (
         SketchRule("R1", "apart", "level", (), {"gap": 1}, 3),
         SketchRule("R2", "table", "level", ("Drone1", "Drone2")),
     )
-    team = teams.add(
-        Sketch("narrow", Area(60, 20), drones(9), (Decision("level", Kind.LEVEL, tuple(range(30))),), rules)
-    )
-    with watched_page(browser, {"width": 360, "height": 740}, color_scheme=scheme) as tab:
+    levels = Decision("level", Kind.LEVEL, tuple(range(30)))
+    team = teams.add(Sketch("narrow", Area(60, 20), drones(9), (levels,), rules))
+    with watched_page(browser, {"width": 360, "height": 740}) as tab:
         page = opened(tab, application, team)
         for number in range(2):
             page.locator(".rule .sentence").nth(number).click()
             page.wait_for_selector(".form")
             assert page.evaluate("document.documentElement.scrollWidth") <= 360
-        wanted = {"light": "rgb(255, 255, 255)", "dark": "rgb(13, 21, 32)"}[scheme]
-        page.wait_for_function(
-            """wanted => [...document.querySelectorAll('.segments .q-btn[aria-pressed=true]')]
-                .every((one) => getComputedStyle(one).color === wanted)""",
-            arg=wanted,
-        )
+        for scheme, wanted in (("light", "rgb(255, 255, 255)"), ("dark", "rgb(13, 21, 32)")):
+            page.emulate_media(color_scheme=scheme)
+            page.wait_for_function(
+                """wanted => [...document.querySelectorAll('.segments .q-btn[aria-pressed=true]')]
+                    .every((one) => getComputedStyle(one).color === wanted)""",
+                arg=wanted,
+            )
