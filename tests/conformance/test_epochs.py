@@ -26,18 +26,16 @@ from robochoc.model.problem import (
     Robot,
     ScenarioEvent,
     Semantics,
-    Team,
     Variable,
 )
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.support.brute_force import solutions
 from tests.support.cases import cases, looped
 from tests.support.examples import count, drawn
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
-from tests.support.random_changes import random_changing_team, stages
+from tests.support.random_changes import check_epochs, random_changing_team
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import differ, pair
 
@@ -51,25 +49,6 @@ COMPLETE = [
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
 
 
-def agrees(team: Team, options: Options) -> int:
-    """Every epoch that came to its end ends with brute force's verdict; returns how many did."""
-    outcome = solve(team, options)
-    every = list(stages(team))
-    assert len(outcome.epochs) == len(every)
-    ended = 0
-    for now, epoch, event in zip(every, outcome.epochs, [*team.scenario, None], strict=True):
-        assert set(epoch.robots) == set(now.order)
-        if epoch.verdict is Verdict.UNKNOWN:
-            assert event is not None
-            assert event.after is not None, "only an event may end an epoch without a verdict"
-            continue
-        truth = Verdict.NO_SOLUTION if next(solutions(now), None) is None else Verdict.SOLUTION
-        assert epoch.verdict is truth, (team, options)
-        assert epoch.verified is (truth is Verdict.SOLUTION)
-        ended += 1
-    return ended
-
-
 def random_dynabt(chance: Random) -> Options:
     return replace(random_schedule(chance), protocol="dynabt")
 
@@ -81,7 +60,7 @@ def test_dynabt_agrees_with_brute_force_after_each_change(problems: int) -> None
         for number in range(problems):
             with each(number):
                 chance = drawn(f"dynabt {number}")
-                ended += agrees(random_changing_team(chance), random_dynabt(chance))
+                ended += check_epochs(random_changing_team(chance), random_dynabt(chance))
     assert ended > 7 * problems
 
 
@@ -91,7 +70,7 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, problems: int
     for number in range(problems):
         chance = drawn(f"anew {protocol} {number}")
         team = random_changing_team(chance, 6)
-        agrees(team, replace(random_schedule(chance), protocol=protocol))
+        check_epochs(team, replace(random_schedule(chance), protocol=protocol))
 
 
 @count("problems", 1, 12)
@@ -99,7 +78,7 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, problems: int
 def test_processes_go_through_epochs_as_well(protocol: str, problems: int) -> None:
     for number in range(problems):
         team = random_changing_team(drawn(f"processes {protocol} {number}"), 6)
-        agrees(team, Options(protocol=protocol, timeout=HANG_S))
+        check_epochs(team, Options(protocol=protocol, timeout=HANG_S))
 
 
 def test_epochs_follow_an_order_that_is_asked_for() -> None:
@@ -107,7 +86,7 @@ def test_epochs_follow_an_order_that_is_asked_for() -> None:
         chance = drawn(f"order {number}")
         team = random_changing_team(chance, 5, partial(loosened, chance=chance))
         order = chance.choice([*Order, tuple(chance.sample(team.order, len(team.order)))])
-        agrees(team, replace(random_dynabt(chance), order=order))
+        check_epochs(team, replace(random_dynabt(chance), order=order))
 
 
 def test_the_judge_goes_through_the_same_epochs() -> None:

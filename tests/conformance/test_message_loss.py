@@ -11,11 +11,12 @@ import pytest
 from robochoc.communication.simulator.channel import ChannelModel
 from robochoc.communication.simulator.link_loss import Bursts, NamedLink, PathLoss, Point
 from robochoc.generators.random_csp import random_csp
+from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.run import Options, Runtime, solve
-from robochoc.run.options import ScheduleName
+from robochoc.run.options import ScheduleName, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.brute_force import least_cost
@@ -61,6 +62,8 @@ def is_true(team: Team, outcome: Outcome) -> bool:
     least = minimum_cost(team)
     sure = not outcome.metrics.lost_messages or protocol_named(outcome.protocol).traits.bears_loss
     match outcome.verdict:
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn:
+            return sure and outcome.verified and least == INFINITE
         case Verdict.SOLUTION:
             return outcome.verified and outcome.cost is not None and least <= outcome.cost < INFINITE
         case Verdict.OPTIMAL:
@@ -151,6 +154,42 @@ def test_even_nine_of_ten_lost_is_no_reason_to_wait_for_ever() -> None:
                 outcome = run(name, team_for(name, Random(3)), 1, loss=0.9)
                 assert outcome is not None
                 assert outcome.metrics.lost_messages > 0
+
+
+def problem(number: int) -> tuple[Team, Options]:
+    """A random protocol, a team of the kind that it takes, and options that go together more often than not."""
+    chance = drawn(f"loss in processes {number}")
+    name = OURS[number % len(OURS)]
+    traits = protocol_named(name).traits
+    team = (random_cost_team if traits.costs else random_team)(chance, n_ary=traits.n_ary)
+    cycles = {"cycles": "10"} if hasattr(protocol_named(name).settings, "cycles") else {}
+    return team, Options(
+        protocol=name,
+        runtime=Runtime.PROCESSES,
+        seed=number,
+        settings=cycles,
+        message_loss=chance.choice((0.02, 0.1, 0.4)),
+        order=chance.choice((None, None, Order.RANDOM, Order.DOM_DEG, Order.LEXICOGRAPHIC)),
+        withdraw=chance.choice((None, None, None, *Withdrawal)),
+        deadline=chance.choice((None, None, 2.0)),
+    )
+
+
+@pytest.mark.more
+@count("runs", 60, 300)
+def test_with_any_protocol_and_options_no_verdict_is_wrong(runs: int) -> None:
+    lost, wrong = 0, []
+    for number in range(runs):
+        team, options = problem(number)
+        try:
+            outcome = solve(team, options)
+        except UnsupportedError:
+            continue
+        lost += outcome.metrics.lost_messages
+        if not is_true(team, outcome):
+            wrong.append((number, options.protocol, outcome.verdict, outcome.reason))
+    assert wrong == []
+    assert lost > 0
 
 
 def test_all_of_the_three_families_bear_loss() -> None:

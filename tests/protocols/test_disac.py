@@ -230,7 +230,7 @@ def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytes
 
 
 @looped("protocol", ["abt", "sfb"])
-@looped("team", [chain(1, 2, 3, 4), pair()])
+@looped("team", lambda: [chain(1, 2, 3, 4), pair()])
 def test_its_journal_is_replayed(protocol: str, team: Team) -> None:
     done = replay(record(team, replace(AC, protocol=protocol)))
     assert done.difference is None

@@ -25,13 +25,12 @@ from robochoc.replay.replay import replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Preprocess
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.support.brute_force import solutions
 from tests.support.cases import looped
 from tests.support.changing_costs import agrees_on_costs, changing_cost_team
 from tests.support.examples import count
 from tests.support.limits import HANG_S
 from tests.support.problems import team_of
-from tests.support.random_changes import random_changing_team, stages
+from tests.support.random_changes import check_epochs, random_changing_team
 from tests.support.random_options import random_schedule
 from tests.support.recorded_journals import record
 from tests.support.small_teams import DIFFERENT
@@ -119,29 +118,12 @@ def test_a_proof_that_rests_on_values_that_have_come_back_is_given_up(protocol: 
     assert verdicts(outcome) == [Verdict.NO_SOLUTION, Verdict.SOLUTION]
 
 
-def agrees(team: Team, options: Options) -> int:
-    """Each epoch that came to its end has brute force's verdict; return how many did."""
-    outcome = solve(team, options)
-    every, ended = list(stages(team)), 0
-    assert len(outcome.epochs) == len(every)
-    for now, epoch, event in zip(every, outcome.epochs, [*team.scenario, None], strict=True):
-        if epoch.verdict is Verdict.UNKNOWN:
-            assert event is not None
-            assert event.after is not None, "only an event may end an epoch without a verdict"
-            continue
-        truth = Verdict.NO_SOLUTION if next(solutions(now), None) is None else Verdict.SOLUTION
-        assert epoch.verdict is truth, (team, options)
-        assert epoch.verified is (truth is Verdict.SOLUTION)
-        ended += 1
-    return ended
-
-
 @count("problems", 7, 1500)
 def test_each_epoch_has_the_verdict_of_brute_force(problems: int) -> None:
     chance, ended = Random("ac epochs"), 0
     for number in range(problems):
         protocol = SATISFYING[number % len(SATISFYING)]
-        ended += agrees(
+        ended += check_epochs(
             random_changing_team(chance), replace(random_schedule(chance), protocol=protocol, preprocess=Preprocess.AC)
         )
     assert ended > 8 * problems
@@ -175,7 +157,7 @@ def test_the_same_in_processes(problems: int) -> None:
     chance = Random("ac in processes")
     for number in range(problems):
         protocol = SATISFYING[-number % len(SATISFYING)]
-        agrees(random_changing_team(chance), Options(protocol=protocol, preprocess=Preprocess.AC, timeout=HANG_S))
+        check_epochs(random_changing_team(chance), Options(protocol=protocol, preprocess=Preprocess.AC, timeout=HANG_S))
 
 
 @looped("protocol", ["abt", "dynabt", "s-dpop"])

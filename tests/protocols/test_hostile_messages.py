@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from random import Random
 from typing import Any
@@ -25,7 +25,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.messages.abt import Ok
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.agent_problem import agent_problems
+from robochoc.solver.agent_problem import AgentProblem, agent_problems
 from robochoc.solver.encoding import TooLargeError
 from tests.support.allocation_problems import random_allocation
 from tests.support.cases import cases, looped
@@ -35,8 +35,7 @@ from tests.support.small_teams import DIFFERENT
 TRIANGLE = [Constraint("C", DIFFERENT, pair, pair) for pair in combinations("ABC", 2)]
 TEAMS = [team_of(dict.fromkeys("ABC", values), TRIANGLE) for values in ((1, 2, 3), (1, 2))]
 """With a solution, and without one."""
-ALLOCATIONS = [random_allocation(Random(seed), simple=True).team for seed in range(3)]
-"""For protocols that take only these."""
+Parts = Mapping[str, AgentProblem]
 MOST = 120
 """Messages in a run."""
 SPOILT = {1, 4}
@@ -77,10 +76,12 @@ def versions(content: bytes) -> Iterator[bytes]:
             yield msgspec.msgpack.encode([tag, *fields[:place], other, *fields[place + 1 :]])
 
 
-def run(protocol: type[Protocol], team: Team, number: int = -1, content: bytes = b"") -> list[Envelope]:
+def parts_of(protocol: type[Protocol], team: Team) -> Parts:
+    return agent_problems(team, shared_scopes=protocol.traits.shared_scopes, tree=protocol.traits.tree)
+
+
+def run(protocol: type[Protocol], parts: Parts, number: int = -1, content: bytes = b"") -> list[Envelope]:
     """Return the messages of a run, one by one; the one of this `number` has another `content`."""
-    traits = protocol.traits
-    parts = agent_problems(team, shared_scopes=traits.shared_scopes, tree=traits.tree)
     hosts = {name: Host.of(protocol, part) for name, part in parts.items()}
     waiting = deque(envelope for host in hosts.values() for envelope in host.start())
     taken: list[Envelope] = []
@@ -94,10 +95,10 @@ def run(protocol: type[Protocol], team: Team, number: int = -1, content: bytes =
     return taken
 
 
-def spoilt_messages(protocol: type[Protocol], team: Team) -> Iterator[tuple[int, bytes]]:
+def spoilt_messages(protocol: type[Protocol], parts: Parts) -> Iterator[tuple[int, bytes]]:
     """Yield the numbers of messages that are to be spoilt, with what stands in their place."""
     seen: Counter[str] = Counter()
-    for number, envelope in enumerate(run(protocol, team)):
+    for number, envelope in enumerate(run(protocol, parts)):
         kind = msgspec.msgpack.decode(envelope.content)[0]
         seen[kind] += 1
         if seen[kind] in SPOILT:
@@ -120,10 +121,12 @@ def test_a_message_that_cannot_be_is_refused_or_harmless(names: set[str]) -> Non
 def refusals(protocol: type[Protocol]) -> int:
     """Run the protocol with each spoilt message in turn; return how many were refused."""
     refused = 0
-    for team in ALLOCATIONS if protocol.traits.allocates else TEAMS:
-        for number, content in spoilt_messages(protocol, team):
+    allocations = (random_allocation(Random(seed), simple=True).team for seed in range(3))
+    for team in allocations if protocol.traits.allocates else TEAMS:
+        parts = parts_of(protocol, team)
+        for number, content in spoilt_messages(protocol, parts):
             try:
-                run(protocol, team, number, content)
+                run(protocol, parts, number, content)
             except BadMessageError as bad:
                 refused += "cannot be used" in str(bad)
             except TooLargeError:  # it believes a size, and says so
@@ -143,12 +146,13 @@ BAD_VALUES: dict[Value, str] = {
 def test_the_reason_says_whose_value_it_is(name: str, value: Value) -> None:
     """Also where it is found out later than the message has come, or from what another robot passes on."""
     protocol = protocol_named(name)
-    first = run(protocol, TEAMS[0])[0]
+    parts = parts_of(protocol, TEAMS[0])
+    first = run(protocol, parts)[0]
     tag, field, *rest = msgspec.msgpack.decode(first.content)
     told = {"Ok": value, "CPA": [value], "Path": [[value, 0]]}[tag]
     assert field == {"Ok": [1], "CPA": [[1]], "Path": [[[1], 0]]}[tag]
     with pytest.raises(BadMessageError) as bad:
-        run(protocol, TEAMS[0], 0, msgspec.msgpack.encode([tag, told, *rest]))
+        run(protocol, parts, 0, msgspec.msgpack.encode([tag, told, *rest]))
     assert BAD_VALUES[value] in str(bad.value)
     assert "that cannot be used" in str(bad.value)
 

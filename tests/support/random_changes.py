@@ -7,6 +7,7 @@ from dataclasses import replace
 from random import Random
 
 from robochoc.model.change import apply_changes
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -22,6 +23,8 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
+from robochoc.run import Options, solve
+from tests.support.brute_force import solutions
 from tests.support.problems import random_constraint, random_team
 
 MOST_ROBOTS, MOST_VALUES = 7, 4
@@ -128,3 +131,22 @@ def stages(team: Team) -> Iterator[Team]:
     for event in team.scenario:
         now = apply_changes(now, event.changes)
         yield now
+
+
+def check_epochs(team: Team, options: Options) -> int:
+    """Solve `team`, compare the verdict of each finished epoch with brute force, and return how many there were."""
+    outcome = solve(team, options)
+    every = list(stages(team))
+    assert len(outcome.epochs) == len(every)
+    ended = 0
+    for now, epoch, event in zip(every, outcome.epochs, [*team.scenario, None], strict=True):
+        assert set(epoch.robots) == set(now.order)
+        if epoch.verdict is Verdict.UNKNOWN:
+            assert event is not None
+            assert event.after is not None, "only an event may end an epoch without a verdict"
+            continue
+        truth = Verdict.NO_SOLUTION if next(solutions(now), None) is None else Verdict.SOLUTION
+        assert epoch.verdict is truth, (team, options)
+        assert epoch.verified is (truth is Verdict.SOLUTION)
+        ended += 1
+    return ended
