@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -192,8 +193,9 @@ class TestWhatIsRemoved:
     def test_that_an_old_run_goes_once_nobody_writes_to_it_any_more(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("robochoc.app.runs.runs.MOST_KEPT", 1)
+        monkeypatch.setattr("robochoc.app.runs.runs.MOST_KEPT", 2)
         old = kept_run(tmp_path, slots(2, 2)).folder
+        shutil.copytree(old, old.with_name("00002"))
         was_there: list[bool] = []
 
         def write(job: Job[None]) -> None:
@@ -206,9 +208,9 @@ class TestWhatIsRemoved:
         runs = Runs(Team(slots(2, 2), tmp_path))
         run = ended(runs.start())
         assert writing.join(HANG_S)
-        _are_left(tmp_path, run.id)
+        _are_left(tmp_path, "00002", run.id)
         assert was_there == [True]
-        assert runs.all() == [run]
+        assert sorted(one.id for one in runs.all()) == ["00002", run.id]
 
     def test_that_a_full_disk_leaves_nothing(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         def full(*_: object) -> int:
