@@ -222,6 +222,13 @@ def test_results_that_are_removed_meanwhile_are_missed(small: Path) -> None:
             store.check_place()
 
 
+def test_a_study_that_another_process_carries_out_is_refused(small: Path) -> None:
+    with Store(small.with_suffix(".sqlite")):
+        refused = robochoc_within("experiment", "run", small)
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "is being written to by another 'robochoc experiment run'" in refused.stderr
+
+
 def test_mistakes_are_told(tmp_path: Path) -> None:
     with cases() as each:
         for words, status, said in [
