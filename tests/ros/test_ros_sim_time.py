@@ -104,7 +104,10 @@ def test_without_a_clock_the_run_ends(waited: WaitedClock) -> None:
 
 @looped(
     "clock",
-    [None, True, "1", 1.5, -1, 1 << 70, {}, {"sec": 1}, {"sec": -1, "nanosec": 0}, {"sec": 1, "nanosec": SECOND}],
+    [
+        *(None, True, "1", 1.5, -1, (1 << 31) * SECOND, 1 << 70),
+        *({}, {"sec": 1}, {"sec": -1, "nanosec": 0}, {"sec": 1 << 31, "nanosec": 0}, {"sec": 1, "nanosec": SECOND}),
+    ],
 )
 def test_what_is_no_time_changes_none(clock: object) -> None:
     found = SimClock()

@@ -6,6 +6,7 @@ import re
 from collections import deque
 from dataclasses import replace
 from random import Random
+from types import SimpleNamespace
 from typing import Any, NoReturn
 
 import msgspec
@@ -268,9 +269,11 @@ def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> Non
 def test_the_safe_repr_of_things_is_short() -> None:
     things = [
         None, True, 12_000, 0.5, float("inf"), b"abc", {}, {"a": (1, 2)}, {3, 1, 2}, ValueText,
+        SimpleNamespace(of=1, _own=(2,)),
     ]  # fmt: skip
     assert [*map(safe_repr, things)] == [
         "None", "True", "12000", "0.5", "inf", "<3 bytes>", "{}", "{'a': (1, 2)}", "{1, 2, 3}", "ValueText",
+        "SimpleNamespace(of=1, own=(2,))",
     ]  # fmt: skip
     for thing in ("x" * 10**6, list(range(10**6)), {number: [number] * 100 for number in range(1000)}, 10**5000):
         assert len(safe_repr(thing)) <= MAX_LENGTH
