@@ -64,6 +64,19 @@ def test_what_is_printed_is_printed_once(capfd: pytest.CaptureFixture[str]) -> N
     assert capfd.readouterr().out == "before and within\n"
 
 
+def test_it_does_not_read_its_parents_standard_input() -> None:
+    read, write = os.pipe()
+    os.write(write, b"for the parent")
+
+    def parent() -> None:
+        os.dup2(read, 0)
+        sys.exit(ended(lambda: sys.exit(len(os.read(0, 1)))))
+
+    assert ended(parent, read) == 0
+    os.close(read)
+    os.close(write)
+
+
 def test_it_has_the_descriptors_that_it_inherits_but_for_those_it_is_to_close() -> None:
     read, write = os.pipe()
     others = [os.open(os.devnull, os.O_RDONLY) for _ in range(4)]
