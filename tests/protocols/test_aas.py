@@ -27,9 +27,9 @@ from tests.support.small_teams import differ, different, triangle
 from tests.support.spent import spent
 
 
-def agent(team: Team, name: str, largest: int = 4) -> AAS:
+def agent(team: Team, name: str, *packet: tuple[str, Message], largest: int = 4) -> AAS:
     kind = type("Limited", (AAS,), {"settings": AASSettings(largest)})
-    return started_robot(kind, team, name)
+    return started_robot(kind, team, name, *packet)
 
 
 def ok(*values: int) -> Ok:
@@ -44,14 +44,13 @@ def aggregate(robot: AAS) -> list[int | None]:
 
 def test_a_robot_proposes_all_values_that_go_with_every_combination_up_to_the_largest_aggregate() -> None:
     for largest, proposed in ((4, ok(2, 3)), (1, ok(2))):
-        robot = agent(triangle(3), "RC", largest)
+        robot = agent(triangle(3), "RC", largest=largest)
         assert replies(robot, ("RA", ok(1)), ("RB", ok(1))) == [("RD", proposed)]
         assert value(robot) == (2,)
 
 
 def test_what_still_goes_with_the_view_is_kept_and_sent_only_when_it_has_changed() -> None:
-    robot = agent(triangle(3), "RC")
-    replies(robot, ("RA", ok(1)))
+    robot = agent(triangle(3), "RC", ("RA", ok(1)))
     assert replies(robot, ("RB", ok(2))) == [("RD", ok(3))]
     assert replies(robot, ("RB", ok(1))) == []
 
@@ -90,8 +89,7 @@ def test_a_nogood_rules_out_what_it_names_and_without_a_value_left_there_is_no_s
 
 
 def test_a_nogood_holds_as_long_as_what_others_propose_is_covered_and_is_answered_otherwise() -> None:
-    robot = agent(triangle(3), "RB")
-    replies(robot, ("RA", ok(1, 2)), ("RC", Nogood({"RA": ((1,), (2,))}, ((3,),))))
+    robot = agent(triangle(3), "RB", ("RA", ok(1, 2)), ("RC", Nogood({"RA": ((1,), (2,))}, ((3,),))))
     for proposed, held in ((ok(2), True), (ok(2, 3), False)):
         replies(robot, ("RA", proposed))
         assert robot.store[2] == ({"RA": ((1,), (2,))} if held else None)

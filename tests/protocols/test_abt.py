@@ -49,8 +49,7 @@ def test_resolve_conflict_accepts_a_coherent_nogood_and_takes_another_value() ->
 
 
 def test_resolve_conflict_answers_an_obsolete_nogood_about_the_present_value_and_no_other() -> None:
-    abt = agent(triangle(), "RB")
-    replies(abt, ("RA", Ok((2,))))
+    abt = agent(triangle(), "RB", ("RA", Ok((2,))))
     assert replies(abt, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", Ok((1,)))]
     assert value(abt) == (1,)
     replies(abt, ("RA", Ok((1,))))
@@ -71,12 +70,10 @@ def test_set_link_tells_the_value_to_the_new_child_now_and_later_once() -> None:
 
 
 def test_nogoods_go_when_their_left_side_no_longer_stands_and_of_two_the_one_with_the_higher_robot_is_kept() -> None:
-    abt = agent(triangle(), "RB")
-    replies(abt, ("RA", Ok((2,))), ("RC", Nogood({"RA": (2,)}, (1,))))
+    abt = agent(triangle(), "RB", ("RA", Ok((2,))), ("RC", Nogood({"RA": (2,)}, (1,))))
     replies(abt, ("RA", Ok((1,))))
     assert all(lhs == {"RA": (1,)} for lhs in abt.store)
-    abt = agent(triangle(3), "RC")
-    replies(abt, ("RB", Ok((1,))), ("RA", Ok((1,))))
+    abt = agent(triangle(3), "RC", ("RB", Ok((1,))), ("RA", Ok((1,))))
     assert list(abt.store) == [{"RA": (1,)}]
 
 

@@ -61,8 +61,7 @@ def test_backtrack_tells_the_lowest_robot_at_present_and_how_many_values_are_lef
     assert replies(abt, *packet) == [("RC", Nogood({"RA": (1,), "RB": (2,)}, (3,), 1))]
     assert "RC" not in abt.view
     assert value(abt) == (3,)
-    abt = agent(clique(), "RD")
-    replies(abt, ("RC", order("CBADE", (1, "RA"))))
+    abt = agent(clique(), "RD", ("RC", order("CBADE", (1, "RA"))))
     assert replies(abt, *packet) == [("RA", Nogood({"RB": (2,), "RC": (3,)}, (1,), 1))]
 
 
@@ -74,8 +73,7 @@ def test_an_empty_nogood_ends_the_search_without_solution() -> None:
 
 
 def test_an_obsolete_nogood_about_the_present_value_is_answered_once_a_packet_and_one_about_another_is_not() -> None:
-    abt = agent(clique(), "RB")
-    replies(abt, ("RA", Ok((2,), 3)))
+    abt = agent(clique(), "RB", ("RA", Ok((2,), 3)))
     obsolete = Nogood({"RA": (3,)}, (1,), 1)
     for packet in ([obsolete], [obsolete, obsolete]):
         assert replies(abt, *(("RD", nogood) for nogood in packet)) == [("RD", Ok((1,), 3))]
@@ -146,8 +144,7 @@ def test_a_sender_passes_only_those_that_are_known_to_have_more_values_left() ->
 
 
 def test_a_sender_does_not_pass_the_second_last_robot_of_the_nogood() -> None:
-    abt = agent(clique(), "RC")
-    replies(abt, ("RA", Ok((2,), 3)), ("RB", Ok((3,), 3)))
+    abt = agent(clique(), "RC", ("RA", Ok((2,), 3)), ("RB", Ok((3,), 3)))
     said = replies(abt, ("RD", Nogood({"RA": (2,)}, (1,), 0)))
     moved = order("ADBCE", (0, ""), (1, "RC"))
     assert orders(said) == [("RD", moved), ("RB", moved), ("RE", moved)], "not RA: for it nothing has changed"
@@ -163,8 +160,7 @@ def test_a_new_order_raises_the_counter_of_its_place_and_drops_those_below() -> 
 def test_who_adopts_an_order_tells_its_value_to_those_newly_lower_and_drops_nogoods_that_rest_on_them() -> None:
     said = replies(agent(clique(), "RC"), ("RA", order("CABDE", (1, "RA"))))
     assert said == [("RA", Ok((1,), 3)), ("RB", Ok((1,), 3))]
-    abt = agent(clique(), "RC")
-    replies(abt, ("RA", Ok((1,), 3)), ("RB", Ok((2,), 3)))
+    abt = agent(clique(), "RC", ("RA", Ok((1,), 3)), ("RB", Ok((2,), 3)))
     assert value(abt) == (3,)
     assert list(abt.store) == [{"RA": (1,)}, {"RB": (2,)}]
     assert replies(abt, ("RA", order("ACBDE", (0, ""), (1, "RA")))) == [("RB", Ok((3,), 2))]
@@ -172,28 +168,24 @@ def test_who_adopts_an_order_tells_its_value_to_those_newly_lower_and_drops_nogo
 
 
 def test_only_robots_that_are_higher_at_present_are_looked_at() -> None:
-    abt = agent(clique(), "RC")
-    replies(abt, ("RA", order("BCADE", (1, "RA"))))
+    abt = agent(clique(), "RC", ("RA", order("BCADE", (1, "RA"))))
     assert replies(abt, ("RA", Ok((1,), 3))) == []
     assert value(abt) == (1,)
     assert ("RA", Ok((2,), 2)) in replies(abt, ("RB", Ok((1,), 3)))
-    abt = agent(clique(), "RB")
-    replies(abt, ("RC", Ok((1,), 3)))
+    abt = agent(clique(), "RB", ("RC", Ok((1,), 3)))
     assert value(abt) == (1,)
     replies(abt, ("RA", order("CABDE", (1, "RA"))))
     assert value(abt) == (2,), "the value counts as soon as its robot is higher"
 
 
 def test_a_nogood_that_rests_on_a_robot_that_is_lower_at_present_is_answered() -> None:
-    abt = agent(clique(), "RB")
-    replies(abt, ("RA", Ok((2,), 3)))
+    abt = agent(clique(), "RB", ("RA", Ok((2,), 3)))
     replies(abt, ("RC", order("BACDE", (1, "RC"))))
     assert replies(abt, ("RD", Nogood({"RA": (2,)}, (1,), 1))) == [("RD", Ok((1,), 3))]
 
 
 def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None:
-    abt = agent(odd_triple(), "RA")
-    replies(abt, ("RB", Ok((1,), 2)), ("RC", Ok((1,), 2)), ("RB", order("BAC", (1, "RB"))))
+    abt = agent(odd_triple(), "RA", ("RB", Ok((1,), 2)), ("RC", Ok((1,), 2)), ("RB", order("BAC", (1, "RB"))))
     assert abt.problem.checks == 0
     replies(abt, ("RB", order("CBA", (2, "RB"))))
     assert value(abt) == (2,)
@@ -201,8 +193,7 @@ def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None
 
 
 def test_what_is_known_to_hold_is_not_checked_again() -> None:
-    abt = agent(clique(), "RB")
-    replies(abt, ("RA", Ok((2,), 3)))
+    abt = agent(clique(), "RB", ("RA", Ok((2,), 3)))
     checks = abt.problem.checks
     assert checks
     replies(abt, ("RA", Ok((2,), 3)), ("RC", Ok((1,), 3)))

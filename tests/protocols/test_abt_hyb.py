@@ -57,8 +57,7 @@ def test_another_value_of_the_nogoods_receiver_ends_the_wait_and_the_same_one_br
 
 
 def test_an_obsolete_nogood_about_the_present_value_is_answered_and_an_empty_one_ends_the_search() -> None:
-    robot = agent(triangle(), "RB")
-    replies(robot, ("RA", Ok((2,))))
+    robot = agent(triangle(), "RB", ("RA", Ok((2,))))
     assert replies(robot, ("RC", Nogood({"RA": (1,)}, (1,)))) == [("RC", Ok((1,)))]
     robot = agent(triangle(1), "RA")
     assert replies(robot, ("RB", Nogood({}, (1,)))) == []

@@ -19,7 +19,7 @@ from robochoc.protocols.optimization.messages.bnb_adopt import Cost
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.run import solve
-from tests.support.agents import replies, value
+from tests.support.agents import after, replies, value
 from tests.support.cases import cases, looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.pseudo_trees import context, middle, root, to
@@ -38,24 +38,20 @@ def kind(of_k: float) -> type[ADOPTk]:
 
 def informed(k: float, allowance: float = 0, threshold: float = INFINITE) -> ADOPTk:
     """B, when it knows the values above, both 1, and its thresholds: its own values cost 0 and 4."""
-    robot = middle(kind(k))
-    replies(robot, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold, allowance)))
-    return robot
+    return after(middle(kind(k)), ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold, allowance)))
 
 
 @looped(("k", "kept"), [(1, 5), (3, 7), (9, 9)])
 def test_a_value_is_left_when_its_lower_bound_is_k_above_the_first_threshold(k: int, kept: int) -> None:
     """With 9, it is left at 10: it has reached the threshold of BnB-ADOPT."""
-    robot = informed(k, allowance=5, threshold=10)
-    replies(robot, ("RC", Cost(context(B=1), kept, INFINITE)))
+    robot = after(informed(k, allowance=5, threshold=10), ("RC", Cost(context(B=1), kept, INFINITE)))
     assert value(robot) == (1,)
     replies(robot, ("RC", Cost(context(B=1), kept + 1, INFINITE)))
     assert value(robot) == (2,)
 
 
 def test_a_value_is_left_when_its_lower_bound_is_the_best_known_cost() -> None:
-    robot = informed(99)
-    replies(robot, *((child, Cost(context(B=1), 4, 4)) for child in ("RC", "RD")))
+    robot = after(informed(99), *((child, Cost(context(B=1), 4, 4)) for child in ("RC", "RD")))
     assert (robot.lb, robot.ub, value(robot)) == (4, 8, (2,))
 
 
@@ -65,8 +61,7 @@ def test_the_first_threshold_stays_between_lb_and_ub_and_is_ub_for_the_value_wit
         assert robot.allowance == allowance
         replies(robot, *((child, Cost(context(B=1), 3, 9)) for child in ("RC", "RD")))
         assert (robot.lb, robot.ub, robot.allowance) == (4, 18, bound)
-    robot = informed(9, allowance=9)
-    replies(robot, *((child, Cost(context(B=2), 0, 1)) for child in ("RC", "RD")))
+    robot = after(informed(9, allowance=9), *((child, Cost(context(B=2), 0, 1)) for child in ("RC", "RD")))
     assert (robot.lb, robot.ub, value(robot)) == (0, 6, (2,))
 
 
@@ -82,8 +77,7 @@ def test_the_first_threshold_is_split_among_the_children_within_their_bounds() -
 
 def test_what_is_split_is_no_less_than_the_value_costs_and_a_lower_share_is_told_but_no_higher_one() -> None:
     """The value may cost more than the first threshold, by less than k."""
-    robot = informed(9)
-    replies(robot, ("RC", Cost(context(B=1), 3, 9)), ("RD", Cost(context(B=1), 2, 9)))
+    robot = after(informed(9), ("RC", Cost(context(B=1), 3, 9)), ("RD", Cost(context(B=1), 2, 9)))
     assert value(robot) == (1,)
     assert robot.allowance == robot.lb == 4
     assert [t[0] for t in robot.t.values()] == [3, 2]
@@ -98,22 +92,19 @@ def test_a_changed_value_voids_both_thresholds_and_a_threshold_of_a_pseudo_paren
     said = replies(robot, ("RZ", Value((2,), 2)))
     assert (robot.threshold, robot.allowance) == (INFINITE, robot.lb)
     assert to("RA", said) == [Cost(context(A=1, Z=(2, 2)), 2, INFINITE, True)], "they are asked for"
-    robot = informed(9, allowance=3)
-    replies(robot, ("RZ", Value((1,), 2, 7, 1)))
+    robot = after(informed(9, allowance=3), ("RZ", Value((1,), 2, 7, 1)))
     assert (robot.threshold, robot.allowance) == (INFINITE, 3)
 
 
 def test_after_the_parent_s_end_a_robot_ends_when_ub_is_its_first_threshold() -> None:
-    robot = informed(9, allowance=2)
-    replies(robot, *((child, Cost(context(B=1), 0, 1)) for child in ("RC", "RD")))
+    robot = after(informed(9, allowance=2), *((child, Cost(context(B=1), 0, 1)) for child in ("RC", "RD")))
     assert (robot.lb, robot.ub, robot.allowance) == (0, 2, 2)
     said = replies(robot, ("RA", Terminate(context(Z=1, A=1))))
     assert said[-2:] == [(child, Terminate(context(Z=1, A=1, B=1))) for child in ("RC", "RD")]
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all() -> None:
-    robot = root(kind(1))
-    replies(robot, ("RC", Cost(context(B=1), INFINITE, INFINITE)))
+    robot = after(root(kind(1)), ("RC", Cost(context(B=1), INFINITE, INFINITE)))
     assert value(robot) == (2,)
     assert replies(robot, ("RC", Cost(context(B=(2, 2)), INFINITE, INFINITE))) == []
     assert robot.verdict is Verdict.NO_SOLUTION

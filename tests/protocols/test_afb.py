@@ -95,8 +95,7 @@ def test_values_are_tried_the_cheapest_first_and_none_with_which_the_cpa_costs_a
 
 
 def test_a_cpa_that_costs_as_much_as_b_goes_back_without_a_look_at_any_value() -> None:
-    robot = agent(chain(), "RD")
-    replies(robot, ("RC", solution(3, 1, 1, 1, 1)))
+    robot = agent(chain(), "RD", ("RC", solution(3, 1, 1, 1, 1)))
     before = robot.problem.checks
     assert replies(robot, ("RC", cpa((1, 1), (2, 1), (2, 1), least=[0, 0, 2, 3]))) == [
         ("RC", back((1, 1), (2, 1), (2, 1), bound=3))
@@ -109,8 +108,7 @@ def test_a_cpa_that_costs_as_much_as_b_goes_back_without_a_look_at_any_value() -
 
 def test_an_estimate_is_what_the_cheapest_value_costs_with_each_beginning_of_the_cpa() -> None:
     """The part that a CPA has in common with the last one is not priced again."""
-    robot = agent(chain(), "RC")
-    replies(robot, ("RA", asks((1, 1))))
+    robot = agent(chain(), "RC", ("RA", asks((1, 1))))
     before = robot.problem.checks
     assert replies(robot, ("RB", asks((1, 1), (2, 1)))) == [("RB", FBEstimate([1, 1], [0, 0, 2]))]
     assert value(robot) is None
@@ -151,8 +149,7 @@ def test_who_has_nothing_new_to_say_is_silent() -> None:
 
 def test_a_robot_is_asked_only_when_its_estimate_may_have_changed() -> None:
     """D has no constraint with B, and has told so by the length of its answer."""
-    robot = agent(chain(), "RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    robot = agent(chain(), "RB", ("RA", cpa((1, 1), least=[0, 0])))
     replies(robot, ("RD", FBEstimate([1, 1], [0, 0])))
     assert [receiver for receiver, _ in replies(robot, ("RC", back((1, 1), (1, 1))))] == ["RC"]
     assert [receiver for receiver, _ in replies(robot, ("RA", cpa((2, 2), least=[0, 1])))] == ["RC", "RD"]
@@ -161,13 +158,11 @@ def test_a_robot_is_asked_only_when_its_estimate_may_have_changed() -> None:
 def test_the_cpa_and_estimates_that_cost_as_much_as_b_make_the_next_value_be_taken_wherever_the_cpa_is() -> None:
     """An estimate for another CPA counts so far as the CPA is still the same; the own value is another one."""
     packet = [("RD", solution(6, 2, 2, 1, 2)), ("RA", cpa((1, 1), least=[0, 0]))]
-    robot = agent(chain(), "RB")
-    replies(robot, *packet)
+    robot = agent(chain(), "RB", *packet)
     assert replies(robot, ("RC", FBEstimate([1, 1], [0, 0, 3]))) == []
     said = replies(robot, ("RD", FBEstimate([1, 1], [0, 3])))
     assert said[0] == ("RC", cpa((1, 1), (2, 2), least=[0, 0, 0], bound=6))
-    robot = agent(chain(), "RB")
-    replies(robot, *packet)
+    robot = agent(chain(), "RB", *packet)
     replies(robot, ("RC", back((1, 1), (1, 1))))
     assert replies(robot, ("RC", FBEstimate([1, 1], [0, 0, 9]))) == []
     assert replies(robot, ("RD", FBEstimate([1, 1], [0, 6]))) == [("RA", back((1, 1), bound=6))]
@@ -177,8 +172,7 @@ def test_the_cpa_and_estimates_that_cost_as_much_as_b_make_the_next_value_be_tak
 
 
 def test_without_a_value_left_the_cpa_goes_back_to_the_robot_before() -> None:
-    robot = agent(chain(), "RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    robot = agent(chain(), "RB", ("RA", cpa((1, 1), least=[0, 0])))
     replies(robot, ("RC", back((1, 1), (1, 1))))
     assert replies(robot, ("RD", back((1, 1), (1, 1)))) == [], "another value has been taken since"
     assert value(robot) == (2,)
@@ -188,8 +182,7 @@ def test_without_a_value_left_the_cpa_goes_back_to_the_robot_before() -> None:
 def test_the_cpa_jumps_back_to_the_last_robot_of_the_shortest_beginning_that_costs_too_much() -> None:
     """Each value of C costs 4 with A = 1 already; so B is passed over."""
     constraints = [priced("AC", {(1, 1): 4, (1, 2): 4}), same("BC", 1)]
-    robot = agent(team_of(dict.fromkeys("ABC", (1, 2)), constraints), "RC")
-    replies(robot, ("RA", solution(4, 2, 1, 1)))
+    robot = agent(team_of(dict.fromkeys("ABC", (1, 2)), constraints), "RC", ("RA", solution(4, 2, 1, 1)))
     assert replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0]))) == [("RA", back((1, 1), bound=4))]
 
 
@@ -205,14 +198,12 @@ def test_what_robots_in_between_and_below_cost_counts_for_the_jump_as_well() -> 
 
 def test_an_obsolete_cpa_is_ignored_and_an_obsolete_question_not_answered() -> None:
     for name, old in (("RC", cpa((1, 1), (1, 7), least=[0, 0, 0])), ("RD", asks((1, 1), (1, 7)))):
-        robot = agent(chain(), name)
-        replies(robot, ("RA", asks((2, 2))))
+        robot = agent(chain(), name, ("RA", asks((2, 2))))
         assert replies(robot, ("RB", old)) == []
 
 
 def test_a_late_question_for_the_present_cpa_is_answered_and_a_stronger_cpa_makes_the_own_value_void() -> None:
-    robot = agent(chain(), "RC")
-    replies(robot, ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
+    robot = agent(chain(), "RC", ("RB", cpa((1, 1), (2, 1), least=[0, 0, 0])))
     assert replies(robot, ("RA", asks((1, 1)))) == [("RA", FBEstimate([1], [0, 0]))]
     assert value(robot) == (2,)
     replies(robot, ("RA", asks((2, 2))))
@@ -241,8 +232,7 @@ def test_every_cpa_tells_b() -> None:
 
 
 def test_the_first_robot_ends_the_search_when_it_has_no_value_left_without_solution_if_nobody_has_told_b() -> None:
-    robot = agent(chain(), "RA")
-    replies(robot, ("RD", solution(5, 1, 2, 2, 1)), ("RB", back((1, 1), bound=5)))
+    robot = agent(chain(), "RA", ("RD", solution(5, 1, 2, 2, 1)), ("RB", back((1, 1), bound=5)))
     said = replies(robot, ("RB", back((2, 2), bound=5)))
     assert said == [(name, Terminate()) for name in ("RB", "RC", "RD")]
     assert value(robot) == (1,)
@@ -252,16 +242,14 @@ def test_the_first_robot_ends_the_search_when_it_has_no_value_left_without_solut
 
 
 def test_whoever_knows_that_nothing_is_better_with_any_beginning_ends_the_search() -> None:
-    robot = agent(chain(), "RC")
-    replies(robot, ("RD", solution(1, 1, 2, 2, 1)))
+    robot = agent(chain(), "RC", ("RD", solution(1, 1, 2, 2, 1)))
     said = replies(robot, ("RB", cpa((1, 1), (2, 1), least=[1, 1, 1])))
     assert said == [("RA", Terminate()), ("RB", Terminate()), ("RD", Terminate())]
 
 
 def test_who_is_told_the_end_takes_its_value_in_the_best_solution_and_is_silent() -> None:
     """The news of the solution may come after the end."""
-    robot = agent(chain(), "RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])), ("RD", solution(5, 1, 2, 2, 1)))
+    robot = agent(chain(), "RB", ("RA", cpa((1, 1), least=[0, 0])), ("RD", solution(5, 1, 2, 2, 1)))
     assert replies(robot, ("RA", Terminate()), ("RA", cpa((2, 2), least=[0, 0])), ("RC", back((1, 1), (1, 1)))) == []
     assert value(robot) == (2,)
     robot = agent(chain(), "RB")
@@ -286,8 +274,7 @@ def test_the_best_solution_and_a_bound_are_found_before_the_end() -> None:
     assert robot.findings == Findings(best=Incumbent(9, {"RA": (1,), "RB": (2,)}), bound=3)
     assert agent(team, "RB").findings == Findings()
     team = team_of(dict.fromkeys("AB", (1, 2)), [priced("A", {(1,): 2, (2,): 5}), priced("AB", {(1, 1): 1})])
-    robot = agent(team, "RA")
-    replies(robot, ("RB", FBEstimate([1], [0, 2])))
+    robot = agent(team, "RA", ("RB", FBEstimate([1], [0, 2])))
     assert robot.findings == Findings(bound=4)
     robot.receive("RB", cpa((1, 1), least=[]))
     assert robot.findings == Findings(bound=5)

@@ -29,10 +29,12 @@ def square(values: int = 3) -> Team:
     return team_of(domains, [differ(*pair) for pair in pairs])
 
 
-def agent(team: Team, name: str) -> AFC:
-    """The protocol object of one robot, started."""
+def agent(team: Team, name: str, *packet: Message) -> AFC:
+    """The protocol object of one robot, started, which has read `packet`."""
     afc = robot_of(AFC, team, name)
     afc.start()
+    if packet:
+        told(afc, *packet)
     return afc
 
 
@@ -83,8 +85,7 @@ def test_the_last_robot_concludes_that_a_solution_stands_and_one_with_an_empty_d
 
 
 def test_backtrack_cpa_makes_the_robot_take_its_next_value_at_a_later_step_without_a_check() -> None:
-    afc = agent(square(4), "RC")
-    told(afc, CPA(values(1, 2), 2))
+    afc = agent(square(4), "RC", CPA(values(1, 2), 2))
     before = afc.problem.checks
     said = told(afc, BacktrackCPA(values(1, 2, 3), 30))
     assert said == [("RD", CPA(values(1, 2, 4), 31)), ("RE", FcCPA(values(1, 2, 4), 31))]
@@ -93,8 +94,7 @@ def test_backtrack_cpa_makes_the_robot_take_its_next_value_at_a_later_step_witho
 
 def test_a_value_once_tried_is_tried_again_only_under_another_cpa() -> None:
     """Also if the last one was never brought back: some robot below sent it back to A, past this robot."""
-    afc = agent(square(), "RB")
-    told(afc, CPA(values(1), 1))
+    afc = agent(square(), "RB", CPA(values(1), 1))
     assert told(afc, BacktrackCPA(values(1, 2), 2))[0] == ("RC", CPA(values(1, 3), 3))
     assert told(afc, BacktrackCPA(values(1, 3), 3)) == [("RA", BacktrackCPA(values(1), 3))]
     assert told(afc, CPA(values(2), 4))[0] == ("RC", CPA(values(2, 1), 5))
@@ -102,8 +102,7 @@ def test_a_value_once_tried_is_tried_again_only_under_another_cpa() -> None:
 
 
 def test_a_robot_that_has_tried_all_its_values_backtracks_to_the_robot_before() -> None:
-    afc = agent(team_of({"A": (1,), "B": (1,), "C": (1,), "D": (1,)}, []), "RC")
-    told(afc, CPA(values(1, 1), 2))
+    afc = agent(team_of({"A": (1,), "B": (1,), "C": (1,), "D": (1,)}, []), "RC", CPA(values(1, 1), 2))
     assert told(afc, BacktrackCPA(values(1, 1, 1), 3)) == [("RB", BacktrackCPA(values(1, 1), 3))]
     assert afc.assignment == {}
 
@@ -126,20 +125,17 @@ def test_the_first_robot_concludes_that_there_is_none_when_its_domain_is_exhaust
 
 def test_who_gets_a_cpa_that_is_known_to_be_inconsistent_sends_it_back_without_a_check() -> None:
     """A `NotOk` in the packet of the CPA is read first. A CPA that does not go on from it is taken up."""
-    afc = agent(square(), "RD")
-    told(afc, NotOk(values(1, 2), 2))
+    afc = agent(square(), "RD", NotOk(values(1, 2), 2))
     assert told(afc, CPA(values(1, 2, 3), 3)) == [("RB", BacktrackCPA(values(1, 2), 3))]
     assert afc.problem.checks == 0
     said = told(agent(square(), "RD"), CPA(values(1, 2, 3), 3), NotOk(values(1), 3))
     assert said == [("RA", BacktrackCPA(values(1), 3))]
-    afc = agent(square(4), "RC")
-    told(afc, NotOk(values(1), 1))
+    afc = agent(square(4), "RC", NotOk(values(1), 1))
     assert told(afc, CPA(values(2, 1), 3))[0] == ("RD", CPA(values(2, 1, 3), 4))
 
 
 def test_who_gets_a_cpa_back_that_is_known_to_be_inconsistent_above_sends_it_on() -> None:
-    afc = agent(square(4), "RC")
-    told(afc, CPA(values(1, 2), 2))
+    afc = agent(square(4), "RC", CPA(values(1, 2), 2))
     told(afc, NotOk(values(1), 1))
     assert told(afc, BacktrackCPA(values(1, 2, 3), 4)) == [("RA", BacktrackCPA(values(1), 4))]
 
@@ -165,8 +161,7 @@ def test_forward_check_tells_all_robots_without_a_value_in_the_shortest_inconsis
 
 
 def test_forward_check_says_an_inconsistent_assignment_once_and_starts_anew_with_another() -> None:
-    afc = agent(square(2), "RE")
-    told(afc, FcCPA(values(1, 2), 2))
+    afc = agent(square(2), "RE", FcCPA(values(1, 2), 2))
     before = afc.problem.checks
     assert told(afc, FcCPA(values(1, 2, 1), 3)) == []
     assert afc.problem.checks == before
@@ -175,15 +170,13 @@ def test_forward_check_says_an_inconsistent_assignment_once_and_starts_anew_with
 
 
 def test_a_copy_of_an_earlier_step_is_ignored() -> None:
-    afc = agent(square(2), "RE")
-    told(afc, FcCPA(values(2), 5))
+    afc = agent(square(2), "RE", FcCPA(values(2), 5))
     assert told(afc, FcCPA(values(1, 2), 4)) == []
     assert afc.view == values(2)
 
 
 def test_a_copy_of_a_later_step_takes_the_own_value_and_a_late_copy_does_not() -> None:
-    afc = agent(square(4), "RC")
-    told(afc, CPA(values(1, 2), 2))
+    afc = agent(square(4), "RC", CPA(values(1, 2), 2))
     assert told(afc, FcCPA(values(1), 1)) == []
     assert afc.assignment == {"C": 3}
     told(afc, FcCPA(values(2), 9))
@@ -194,15 +187,13 @@ def test_a_copy_of_a_later_step_takes_the_own_value_and_a_late_copy_does_not() -
 
 
 def test_a_not_ok_of_an_earlier_step_is_believed_when_the_view_goes_on_from_it() -> None:
-    afc = agent(square(4), "RD")
-    told(afc, FcCPA(values(1, 2), 8))
+    afc = agent(square(4), "RD", FcCPA(values(1, 2), 8))
     told(afc, NotOk(values(1), 3))
     assert told(afc, CPA(values(1, 2, 3), 9)) == [("RA", BacktrackCPA(values(1), 9))]
 
 
 def test_a_not_ok_about_another_cpa_is_obsolete_if_earlier_and_ahead_of_its_copy_if_later() -> None:
-    afc = agent(square(4), "RE")
-    told(afc, FcCPA(values(2), 8))
+    afc = agent(square(4), "RE", FcCPA(values(2), 8))
     told(afc, NotOk(values(1), 3))
     assert (afc.view, afc.sc, afc.consistent) == (values(2), 8, True)
     told(afc, NotOk(values(3, 1), 11))
@@ -213,8 +204,7 @@ def test_a_not_ok_about_another_cpa_is_obsolete_if_earlier_and_ahead_of_its_copy
 
 
 def test_of_two_inconsistent_assignments_the_shorter_one_is_kept() -> None:
-    afc = agent(square(4), "RD")
-    told(afc, NotOk(values(1), 2), NotOk(values(1, 2), 5))
+    afc = agent(square(4), "RD", NotOk(values(1), 2), NotOk(values(1, 2), 5))
     assert (afc.view, afc.sc) == (values(1), 5)
     told(afc, NotOk(values(3, 1), 9), NotOk(values(3), 8))
     assert (afc.view, afc.sc) == (values(3), 9)
@@ -227,8 +217,7 @@ def test_of_two_inconsistent_assignments_the_shorter_one_is_kept() -> None:
 
 
 def test_an_n_ary_constraint_is_checked_once_the_cpa_names_all_its_other_robots() -> None:
-    afc = agent(odd_triple(), "RC")
-    told(afc, FcCPA(values(1), 1))
+    afc = agent(odd_triple(), "RC", FcCPA(values(1), 1))
     assert afc.problem.checks == 0
     assert told(afc, CPA(values(2, 2), 5)) == [("RB", BacktrackCPA(values(2, 2), 5))]
 

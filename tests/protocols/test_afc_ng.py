@@ -59,16 +59,14 @@ def test_a_cpa_goes_to_the_next_robot_and_to_those_that_share_a_constraint() -> 
 
 
 def test_the_first_counter_that_differs_decides_which_cpa_is_stronger() -> None:
-    afc = agent(triangle(3), "RC")
-    replies(afc, ("RB", cpa((1, 2), (2, 1))))
+    afc = agent(triangle(3), "RC", ("RB", cpa((1, 2), (2, 1))))
     assert replies(afc, ("RB", cpa((2, 1), (1, 9)))) == []
     assert afc.view == {"RA": (1,), "RB": (2,)}
     assert replies(afc, ("RB", cpa((2, 3), (1, 1)))) == [("RD", cpa((2, 3), (1, 1), (3, 2)))]
 
 
 def test_only_a_stronger_cpa_takes_the_value_and_what_was_known_of_robots_below_its_sender_but_counters() -> None:
-    afc = agent(triangle(3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 4))))
+    afc = agent(triangle(3), "RC", ("RB", cpa((1, 1), (2, 4))))
     assert replies(afc, ("RA", cpa((1, 1)))) == [], "it has the counters of the view"
     assert afc.view == {"RA": (1,), "RB": (2,)}
     assert value(afc) == (3,)
@@ -79,8 +77,7 @@ def test_only_a_stronger_cpa_takes_the_value_and_what_was_known_of_robots_below_
 
 
 def test_nogoods_that_agree_with_the_new_view_stay_and_are_not_checked_again() -> None:
-    afc = agent(triangle(3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    afc = agent(triangle(3), "RC", ("RB", cpa((1, 1), (2, 1))))
     checks = afc.problem.checks
     replies(afc, ("RB", cpa((1, 1), (3, 2))))
     assert list(afc.store) == [{"RA": (1,)}, {"RB": (3,)}]
@@ -93,8 +90,7 @@ def test_nogoods_that_agree_with_the_new_view_stay_and_are_not_checked_again() -
 def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_changed() -> None:
     owned = {"R1": ("A", "B"), "R2": ("C",), "R3": ("D",)}
     constraints = [Constraint("C", DIFFERENT, pair, pair) for pair in (("A", "D"), ("B", "C"))]
-    afc = agent(complex_team(owned, dict.fromkeys("ABCD", (1, 2)), constraints), "R3")
-    replies(afc, ("R1", CPA((((1, 1), 1),))))
+    afc = agent(complex_team(owned, dict.fromkeys("ABCD", (1, 2)), constraints), "R3", ("R1", CPA((((1, 1), 1),))))
     checks = afc.problem.checks
     replies(afc, ("R1", CPA((((1, 2), 2),))))
     assert list(afc.store) == [{"R1": (1, None)}]
@@ -103,18 +99,15 @@ def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_chan
 
 def test_the_better_of_two_nogoods_for_a_value_is_kept() -> None:
     """Of two conflicts that is the one with the highest lowest robot."""
-    afc = agent(different("ABC", "AC BC", 3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (1, 1))))
+    afc = agent(different("ABC", "AC BC", 3), "RC", ("RB", cpa((1, 1), (1, 1))))
     assert list(afc.store) == [{"RA": (1,)}]
-    afc = agent(different("ABCD", "AD BD CD", 3), "RC")
-    replies(afc, ("RB", cpa((1, 1), (2, 1))))
+    afc = agent(different("ABCD", "AD BD CD", 3), "RC", ("RB", cpa((1, 1), (2, 1))))
     replies(afc, ("RD", Nogood({"RA": (1,)}, (3,))), ("RD", Nogood({"RA": (1,), "RB": (2,)}, (3,))))
     assert list(afc.store) == [{"RA": (1,)}]
 
 
 def test_an_n_ary_constraint_is_checked_when_all_its_robots_are_known() -> None:
-    afc = agent(odd_triple(), "RC")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(odd_triple(), "RC", ("RA", cpa((1, 1))))
     assert afc.problem.checks == 0
     replies(afc, ("RB", cpa((1, 1), (1, 1))))
     assert value(afc) == (2,)
@@ -125,8 +118,7 @@ def test_backtrack_tells_the_lowest_cause_and_forgets_it_and_all_below_it_but_no
     afc = agent(different("ABCD", "AD BD CD", 2), "RD")
     said = replies(afc, ("RB", cpa((1, 1), (2, 1))))
     assert said == [("RB", Nogood({"RA": (1,)}, (2,)))], "before the CPA has come"
-    afc = agent(different("ABCD", "AD BD CD", 2), "RD")
-    replies(afc, ("RC", cpa((1, 1), (2, 1), (1, 3))))
+    afc = agent(different("ABCD", "AD BD CD", 2), "RD", ("RC", cpa((1, 1), (2, 1), (1, 3))))
     assert afc.view == {"RA": (1,)}
     assert afc.counters == [1, 1, 3]
     assert list(afc.store) == [{"RA": (1,)}]
@@ -134,19 +126,16 @@ def test_backtrack_tells_the_lowest_cause_and_forgets_it_and_all_below_it_but_no
 
 
 def test_a_compatible_nogood_about_the_value_makes_the_robot_take_another_and_one_about_another_is_stored() -> None:
-    afc = agent(triangle(3), "RB")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(triangle(3), "RB", ("RA", cpa((1, 1))))
     assert replies(afc, ("RC", Nogood({"RA": (1,)}, (3,)))) == []
     assert list(afc.store) == [{"RA": (1,)}] * 2
-    afc = agent(triangle(3), "RB")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(triangle(3), "RB", ("RA", cpa((1, 1))))
     assert replies(afc, ("RC", Nogood({"RA": (1,)}, (2,)))) == [("RC", cpa((1, 1), (3, 2)))]
 
 
 def test_a_nogood_that_does_not_agree_with_the_view_is_ignored() -> None:
     for known in ([("RA", cpa((2, 1)))], []):
-        afc = agent(triangle(3), "RB")
-        replies(afc, *known)
+        afc = agent(triangle(3), "RB", *known)
         before = list(afc.store)
         assert replies(afc, ("RC", Nogood({"RA": (1,)}, (1,)))) == []
         assert list(afc.store) == before
@@ -168,8 +157,7 @@ def test_the_last_robot_s_value_makes_a_solution_and_who_is_told_it_takes_its_va
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (3,), "RD": (1,)}
     said = replies(agent(triangle(3), "RD"), ("RC", cpa((1, 1), (2, 1), (3, 1))))
     assert said == [(name, Solved(solution)) for name in ("RA", "RB", "RC")]
-    afc = agent(triangle(3), "RB")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(triangle(3), "RB", ("RA", cpa((1, 1))))
     told = ("RD", Solved({**solution, "RB": (3,), "RC": (2,)}))
     assert replies(afc, told, ("RA", cpa((2, 2))), ("RC", Nogood({}, (3,)))) == []
     assert value(afc) == (3,)

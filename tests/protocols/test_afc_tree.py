@@ -80,8 +80,7 @@ def test_backtrack_goes_to_the_lowest_ancestor_among_the_causes() -> None:
 
 
 def test_constraints_with_ancestors_that_have_not_moved_are_not_checked_again() -> None:
-    afc = agent(fork(), "RE")
-    replies(afc, ("RC", cpa((1, 1), (2, 1))))
+    afc = agent(fork(), "RE", ("RC", cpa((1, 1), (2, 1))))
     checks = afc.problem.checks
     replies(afc, ("RC", cpa((1, 1), (3, 2))))
     assert afc.problem.checks == checks + 2
@@ -89,8 +88,7 @@ def test_constraints_with_ancestors_that_have_not_moved_are_not_checked_again() 
 
 def test_a_leaf_accepts_the_cpa_that_it_has_a_value_for_and_others_once_all_their_children_have() -> None:
     assert replies(agent(fork(), "RB"), ("RA", cpa((1, 4)))) == [("RA", Accept([4], {"RB": (2,)}))]
-    afc = agent(fork(), "RC")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(fork(), "RC", ("RA", cpa((1, 1))))
     assert replies(afc, ("RD", Accept([1, 1], {"RD": (1,)}))) == []
     said = replies(afc, ("RE", Accept([1, 1], {"RE": (3,)})))
     assert said == [("RA", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)}))]
@@ -98,16 +96,14 @@ def test_a_leaf_accepts_the_cpa_that_it_has_a_value_for_and_others_once_all_thei
 
 def test_an_accept_of_another_cpa_is_ignored() -> None:
     for counters in ([1, 1], [2, 2]):
-        afc = agent(fork(), "RC")
-        replies(afc, ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
+        afc = agent(fork(), "RC", ("RA", cpa((1, 1))), ("RD", Accept([1, 1], {"RD": (1,)})))
         replies(afc, ("RA", cpa((2, 2))))
         replies(afc, ("RD", Accept([2, 1], {"RD": (2,)})))
         assert replies(afc, ("RE", Accept(counters, {"RE": (3,)}))) == []
 
 
 def test_a_new_value_needs_new_accepts() -> None:
-    afc = agent(fork(), "RC")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(fork(), "RC", ("RA", cpa((1, 1))))
     replies(afc, ("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Nogood({"RA": (1,)}, (2,))))
     assert value(afc) == (3,)
     assert replies(afc, ("RE", Accept([1, 2], {"RE": (2,)}))) == []
@@ -115,13 +111,11 @@ def test_a_new_value_needs_new_accepts() -> None:
 
 
 def test_a_root_with_all_accepts_tells_its_part_the_solution_and_who_is_told_it_takes_its_value() -> None:
-    afc = agent(fork(), "RA")
-    replies(afc, ("RB", Accept([1], {"RB": (2,)})))
+    afc = agent(fork(), "RA", ("RB", Accept([1], {"RB": (2,)})))
     said = replies(afc, ("RC", Accept([1], {"RC": (2,), "RD": (1,), "RE": (3,)})))
     solution: dict[str, Value] = {"RA": (1,), "RB": (2,), "RC": (2,), "RD": (1,), "RE": (3,)}
     assert said == [(name, Solved(solution)) for name in ("RB", "RC", "RD", "RE")]
-    afc = agent(fork(), "RC")
-    replies(afc, ("RA", cpa((1, 1))))
+    afc = agent(fork(), "RC", ("RA", cpa((1, 1))))
     packet = [("RD", Accept([1, 1], {"RD": (1,)})), ("RE", Accept([1, 1], {"RE": (3,)})), ("RA", cpa((2, 2)))]
     assert replies(afc, ("RA", Solved({**solution, "RC": (3,), "RE": (2,)})), *packet) == [], "it is silent"
     assert value(afc) == (3,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from random import Random
 
 from hypothesis import given
@@ -9,9 +10,8 @@ from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message, Value
+from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.agile_abt import AgileABT
@@ -26,26 +26,12 @@ from robochoc.protocols.satisfaction.agile_order import (
 )
 from robochoc.protocols.satisfaction.messages.agile_abt import AddLink, Ok, Order
 from robochoc.protocols.satisfaction.messages.nogood import Nogood
-from tests.support.agents import replies, robot_of, value
+from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.examples import count, examples
 from tests.support.problems import random_team
 from tests.support.small_teams import different, odd_triple, triangle
 
-
-def begun(team: Team, name: str) -> AgileABT:
-    """The protocol object of one robot, started; its first messages are in its outbox."""
-    agile = robot_of(AgileABT, team, name)
-    agile.start()
-    return agile
-
-
-def agent(team: Team, name: str, *packet: tuple[str, Message]) -> AgileABT:
-    """The protocol object of one robot, started and told a packet, with nothing left to say."""
-    agile = begun(team, name)
-    agile.outbox.clear()
-    if packet:
-        replies(agile, *packet)
-    return agile
+agent = partial(started_robot, AgileABT)
 
 
 def ok(value: int, left: int = 2, size: int = 2, **lhs: int) -> Ok:
@@ -162,7 +148,7 @@ def test_orders_only_become_stronger_and_all_robots_end_with_the_same(teams: int
 
 
 def test_start_takes_the_first_value_and_tells_it_with_its_explanation_to_those_below() -> None:
-    assert begun(triangle(), "RB").outbox == [("RC", ok(1))]
+    assert started(robot_of(AgileABT, triangle(), "RB")) == [("RC", ok(1))]
 
 
 def test_a_value_that_those_above_allow_is_kept_and_those_below_are_not_heeded() -> None:

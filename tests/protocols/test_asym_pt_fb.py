@@ -9,7 +9,7 @@ from robochoc.protocols.asymmetric.asym_pt_fb import AsymPTFB
 from robochoc.protocols.asymmetric.messages.asym_pt_fb import Row, RowRequest
 from robochoc.protocols.optimization.messages.branching import Members, Report, Request, Result
 from robochoc.protocols.optimization.messages.pt_fb import CPA, Reduce
-from tests.support.agents import replies
+from tests.support.agents import after, replies
 from tests.support.asymmetric_problems import priced_part, two_valued
 from tests.support.pseudo_trees import placed
 
@@ -33,8 +33,7 @@ def top() -> AsymPTFB:
 
 def middle() -> AsymPTFB:
     """B, which knows that A = 1, and has been told to search."""
-    robot = placed(AsymPTFB, team(), "RB", "RA", children=["RC"])
-    replies(robot, ("RC", Members({"RB": ["RC"], "RA": ["RC"]})))
+    robot = after(placed(AsymPTFB, team(), "RB", "RA", children=["RC"]), ("RC", Members({"RB": ["RC"], "RA": ["RC"]})))
     assert replies(robot, ("RA", Request((1,)))) == [("RA", Report(0))]
     return robot
 
@@ -63,15 +62,13 @@ def test_before_it_searches_a_robot_asks_those_above_for_their_sides_and_then_co
     assert not robot.searching
     assert replies(robot, ("RA", Row([0, 5]))) == [("RC", Request((1,)))]
     assert robot.local == [1, 5]
-    robot = middle()
-    replies(robot, ("RA", CPA(INFINITE, {})), ("RA", Reduce(1)))
+    robot = after(middle(), ("RA", CPA(INFINITE, {})), ("RA", Reduce(1)))
     said = replies(robot, ("RA", Row([0, 5])))
     assert said == [("RA", Result(INFINITE, {}))], "the bound fell while sides were asked for"
 
 
 def test_a_side_is_asked_for_once_for_each_value_above() -> None:
-    robot = middle()
-    replies(robot, ("RA", CPA(7, {})), ("RA", Row([9, 9])))
+    robot = after(middle(), ("RA", CPA(7, {})), ("RA", Row([9, 9])))
     assert replies(robot, ("RA", Request((2,)))) == [("RA", Report(0))]
     assert replies(robot, ("RA", Request((1,)))) == [("RA", Report(9))]
     assert replies(robot, ("RA", CPA(3, {}))) == [("RA", Result(INFINITE, {}))]

@@ -22,7 +22,7 @@ from robochoc.protocols.shared.cycles import NO_GAIN
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled import LexicographicCost
-from tests.support.agents import assert_refused, replies, started_robot, value
+from tests.support.agents import after, assert_refused, replies, started_robot, value
 from tests.support.asymmetric_problems import divided_pair as pair
 from tests.support.cases import looped
 from tests.support.examples import count
@@ -35,14 +35,14 @@ TRANSFERS = looped("protocol", [MCSMGM, GCAMGM])
 
 def proposing(*chances: float) -> ACLS:
     """A, with the value 1, which has proposed 2, where B has 1."""
-    robot = started_robot(ACLS, pair(), "RA", 0.0, *chances)
+    robot = started_robot(ACLS, pair(), "RA", chances=(0.0, *chances))
     assert replies(robot, ("RB", Value((1,)))) == [("RB", Proposal((2,)))]
     return robot
 
 
 def test_a_robot_proposes_a_value_that_improves_its_own_side_or_says_that_none_does() -> None:
     assert proposing().proposal == 1
-    robot = started_robot(ACLS, pair(), "RB", 0.0)
+    robot = started_robot(ACLS, pair(), "RB")
     assert replies(robot, ("RA", Value((1,)))) == [("RA", Proposal(None))]
     assert replies(robot, ("RA", Proposal((2,)))) == [("RA", Sides((0, 0), (0, 5)))], "the own side: now, and with it"
 
@@ -64,8 +64,7 @@ def test_a_proposal_that_is_cheap_enough_for_both_is_taken_with_a_probability(
     lot: float,
     moves: bool,  # noqa: FBT001
 ) -> None:
-    robot = proposing(0.0, lot)
-    replies(robot, ("RB", Proposal(None)))
+    robot = after(proposing(0.0, lot), ("RB", Proposal(None)))
     replies(robot, ("RB", Sides(now, proposed)))
     assert value(robot) == ((2,) if moves else (1,))
 
@@ -80,7 +79,7 @@ def test_what_the_neighbour_cannot_have_or_take_is_refused() -> None:
     wrong: tuple[tuple[int, ...], ...] = ((), (1, 1), (3,))
     for protocol in (ACLS, MCSMGM, GCAMGM):
         said = [("RB", message) for message in (*map(Value, wrong), Gain(0, 1))]
-        assert_refused(partial(started_robot, protocol, pair(), "RA", 0.0), said, "RB")
+        assert_refused(partial(started_robot, protocol, pair(), "RA"), said, "RB")
     assert_refused(proposing, [("RB", Proposal(proposed)) for proposed in wrong], "RB")
 
 
@@ -89,7 +88,7 @@ def test_what_the_neighbour_cannot_have_or_take_is_refused() -> None:
 
 def moved(protocol: type[MCSMGM], gained: int) -> list[tuple[str, Message]]:
     """Return the messages of B = 1 when A has gone from 1 to 2, which costs B 5, after it announced that gain."""
-    robot = started_robot(protocol, pair(), "RB", 0.0)
+    robot = started_robot(protocol, pair(), "RB")
     for said in (Value((1,)), Transfer(None), Gain(0, gained)):
         replies(robot, ("RA", said))
     return replies(robot, ("RA", Value((2,))))
@@ -99,14 +98,13 @@ def test_who_loses_too_much_by_a_move_hands_over_its_entry() -> None:
     assert moved(MCSMGM, 4) == moved(GCAMGM, 4) == moved(GCAMGM, 5) == [("RA", Transfer((0, 5)))]
     assert moved(MCSMGM, 5) == [("RA", Transfer(None))]
     for protocol in (MCSMGM, GCAMGM):
-        said = replies(started_robot(protocol, pair(), "RB", 0.0), ("RA", Value((2,))))
+        said = replies(started_robot(protocol, pair(), "RB"), ("RA", Value((2,))))
         assert said == [("RA", Transfer(None))], "no robot has moved before"
 
 
 @TRANSFERS
 def test_who_is_handed_an_entry_pays_it_and_what_is_no_gain_is_refused(protocol: type[MCSMGM]) -> None:
-    robot = started_robot(protocol, pair(), "RA", 0.0)
-    replies(robot, ("RB", Value((1,))))
+    robot = after(started_robot(protocol, pair(), "RA"), ("RB", Value((1,))))
     assert replies(robot, ("RB", Transfer(None))) == [("RB", Gain(0, 3))]
     assert replies(robot, ("RB", Gain(0, 0))) == [("RB", Value((2,)))]
     replies(robot, ("RB", Value((1,))))

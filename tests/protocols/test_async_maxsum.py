@@ -17,7 +17,7 @@ from robochoc.protocols.inference.settings.async_maxsum import AsyncMaxSumSettin
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import assert_refused, replies, robot_of, started, value
+from tests.support.agents import after, assert_refused, replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_tree
@@ -63,15 +63,13 @@ def test_r_goes_up_as_soon_as_domains_are_known_and_each_arrival_is_answered_at_
 
 
 def test_a_change_that_is_smaller_than_the_tolerance_is_not_told() -> None:
-    robot = middle(tolerance=0.5)
-    replies(robot, ("RA", TWO), ("RC", R([[0, 7]], settled=True)))
+    robot = after(middle(tolerance=0.5), ("RA", TWO), ("RC", R([[0, 7]], settled=True)))
     assert replies(robot, ("RC", R([[0, 1.5]], settled=True))) == []  # A's value 1 costs 2.5 now, and not 3
     assert replies(robot, ("RC", R([[0, 1]], settled=True))) == [("RA", R([[2, 4]], settled=True))]
 
 
 def test_what_is_damped_is_not_settled_and_is_told_on_when_the_receiver_answers() -> None:
-    robot = middle(damping=0.25, tolerance=0.4)
-    replies(robot, ("RA", TWO))
+    robot = after(middle(damping=0.25, tolerance=0.4), ("RA", TWO))
     replies(robot, ("RC", R([[0, 0]], settled=True)))
     assert replies(robot, ("RC", R([[0, 2]], settled=True))) == [("RA", R([[2.5, 4]], settled=False))]
     assert replies(robot, ("RA", Q([[0, 0]], settled=True))) == [("RA", R([[3, 4]], settled=True))]
@@ -79,16 +77,14 @@ def test_what_is_damped_is_not_settled_and_is_told_on_when_the_receiver_answers(
 
 
 def test_after_so_many_messages_a_neighbour_hears_no_more() -> None:
-    robot = middle(limit=1)
-    replies(robot, ("RA", TWO))
+    robot = after(middle(limit=1), ("RA", TWO))
     assert replies(robot, ("RC", R([[0, 7]], settled=True))) == [("RC", Q([[2, 0]], settled=True))]
     assert replies(robot, ("RC", R([[9, 0]], settled=True))) == []
     assert value(robot) == (2,)
 
 
 def test_a_robot_all_of_whose_values_are_out_has_proven_that_there_is_no_solution() -> None:
-    robot = middle()
-    replies(robot, ("RA", TWO))
+    robot = after(middle(), ("RA", TWO))
     assert replies(robot, ("RC", R([[INFINITE, INFINITE]], settled=True))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
     assert replies(robot, ("RA", Q([[0, 0]], settled=True))) == []

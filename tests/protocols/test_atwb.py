@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import pytest
 
@@ -11,8 +12,8 @@ from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.asymmetric.atwb import ATWB
 from robochoc.protocols.asymmetric.messages.atwb import Side, SideRequest
 from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution
-from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
-from tests.support.agents import assert_refused, replies, started_robot, value
+from robochoc.solver.agent_problem import RunParameters
+from tests.support.agents import after, assert_refused, replies, started_robot, value
 from tests.support.asymmetric_problems import priced_part, two_valued
 
 
@@ -26,8 +27,7 @@ def chain() -> Team:
     return two_valued("ABCD", parts)
 
 
-def agent(name: str, parameters: RunParameters = DEFAULT_PARAMETERS) -> ATWB:
-    return started_robot(ATWB, chain(), name, parameters=parameters)
+agent = partial(started_robot, ATWB, chain())
 
 
 def assigned(*assignments: tuple[int, int]) -> list[tuple[Value, int]]:
@@ -44,9 +44,7 @@ AB = cpa((1, 1), (2, 1), least=[0, 0, 0])
 
 def holder() -> ATWB:
     """C, which holds the CPA with A = 1 and B = 2, and has asked for the sides of its value 1."""
-    robot = agent("RC")
-    replies(robot, ("RB", AB))
-    return robot
+    return agent("RC", ("RB", AB))
 
 
 def test_robots_before_are_asked_for_their_sides_and_robots_after_for_bounds_at_once() -> None:
@@ -60,8 +58,7 @@ def test_robots_before_are_asked_for_their_sides_and_robots_after_for_bounds_at_
 
 
 def test_a_robot_before_tells_what_its_side_adds_to_a_value_that_can_be() -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    robot = agent("RB", ("RA", cpa((1, 1), least=[0, 0])))
     assert replies(robot, ("RC", SideRequest((1,), 5, 1))) == [("RC", Side(5, 3))]
     assert replies(robot, ("RC", SideRequest((2,), 6, 1))) == [("RC", Side(6, 0))]
     for wrong in ((), (3,), (1, 1)):
@@ -74,12 +71,11 @@ def test_what_it_pays_in_any_case_is_in_the_cpa_already_unless_robots_may_withdr
     said = replies(robot, ("RB", CPA(assigned((1, 1)), math.inf, [])))
     assert said[0] == ("RB", cpa((2, 2), least=[0, 2]))
     assert replies(robot, ("RC", SideRequest((1,), 5, 2))) == [("RC", Side(5, 3))]
-    assert agent("RA", RunParameters(withdrawal_cost=9)).least == {"RC": [0, 0, 0]}
+    assert agent("RA", parameters=RunParameters(withdrawal_cost=9)).least == {"RC": [0, 0, 0]}
 
 
 def test_what_its_side_forbids_is_infinite_and_a_request_about_a_value_that_was_given_up_is_dropped() -> None:
-    robot = agent("RB")
-    replies(robot, ("RA", cpa((1, 1), least=[0, 0])))
+    robot = agent("RB", ("RA", cpa((1, 1), least=[0, 0])))
     replies(robot, ("RC", CPA(assigned((1, 1), (1, 1)), math.inf, [])))
     assert value(robot) == (2,)
     assert replies(robot, ("RC", SideRequest((2,), 5, 2))) == [("RC", Side(5, INFINITE))]
@@ -95,24 +91,21 @@ def test_the_cpa_goes_on_with_its_exact_cost_when_all_sides_are_known_and_they_a
 
 
 def test_the_next_value_is_taken_as_soon_as_the_sum_reaches_b() -> None:
-    robot = holder()
-    replies(robot, ("RD", NewSolution([(1,), (1,), (2,), (1,)], 8)))
+    robot = after(holder(), ("RD", NewSolution([(1,), (1,), (2,), (1,)], 8)))
     said = replies(robot, ("RA", Side(1, 7)))
     assert said[:2] == [("RA", SideRequest((2,), 2, 1)), ("RB", SideRequest((2,), 2, 1))]
     assert value(robot) == (2,)
     before = robot.cost
     assert replies(robot, ("RB", Side(1, 5))) == [], "an answer about a value that was given up is dropped"
     assert robot.cost == before
-    robot = holder()
-    replies(robot, ("RD", NewSolution([(1,), (1,), (2,), (1,)], 8)), ("RA", Side(1, 5)))
+    robot = after(holder(), ("RD", NewSolution([(1,), (1,), (2,), (1,)], 8)), ("RA", Side(1, 5)))
     assert value(robot) == (1,)
     replies(robot, ("RD", FBEstimate([1, 1, 1], [0, 0, 0, 2])))
     assert value(robot) == (2,), "both sides and the bounds of robots after count"
 
 
 def test_a_side_is_asked_for_once() -> None:
-    robot = holder()
-    replies(robot, ("RA", Side(1, 7)), ("RB", Side(1, 0)))
+    robot = after(holder(), ("RA", Side(1, 7)), ("RB", Side(1, 0)))
     said = replies(robot, ("RB", cpa((1, 1), (1, 2), least=[0, 0, 0])))
     assert said[0] == ("RA", SideRequest((2,), 2, 1))  # now the cheaper value: 2, and not 1 + 4 + 7
     replies(robot, ("RA", Side(2, 0)), ("RB", Side(2, 0)))

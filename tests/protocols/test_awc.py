@@ -48,8 +48,7 @@ def test_the_view_is_checked_once_a_packet_has_been_read() -> None:
 def test_of_the_allowed_values_the_one_with_fewest_conflicts_with_lower_robots_is_taken() -> None:
     """A nogood with lower robots counts as a conflict."""
     for packet in ([("RC", Ok((2,), 0))], [("RC", Ok((1,), 0)), ("RC", nogood({"RB": (2,), "RC": (1,)}))]):
-        awc = agent(triangle(3), "RB")
-        replies(awc, *packet)
+        awc = agent(triangle(3), "RB", *packet)
         replies(awc, ("RA", Ok((1,), 0)))
         assert value(awc) == (3,)
 
@@ -64,8 +63,7 @@ def test_backtrack_tells_the_nogood_to_all_robots_in_it_and_goes_above_all_neigh
 
 
 def test_a_nogood_that_has_been_sent_before_is_not_sent_again_and_changes_nothing() -> None:
-    awc = agent(triangle(), "RC")
-    replies(awc, ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)))
+    awc = agent(triangle(), "RC", ("RA", Ok((1,), 0)), ("RB", Ok((2,), 0)))
     assert replies(awc, ("RA", Ok((1,), 2)), ("RB", Ok((2,), 2))) == []
     assert awc.priority == 1
     assert replies(awc, ("RA", Ok((2,), 2)), ("RB", Ok((1,), 2)))
@@ -98,8 +96,7 @@ def test_a_robot_that_is_not_the_lowest_of_a_nogood_keeps_to_it_only_once_it_is(
 
 
 def test_a_nogood_with_a_robot_that_is_no_neighbour_makes_it_one_and_only_then_is_believed() -> None:
-    awc = agent(triangle(), "RA")
-    replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RB": ((2,), 4)})))
+    awc = agent(triangle(), "RA", ("RC", Nogood({"RA": ((1,), 0), "RB": ((2,), 4)})))
     assert awc.view == {}
     awc = agent(triangle(), "RA")
     said = replies(awc, ("RC", Nogood({"RA": ((1,), 0), "RD": ((2,), 4)})))
@@ -123,8 +120,7 @@ def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None
 
 
 def test_what_is_known_to_hold_is_not_checked_again() -> None:
-    awc = agent(triangle(3), "RB")
-    replies(awc, ("RA", Ok((2,), 0)))
+    awc = agent(triangle(3), "RB", ("RA", Ok((2,), 0)))
     checks = awc.problem.checks
     assert checks
     replies(awc, ("RC", Ok((1,), 0)), ("RA", Ok((2,), 0)))

@@ -8,7 +8,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Value
 from robochoc.protocols.optimization.messages.bounding import Terminate
-from tests.support.agents import replies, value
+from tests.support.agents import after, replies, value
 from tests.support.pseudo_trees import context, placed, priced, root, to
 
 TEAM = priced(
@@ -26,9 +26,7 @@ def middle() -> BnBADOPT:
 
 def informed(threshold: float = INFINITE) -> BnBADOPT:
     """B, when it knows the values above, both 1."""
-    adopt = middle()
-    replies(adopt, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold)))
-    return adopt
+    return after(middle(), ("RZ", Value((1,), 1)), ("RA", Value((1,), 1, threshold)))
 
 
 def both(*costs: Cost) -> list[tuple[str, Message]]:
@@ -43,8 +41,7 @@ def test_start_takes_the_value_with_the_least_lower_bound_and_tells_all_around()
 
 
 def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
-    adopt = informed()
-    replies(adopt, ("RC", Cost(context(B=1, X=(1, 2), A=(2, 2)), 4, 7)))
+    adopt = after(informed(), ("RC", Cost(context(B=1, X=(1, 2), A=(2, 2)), 4, 7)))
     replies(adopt, ("RD", Cost(context(B=1, X=(2, 1)), 5, 7)), ("RA", Value((1,), 1)))
     assert adopt.context == context(A=(2, 2), Z=1, X=(1, 2))
     assert adopt.bounds["RC"].lb == [4, 0]
@@ -52,8 +49,7 @@ def test_priority_merge_keeps_the_larger_id_whoever_tells() -> None:
 
 
 def test_a_changed_value_voids_the_bounds_of_children_that_depend_on_it_and_the_threshold() -> None:
-    adopt = informed(threshold=9)
-    replies(adopt, ("RC", Cost(context(B=1, Z=1), 4, 7)), ("RD", Cost(context(B=1, A=1), 3, 3)))
+    adopt = after(informed(threshold=9), ("RC", Cost(context(B=1, Z=1), 4, 7)), ("RD", Cost(context(B=1, A=1), 3, 3)))
     said = replies(adopt, ("RZ", Value((2,), 2)))
     assert (adopt.bounds["RC"].lb, adopt.bounds["RC"].ub) == ([0, 0], [INFINITE, INFINITE])
     assert (adopt.bounds["RD"].lb, adopt.bounds["RD"].ub) == ([3, 0], [3, INFINITE])
@@ -63,8 +59,7 @@ def test_a_changed_value_voids_the_bounds_of_children_that_depend_on_it_and_the_
 
 
 def test_a_value_that_was_not_known_voids_no_threshold_but_the_own_value_is_chosen_anew() -> None:
-    adopt = middle()
-    replies(adopt, ("RA", Value((2,), 1, 9)), ("RZ", Value((2,), 1)))
+    adopt = after(middle(), ("RA", Value((2,), 1, 9)), ("RZ", Value((2,), 1)))
     assert adopt.threshold == 9
     assert value(adopt) == (2,)
 
@@ -78,8 +73,7 @@ def test_init_self_takes_the_value_with_the_least_lower_bound() -> None:
 
 
 def test_a_value_is_kept_until_it_is_no_better_than_the_best_known_or_dearer_than_the_threshold() -> None:
-    adopt = informed()
-    replies(adopt, *both(Cost(context(B=1), 0, 5)))
+    adopt = after(informed(), *both(Cost(context(B=1), 0, 5)))
     assert adopt.ub == 10
     for least, kept, own in ((3, [6, 4], 1), (5, [10, 4], 2)):
         replies(adopt, *both(Cost(context(B=1), least, 5)))
@@ -91,8 +85,7 @@ def test_a_value_is_kept_until_it_is_no_better_than_the_best_known_or_dearer_tha
 
 
 def test_when_the_bounds_meet_the_value_is_the_one_that_is_known_to_cost_that() -> None:
-    adopt = root(BnBADOPT)
-    replies(adopt, *both(Cost(context(B=1), 1, INFINITE)))
+    adopt = after(root(BnBADOPT), *both(Cost(context(B=1), 1, INFINITE)))
     said = replies(adopt, *both(Cost(context(B=2), 0, 0)))
     assert list(adopt.lower) == [2, 2]
     assert value(adopt) == (2,)
@@ -142,8 +135,7 @@ def test_the_last_value_goes_to_all_neighbours_below() -> None:
 
 
 def test_another_robot_ends_only_after_its_parent_when_its_bounds_meet_and_tells_it_nothing() -> None:
-    adopt = informed()
-    replies(adopt, *both(Cost(context(B=1), 1, 1)))
+    adopt = after(informed(), *both(Cost(context(B=1), 1, 1)))
     assert adopt.lb == adopt.ub == 2
     assert not adopt.terminated
     said = replies(adopt, ("RA", Terminate(context(Z=1, A=1, X=2))))
@@ -158,8 +150,7 @@ def test_another_robot_ends_only_after_its_parent_when_its_bounds_meet_and_tells
 
 
 def test_a_root_that_finds_all_values_infinite_ends_the_search_of_all_and_another_robot_says_so() -> None:
-    adopt = root(BnBADOPT)
-    replies(adopt, ("RC", Cost(context(B=2), INFINITE, INFINITE)))
+    adopt = after(root(BnBADOPT), ("RC", Cost(context(B=2), INFINITE, INFINITE)))
     assert replies(adopt, ("RC", Cost(context(B=1), INFINITE, INFINITE))) == []
     assert adopt.verdict is Verdict.NO_SOLUTION
     adopt = informed(threshold=5)

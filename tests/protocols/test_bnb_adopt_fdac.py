@@ -14,7 +14,7 @@ from robochoc.protocols.optimization.bnb_adopt_fdac import BnBADOPTFDAC
 from robochoc.protocols.optimization.messages.bnb_adopt_fdac import Cost, Domain, Moved, Value
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.protocols.optimization.settings.bnb_adopt_fdac import BnBADOPTFDACSettings
-from tests.support.agents import assert_refused, replies, value
+from tests.support.agents import after, assert_refused, replies, value
 from tests.support.pseudo_trees import context, placed, priced, to
 from tests.support.spent import spent
 
@@ -48,9 +48,7 @@ def moved(kind: type[BnBADOPTFDAC] = BnBADOPTFDAC) -> BnBADOPTFDAC:
 
 def informed() -> BnBADOPTFDAC:
     """B, when it also knows the values above, both 1."""
-    robot = moved()
-    replies(robot, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1)))
-    return robot
+    return after(moved(), ("RZ", Value((1,), 1)), ("RA", Value((1,), 1)))
 
 
 # Before the search
@@ -124,8 +122,7 @@ def test_a_table_that_is_too_large_is_left_as_it_is(monkeypatch: pytest.MonkeyPa
 def test_a_robot_that_has_no_value_left_ends_the_search_of_all() -> None:
     robot = moved()
     assert robot.verdict is None
-    robot = middle()
-    replies(robot, ("RC", Moved([INFINITE, 0])), ("RD", Moved([0, INFINITE])), ("RE", Moved([0, 0])))
+    robot = after(middle(), ("RC", Moved([INFINITE, 0])), ("RD", Moved([0, INFINITE])), ("RE", Moved([0, 0])))
     assert replies(robot, ("RA", DOMAIN), ("RZ", DOMAIN))[-1:] == []
     assert robot.verdict is Verdict.NO_SOLUTION
 

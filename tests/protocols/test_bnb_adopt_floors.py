@@ -9,7 +9,7 @@ from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
-from tests.support.agents import assert_refused, replies, sent, value
+from tests.support.agents import after, assert_refused, replies, sent, value
 from tests.support.cases import looped
 from tests.support.pseudo_trees import context, placed, priced
 from tests.support.spent import spent
@@ -40,8 +40,7 @@ def test_children_are_asked_with_the_own_values_and_lower_bounds_begin_at_their_
     robot = middle()
     assert sent(robot) == [("RC", Domain([(1,), (2,)])), ("RD", Domain([(1,), (2,)]))]
     assert replies(robot, ("RZ", Value((1,), 1)), ("RC", Floor([0, 0]))) == []
-    robot = middle()
-    replies(robot, ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
+    robot = after(middle(), ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
     assert (list(robot.lower), value(robot)) == ([5, 2], (2,))
 
 
@@ -54,8 +53,7 @@ def test_the_floor_is_the_least_of_what_is_paid_with_the_parent_and_of_the_child
 
 def test_a_changed_value_voids_bounds_and_shares_of_the_threshold_down_to_the_floors() -> None:
     for kind in (WithFloors, WithShares):
-        robot = middle(kind)
-        replies(robot, ("RA", Value((1,), 1)), ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
+        robot = after(middle(kind), ("RA", Value((1,), 1)), ("RC", Floor([4, 0])), ("RD", Floor([1, 2])))
         assert not isinstance(robot, ADOPTk) or robot.t == {"RC": [4, 0], "RD": [1, 2]}
         replies(robot, ("RC", Cost(context(B=1, A=1), 9, 9)), ("RA", Value((2,), 2)))
         assert (robot.bounds["RC"].lb, robot.bounds["RC"].ub) == ([4, 0], [INFINITE, INFINITE])

@@ -17,7 +17,7 @@ from robochoc.protocols.optimization.messages import adopt as adopt_messages
 from robochoc.protocols.optimization.messages import bnb_adopt as bnb_adopt_messages
 from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.run.incumbent import lower_bound
-from tests.support.agents import replies, robot_of, started, started_robot
+from tests.support.agents import after, replies, robot_of, started, started_robot
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
@@ -33,9 +33,7 @@ class Family(NamedTuple):
 
     def informed(self) -> BoundingProtocol:
         """B, when it knows the values above, both 1."""
-        robot = middle(self.protocol)
-        replies(robot, ("RZ", self.value((1,), 1)), ("RA", self.value((1,), 1)))
-        return robot
+        return after(middle(self.protocol), ("RZ", self.value((1,), 1)), ("RA", self.value((1,), 1)))
 
 
 FAMILIES = [
@@ -78,8 +76,7 @@ def test_an_n_ary_constraint_is_paid_by_its_lowest_robot_once_it_knows_the_other
     team = priced("ABC", {"ABC": range(8)})
     top = placed(protocol, team, "RA", children=["RB"], pseudo_children=["RC"])
     assert list(top.lower) == [0, 0]
-    robot = placed(protocol, team, "RC", "RB", pseudo_parents=["RA"])
-    replies(robot, ("RB", value((2,), 1)))
+    robot = after(placed(protocol, team, "RC", "RB", pseudo_parents=["RA"]), ("RB", value((2,), 1)))
     assert list(robot.lower) == [0, 0]
     assert robot.problem.checks == 0
     assert replies(robot, ("RA", value((2,), 1))) == [("RB", cost(context(A=2, B=2), 6, 6))]
@@ -87,8 +84,7 @@ def test_an_n_ary_constraint_is_paid_by_its_lowest_robot_once_it_knows_the_other
 
 @both
 def test_a_root_whose_bounds_meet_ends_and_says_so(family: Family) -> None:
-    robot = root(family.protocol)
-    replies(robot, ("RC", family.cost(context(B=1), 1, 1)))
+    robot = after(root(family.protocol), ("RC", family.cost(context(B=1), 1, 1)))
     assert robot.findings.bound == 1
     assert not robot.terminated
     said = replies(robot, ("RD", family.cost(context(B=1), 0, 0)))

@@ -13,7 +13,7 @@ from robochoc.protocols.optimization.ncbb import NCBB
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.agents import assert_refused, replies
+from tests.support.agents import after, assert_refused, replies
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
 from tests.support.pseudo_trees import placed, priced, to
@@ -41,17 +41,14 @@ def placed_fork() -> NCBB:
 
 def fork() -> NCBB:
     """B, which searches with A = 1 and no bound: its values cost 0 and 6 themselves."""
-    robot = placed_fork()
-    replies(robot, ("RC", Members({"RB": ["RC", "RE"]})), ("RD", Members({"RB": ["RD"], "RA": ["RF"]})))
+    robot = after(placed_fork(), ("RC", Members({"RB": ["RC", "RE"]})), ("RD", Members({"RB": ["RD"], "RA": ["RF"]})))
     replies(robot, ("RA", Greedy((1,))), ("RC", Result(9, {"RC": (1,), "RE": (1,)})))
     replies(robot, ("RD", Result(9, {"RD": (1,), "RF": (1,)})), ("RA", Request((1,))))
     return robot
 
 
 def searching(bound: float = INFINITE) -> NCBB:
-    robot = fork()
-    replies(robot, ("RA", Search(bound)))
-    return robot
+    return after(fork(), ("RA", Search(bound)))
 
 
 def test_a_robot_tells_its_parent_who_of_its_subtree_is_linked_with_whom_above() -> None:
@@ -80,8 +77,7 @@ def test_a_child_searches_when_all_answers_are_there_for_what_they_leave_of_the_
 
 
 def test_subtrees_are_at_different_values_at_the_same_time() -> None:
-    robot = searching()
-    replies(robot, ("RC", Report(0)), ("RE", Report(0)), ("RD", Report(0)))
+    robot = after(searching(), ("RC", Report(0)), ("RE", Report(0)), ("RD", Report(0)))
     said = replies(robot, ("RC", Result(1, {"RC": (1,), "RE": (2,)})))
     assert said == [("RC", Request((2,))), ("RE", Request((2,)))]
     assert (robot.branches["RC"].index, robot.branches["RD"].index) == (1, 0)
@@ -92,14 +88,12 @@ def test_what_a_subtree_costs_lowers_the_bounds_of_the_others_and_may_rule_a_val
         (Result(11, {"RC": (1,), "RE": (2,)}), [("RD", Search(9))]),
         (Result(INFINITE, {}), [("RD", Request((2,)))]),
     ):
-        robot = searching(bound=20)
-        replies(robot, ("RC", Report(2)), ("RE", Report(3)), ("RC", result))
+        robot = after(searching(bound=20), ("RC", Report(2)), ("RE", Report(3)), ("RC", result))
         assert replies(robot, ("RD", Report(4))) == said
 
 
 def test_the_cheapest_value_with_its_assignment_is_returned_when_all_subtrees_are_done() -> None:
-    robot = searching(bound=20)
-    replies(robot, ("RC", Report(2)), ("RE", Report(3)), ("RD", Report(0)))
+    robot = after(searching(bound=20), ("RC", Report(2)), ("RE", Report(3)), ("RD", Report(0)))
     replies(robot, ("RC", Result(5, {"RC": (1,), "RE": (2,)})))
     assert replies(robot, ("RD", Result(1, {"RD": (2,), "RF": (2,)}))) == []
     assert robot.best == 6
@@ -143,8 +137,7 @@ def leaf() -> NCBB:
 
 def test_a_bound_is_the_cost_with_robots_from_the_asker_up() -> None:
     """Robots below the asker are left out, as their values are old."""
-    robot = leaf()
-    replies(robot, ("RX", Request((1,))), ("RY", Request((1,))))
+    robot = after(leaf(), ("RX", Request((1,))), ("RY", Request((1,))))
     for asked in (leaf(), robot):
         assert replies(asked, ("RX", Request((2,)))) == [("RX", Report(1))]
 

@@ -21,7 +21,7 @@ from robochoc.protocols.local_search.messages.cocoa import (
     SetValue,
 )
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.agents import assert_refused, replies, robot_of, started, started_robot, value
+from tests.support.agents import after, assert_refused, replies, robot_of, started, started_robot, value
 from tests.support.asymmetric_problems import divided_pair as divided
 from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.cost_problems import random_cost_team, random_hard_team
@@ -39,13 +39,12 @@ def chain(*, names: str = "ABC") -> Team:
 
 
 def idle(name: str, *chances: float, team: Team | None = None) -> CoCoA:
-    return started_robot(CoCoA, team or chain(), name, *chances)
+    return started_robot(CoCoA, team or chain(), name, chances=chances)
 
 
 def active(*chances: float) -> CoCoA:
     """B, active because A has taken the value 1."""
-    robot = idle("RB", *chances)
-    replies(robot, ("RA", SetValue((1,))))
+    robot = after(idle("RB", *chances), ("RA", SetValue((1,))))
     assert robot.state is State.ACTIVE
     return robot
 
@@ -64,8 +63,7 @@ def test_a_neighbour_answers_with_the_least_cost_of_each_value_and_counts_what_i
 
 
 def test_who_is_done_answers_for_its_value() -> None:
-    robot = active()
-    replies(robot, ("RC", Costs([(0, 0), (0, 4)])))
+    robot = after(active(), ("RC", Costs([(0, 0), (0, 4)])))
     assert value(robot) == (1,)
     assert replies(robot, ("RC", Inquiry(TWO, {}))) == [("RC", Costs([(0, 8), (0, 5)]))]
 
@@ -73,8 +71,7 @@ def test_who_is_done_answers_for_its_value() -> None:
 def test_an_idle_robot_becomes_active_when_a_neighbour_has_chosen_or_waits_and_asks_those_that_have_not() -> None:
     both = [("RA", Inquiry(TWO, {})), ("RC", Inquiry(TWO, {}))]
     for news, asked in ((SetValue((1,)), [("RC", Inquiry(TWO, {"RA": (1,)}))]), (Hold(), both)):
-        robot = idle("RB")
-        replies(robot, ("RA", Inquiry(TWO, {})))
+        robot = after(idle("RB"), ("RA", Inquiry(TWO, {})))
         states = [robot.state]
         assert replies(robot, ("RA", news)) == asked
         assert [*states, robot.state] == [State.IDLE, State.ACTIVE]
@@ -90,16 +87,14 @@ def test_when_all_have_answered_the_value_with_the_least_sum_is_taken_and_told()
 
 
 def test_who_waits_asks_again_when_a_neighbour_has_chosen() -> None:
-    robot = idle("RB")
-    replies(robot, ("RA", Hold()))
+    robot = after(idle("RB"), ("RA", Hold()))
     assert replies(robot, ("RA", Costs([(0, 0), (0, 0)])), ("RC", Costs([(0, 0), (0, 0)])))[-1] == ("RC", Hold())
     assert replies(robot, ("RA", SetValue((1,)))) == [("RC", Inquiry(TWO, {"RA": (1,)}))]
     assert robot.bound == 1
 
 
 def test_who_waits_accepts_more_equally_good_values_when_nobody_around_goes_on() -> None:
-    robot = active(0.9)
-    replies(robot, ("RC", Costs([(0, 0), (0, 3)])))
+    robot = after(active(0.9), ("RC", Costs([(0, 0), (0, 3)])))
     replies(robot, ("RC", Inquiry(TWO, {})))
     assert (robot.state, robot.bound) == (State.HOLD, 1), "a neighbour is active"
     assert replies(robot, ("RC", Hold())) == [("RC", Inquiry(TWO, {"RA": (1,)}))]
@@ -109,8 +104,7 @@ def test_who_waits_accepts_more_equally_good_values_when_nobody_around_goes_on()
 
 def test_an_answer_of_one_that_has_chosen_meanwhile_is_not_used() -> None:
     """By C's answer 1 would be best; with its value 1, the own 1 costs 4 and the own 2 costs 2."""
-    robot = active()
-    replies(robot, ("RC", SetValue((1,))), ("RC", Costs([(0, 0), (0, 99)])))
+    robot = after(active(), ("RC", SetValue((1,))), ("RC", Costs([(0, 0), (0, 99)])))
     assert value(robot) == (2,)
 
 
@@ -127,8 +121,7 @@ def test_an_n_ary_constraint_counts_once_when_all_but_two_have_values() -> None:
     scope = ("A", "B", "C")
     team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("T", rows, scope, scope)])
     assert replies(idle("RB", team=team), ("RA", Inquiry(TWO, {}))) == [("RA", Costs([(0, 0), (0, 0)]))]
-    robot = idle("RB", team=team)
-    replies(robot, ("RA", SetValue((1,))))
+    robot = after(idle("RB", team=team), ("RA", SetValue((1,))))
     assert robot.state is State.ACTIVE
     asked = ("RC", Inquiry(TWO, {"RA": (1,)}))
     assert replies(robot, asked) == [("RC", Costs([(0, 1), (0, 1)]))]
@@ -136,8 +129,7 @@ def test_an_n_ary_constraint_counts_once_when_all_but_two_have_values() -> None:
 
 def answered() -> CoCoA:
     """B, which A has answered."""
-    robot = idle("RB")
-    replies(robot, ("RA", Hold()))
+    robot = after(idle("RB"), ("RA", Hold()))
     replies(robot, ("RA", Costs([(0, 0), (0, 0)])))
     return robot
 
@@ -177,8 +169,7 @@ def test_who_is_done_tells_what_its_side_charges_with_its_value() -> None:
         (CostsAt([(0, 9), (0, 0)], [(1,), (1,)]), FinalSide([(0, 0), (0, 0)])),
         (CostsAt([(0, 0), (0, 9)], [(1,), (1,)]), FinalSide([(0, 3), (0, 1)])),
     ):
-        robot = asking()
-        replies(robot, ("RB", told))
+        robot = after(asking(), ("RB", told))
         assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", side)]
 
 

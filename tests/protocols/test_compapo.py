@@ -27,7 +27,7 @@ from robochoc.protocols.satisfaction.messages.compapo import (
     Wait,
 )
 from robochoc.run import Options, Runtime, solve
-from tests.support.agents import assert_refused, replies, robot_of, started, value
+from tests.support.agents import after, assert_refused, replies, robot_of, started, value
 from tests.support.examples import count
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import graph_team, triangle
@@ -37,13 +37,15 @@ UNEQUAL = bytes([0b0110])
 """Two robots of two values each that differ."""
 
 
-def agent(team: Team, name: str) -> CompAPO:
-    """The protocol object of one robot, which knows its neighbours' domains, with nothing left to say."""
+def agent(team: Team, name: str, *packet: tuple[str, Message]) -> CompAPO:
+    """The protocol object of one robot, which knows its neighbours' domains, after it has read `packet`."""
     robot = robot_of(CompAPO, team, name)
     robot.start()
     for neighbour in robot.linked:
         robot.receive(neighbour, Init(tuple((one,) for one in team[neighbour].variables[0].domain)))
     robot.outbox.clear()
+    if packet:
+        replies(robot, *packet)
     return robot
 
 
@@ -100,8 +102,7 @@ def test_a_session_also_holds_the_robots_around_the_good_list() -> None:
 
 
 def test_a_good_list_without_a_solution_ends_the_search() -> None:
-    robot = mediator()
-    replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB")))))
+    robot = after(mediator(), ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB")))))
     replies(robot, ("RC", Evaluation(1, 1, 1, (table("RA", "RC"), table("RB", "RC")))))
     assert robot.verdict is Verdict.NO_SOLUTION
 
@@ -138,15 +139,13 @@ def test_whoever_is_held_keeps_its_value() -> None:
 
 
 def test_accept_takes_the_value() -> None:
-    robot = agent(triangle(), "RB")
-    replies(robot, ("RA", Evaluate(1, 3, tables=False)))
+    robot = agent(triangle(), "RB", ("RA", Evaluate(1, 3, tables=False)))
     assert replies(robot, ("RA", Assign(1, {}))) == []
     assert (value(robot), robot.count, robot.holder) == ((2,), 1, None)
 
 
 def test_a_request_of_lower_priority_is_told_when_this_robot_is_free_and_a_higher_one_waits_for_its_turn() -> None:
-    robot = agent(triangle(), "RB")
-    replies(robot, ("RC", Ok((2,), 1)), ("RA", Evaluate(1, 3, tables=False)))
+    robot = agent(triangle(), "RB", ("RC", Ok((2,), 1)), ("RA", Evaluate(1, 3, tables=False)))
     assert replies(robot, ("RC", Evaluate(4, 3, tables=False))) == [("RC", Wait(4))]
     assert replies(robot, ("RA", Release({}))) == [("RC", Free())]
     replies(robot, ("RC", Evaluate(5, 3, tables=False)))

@@ -22,7 +22,7 @@ from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Withdrawal
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
-from tests.support.agents import assert_refused, replies
+from tests.support.agents import after, assert_refused, replies
 from tests.support.brute_force import priced_solutions
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
@@ -82,8 +82,7 @@ def test_costs_are_followed_by_numbers() -> None:
 
 def test_numbers_of_equal_least_cost_are_added_and_those_of_dearer_values_are_not() -> None:
     for costs, place, number in (([4, 4], 0, 5), ([5, 4], 1, 3)):
-        robot = root()
-        replies(robot, ("RB", UTIL(1, bytes(costs))))
+        robot = after(root(), ("RB", UTIL(1, bytes(costs))))
         assert replies(robot, ("RB", Counts(1, bytes([2, 3])))) == [("RB", VALUE([place]))]
         assert (robot.count, robot.findings.count, robot.findings.bound) == (number, str(number), 4)
 
@@ -99,17 +98,14 @@ def test_numbers_of_children_are_multiplied() -> None:
 
 
 def test_without_any_solution_there_are_none() -> None:
-    robot = root()
-    replies(robot, ("RB", UTIL(1, bytes([255, 255]))), ("RB", Counts(1, bytes(2))))
+    robot = after(root(), ("RB", UTIL(1, bytes([255, 255]))), ("RB", Counts(1, bytes(2))))
     assert robot.verdict is Verdict.NO_SOLUTION
     assert robot.count == 0
 
 
 def test_numbers_that_cannot_be_are_refused() -> None:
     def with_costs() -> CountDPOP:
-        robot = root()
-        replies(robot, ("RB", UTIL(1, bytes([4, 5]))))
-        return robot
+        return after(root(), ("RB", UTIL(1, bytes([4, 5]))))
 
     assert replies(with_costs(), ("RB", Counts(1, bytes([1])))) == []
     for wrong, why in (

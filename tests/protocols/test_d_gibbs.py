@@ -17,7 +17,7 @@ from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.run.incumbent import costs_by_cycle
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.support.agents import assert_refused, replies, sent, value
+from tests.support.agents import after, assert_refused, replies, sent, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
@@ -60,8 +60,7 @@ def test_a_value_is_drawn_by_what_it_costs_with_the_neighbours_values() -> None:
     Where it is hot, all values are alike.
     """
     for lot, temperature, drawn in ((0.0, 1, 1), (0.992, 1, 1), (0.994, 1, 2), (0.51, 1e9, 2)):
-        made = robot("A", 0.0, lot, temperature=temperature)
-        replies(made, ("RB", Value((1,), True)))
+        made = after(robot("A", 0.0, lot, temperature=temperature), ("RB", Value((1,), True)))
         assert value(made) == (drawn,)
 
 
@@ -79,16 +78,14 @@ def test_a_leaf_tells_at_once_by_how_much_the_cost_has_changed_and_others_add_up
     made = robot("C", 0.9)
     sent(made)
     assert replies(made, ("RB", Value((1,), False)))[-1] == ("RB", Difference(0, -3))
-    made = robot("B", 0.9)
-    replies(made, ("RC", Value((1,), True)), ("RA", Value((1,), False)))
+    made = after(robot("B", 0.9), ("RC", Value((1,), True)), ("RA", Value((1,), False)))
     assert replies(made, ("RC", Value((1,), False)), ("RC", Difference(0, 2))) == [("RA", Difference(0, -6))]
 
 
 def test_the_root_tells_with_the_next_value_whether_the_sample_was_the_best() -> None:
     """The next sample waits for the values of all below."""
     for change, kept in ((-4, True), (5, False)):
-        made = robot("A")
-        replies(made, ("RB", Value((1,), True)))
+        made = after(robot("A"), ("RB", Value((1,), True)))
         assert replies(made, ("RB", Difference(0, change))) == []
         assert made.cycle == 1
         assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), kept))]
@@ -96,8 +93,7 @@ def test_the_root_tells_with_the_next_value_whether_the_sample_was_the_best() ->
 
 def test_at_the_end_all_take_their_values_of_the_best_sample() -> None:
     for kept, best in ((True, 2), (False, 1)):
-        made = robot("B", 0.0, 0.999, cycles=1)
-        replies(made, ("RC", Value((1,), True)), ("RA", Value((2,), True)))
+        made = after(robot("B", 0.0, 0.999, cycles=1), ("RC", Value((1,), True)), ("RA", Value((2,), True)))
         assert value(made) == (2,)
         replies(made, ("RC", Value((1,), True)), ("RC", Difference(0, 0)))
         assert replies(made, ("RA", Finish(kept))) == [("RC", Finish(kept))]

@@ -32,7 +32,7 @@ def path(*names: str, relation: Relation = DIFFERENT, values: int = 2) -> Team:
 
 def middle(*chances: float, relation: Relation = DIFFERENT, values: int = 2) -> DBA:
     """B between A and C, with the value 1."""
-    return started_robot(DBA, path("A", "B", "C", relation=relation, values=values), "RB", 0.0, *chances)
+    return started_robot(DBA, path("A", "B", "C", relation=relation, values=values), "RB", chances=(0.0, *chances))
 
 
 def hears(it: DBA, left: int, right: int) -> Improve:
@@ -59,7 +59,7 @@ def test_who_misses_a_reduction_stays_and_counts_from_0_and_does_not_give_up_for
     class Short(DBA):
         settings = DBASettings(cycles=1)
 
-    robot = started_robot(Short, path("A", "B", "C"), "RB", 0.0)
+    robot = started_robot(Short, path("A", "B", "C"), "RB")
     hears(robot, 1, 1)
     robot.miss("RA")
     replies(robot, ("RC", Improve(0, 1, 0)))

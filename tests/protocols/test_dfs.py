@@ -292,8 +292,7 @@ def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_th
 
 
 def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
-    greeter = agent("RC")
-    replies(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
+    greeter = agent("RC", ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
     said = replies(greeter, ("RD", Token({"RB": 1, "RD": 1})))
     assert said[0] == ("RD", Back({"RC": 1}))
     assert greeter.findings.place == PseudoTreeNode("RD", ("RB",))

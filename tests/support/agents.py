@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 import pytest
@@ -37,11 +37,18 @@ def started(robot: Protocol) -> list[tuple[str, Message]]:
 
 
 def started_robot(
-    protocol: type[P], team: Team, name: str, *chances: float, parameters: RunParameters = DEFAULT_PARAMETERS
+    protocol: type[P],
+    team: Team,
+    name: str,
+    *packet: tuple[str, Message],
+    chances: Sequence[float] = (),
+    parameters: RunParameters = DEFAULT_PARAMETERS,
 ) -> P:
-    """Return the same as `robot_of`, started; its first messages are gone."""
+    """Return the same as `robot_of`, started, after it has read `packet` (if any); what it has sent is gone."""
     robot = robot_of(protocol, team, name, *chances, parameters=parameters)
     started(robot)
+    if packet:
+        replies(robot, *packet)
     return robot
 
 
@@ -58,6 +65,12 @@ def replies(robot: Protocol, *packet: tuple[str, Message]) -> list[tuple[str, Me
         robot.receive(sender, message)
     robot.settle()
     return sent(robot)
+
+
+def after(robot: P, *packet: tuple[str, Message]) -> P:
+    """Return `robot` after it has read `packet`; its messages so far are gone."""
+    replies(robot, *packet)
+    return robot
 
 
 def assert_refused(make: Callable[[], Protocol], wrong: Iterable[tuple[str, Message]], match: str) -> None:
