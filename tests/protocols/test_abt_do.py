@@ -194,8 +194,7 @@ def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None
 
 def test_what_is_known_to_hold_is_not_checked_again() -> None:
     abt = agent(clique(), "RB", ("RA", Ok((2,), 3)))
-    checks = abt.problem.checks
-    assert checks
+    assert (checks := abt.problem.checks)
     replies(abt, ("RA", Ok((2,), 3)), ("RC", Ok((1,), 3)))
     assert abt.problem.checks == checks
 

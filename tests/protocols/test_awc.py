@@ -121,8 +121,7 @@ def test_an_n_ary_constraint_is_checked_by_the_lowest_robot_at_present() -> None
 
 def test_what_is_known_to_hold_is_not_checked_again() -> None:
     awc = agent(triangle(3), "RB", ("RA", Ok((2,), 0)))
-    checks = awc.problem.checks
-    assert checks
+    assert (checks := awc.problem.checks)
     replies(awc, ("RC", Ok((1,), 0)), ("RA", Ok((2,), 0)))
     assert awc.problem.checks == checks
 

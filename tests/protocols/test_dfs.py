@@ -29,7 +29,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, robot_of, started, started_robot
-from tests.support.examples import count, examples
+from tests.support.examples import examples
 from tests.support.limits import HANG_S
 from tests.support.local_search_runs import any_schedule
 from tests.support.problems import team_of
@@ -142,7 +142,7 @@ def test_every_schedule_builds_the_tree_of_a_depth_first_search(chance: Random) 
     """The root has the most neighbours of its part, a token goes to the neighbour with the most; ties by priority.
 
     Neighbours stand one above the other: all robots of an n-ary constraint on one branch, as any two of them do. A
-    token passes twice between a robot and its parent, and a wave along each edge both ways.
+    token passes twice between a robot and its parent, and a wave along each edge both ways. Each begins once.
     """
     team = random_graph(chance)
     result, robots = played(team, chance)
@@ -159,6 +159,9 @@ def test_every_schedule_builds_the_tree_of_a_depth_first_search(chance: Random) 
         assert set(robot.children) == {other for other, place in places.items() if place.parent == name}
         for names in (robot.pseudo_parents, robot.children, robot.pseudo_children):
             assert list(names) == sorted(names, key=team.order.index)
+        assert robot.begun == 1
+        assert robot.decided
+        assert sorted(robot.greeted) == sorted(met[name])
     joined, edges = sum(robot.parent is not None for robot in robots.values()), sum(map(len, met.values()))
     messages = Counter(result.metrics.messages)
     assert (messages["Token"], messages["Back"], messages["Hello"]) == (joined, joined, edges)
@@ -215,27 +218,11 @@ def test_on_a_path_the_token_names_one_robot_at_most() -> None:
     assert max(lists) == 1
 
 
-@count("teams", 40, 150)
-def test_each_begins_once_and_what_comes_early_is_kept_for_then(teams: int) -> None:
+def test_greetings_come_early_in_such_runs() -> None:
+    """They are kept until the robot begins."""
     chance = Random("early")
-    early = 0
-    for _ in range(teams):
-        team = random_graph(chance)
-        _, robots = played(team, chance)
-        met = neighbours_of(team)
-        for name, robot in robots.items():
-            assert robot.begun == 1
-            assert robot.decided
-            assert sorted(robot.greeted) == sorted(met[name])
-            early += robot.early
-    assert early > teams
-
-
-def test_unconnected_parts_have_a_root_each() -> None:
-    result, _ = played(graph("ABCDEF", "AB BC DE"), Random(0))
-    places = {name: found.place for name, found in result.findings.items()}
-    parents = {"RA": "RB", "RB": None, "RC": "RB", "RD": None, "RE": "RD", "RF": None}
-    assert places == {name: PseudoTreeNode(parent) for name, parent in parents.items()}
+    runs = [played(random_graph(chance), chance)[1] for _ in range(40)]
+    assert sum(robot.early for robots in runs for robot in robots.values()) > 40
 
 
 def test_processes_build_the_same_tree() -> None:
@@ -259,6 +246,15 @@ def test_every_robot_stands_for_election() -> None:
     assert greeter.findings == Findings()
 
 
+def test_a_stronger_candidate_s_wave_goes_on_and_back_from_all_neighbours_to_who_told_it_first() -> None:
+    """A weaker one's ends. Of equals, the one that is lower in the order is weaker."""
+    for weaker in (Wave(1, "RA"), Wave(3, "RD")):
+        greeter = agent("RC")
+        assert replies(greeter, ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
+        assert replies(greeter, ("RD", weaker)) == []
+        assert replies(greeter, ("RD", Wave(3, "RB"))) == [("RB", Wave(3, "RB"))]
+
+
 def test_a_robot_alone_is_its_own_tree_and_says_nothing_or_without_values_ends_the_search() -> None:
     greeter = robot_of(Greeter, graph("AB", ""), "RA")
     assert started(greeter) == []
@@ -268,19 +264,6 @@ def test_a_robot_alone_is_its_own_tree_and_says_nothing_or_without_values_ends_t
     assert greeter.verdict is Verdict.NO_SOLUTION
     assert replies(greeter, ("RB", Wave(1, "RB"))) == []
     assert greeter.begun == 0
-
-
-def test_a_stronger_candidate_s_wave_goes_on_and_a_weaker_one_s_ends() -> None:
-    """Of equals, the one that is lower in the order is weaker."""
-    for weaker in (Wave(1, "RA"), Wave(3, "RD")):
-        greeter = agent("RC")
-        assert replies(greeter, ("RB", Wave(3, "RB"))) == [("RD", Wave(3, "RB"))]
-        assert replies(greeter, ("RD", weaker)) == []
-
-
-def test_back_from_all_neighbours_a_wave_goes_back_to_who_told_it_first() -> None:
-    said = replies(agent("RC"), ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")), ("RD", Wave(3, "RB")))
-    assert said == [("RD", Wave(3, "RB")), ("RB", Wave(3, "RB"))]
 
 
 def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_the_token() -> None:
