@@ -48,7 +48,10 @@ def mcap_of(kind: str, encoding: str, text: bytes, message: str, content: bytes)
     return Path("other.mcap")
 
 
-OURS = types_of(2).definition(POSE).text.encode()
+def ours() -> bytes:
+    return types_of(2).definition(POSE).text.encode()
+
+
 HOSTILE = (
     b"std_msgs/Header header\n__import__('os').mkdir('harm') pose\nstring x \"'); import os; os.mkdir('harm'); ('\""
 )
@@ -56,15 +59,22 @@ HOSTILE = (
 
 @looped(
     ("kind", "encoding", "text", "message", "content", "told"),
-    [
+    lambda: [
         ("geometry_msgs/PoseStamped", "ros2msg", HOSTILE, "cdr", b"", "its definition of geometry_msgs/PoseStamped is"),
         ("geometry_msgs/PoseStamped", "ros2msg", b"\xff" * 99, "cdr", b"", "is not that of ROS 2"),
         ("geometry_msgs/msg/PoseStamped", "ros2msg", b"", "cdr", b"", "is not that of ROS 2"),
-        ("geometry_msgs/msg/PoseStamped", "ros1msg", OURS, "ros1", b"", "is not that of ROS 1"),
-        ("geometry_msgs/PoseStamped", "ros2idl", OURS, "cdr", b"", "written as 'ros2idl', and only ros2msg"),
-        ("geometry_msgs/PoseStamped", "ros2msg", OURS, "json", b"{}", "its messages are written as 'json'"),
-        ("geometry_msgs/PoseStamped", "ros2msg", OURS, "cdr", bytes(10), "10 bytes are no geometry_msgs/PoseStamped"),
-        ("geometry_msgs/PoseStamped", "ros2msg", OURS, "cdr", bytes(999), "999 bytes are no geometry_msgs/PoseStamped"),
+        ("geometry_msgs/msg/PoseStamped", "ros1msg", ours(), "ros1", b"", "is not that of ROS 1"),
+        ("geometry_msgs/PoseStamped", "ros2idl", ours(), "cdr", b"", "written as 'ros2idl', and only ros2msg"),
+        ("geometry_msgs/PoseStamped", "ros2msg", ours(), "json", b"{}", "its messages are written as 'json'"),
+        ("geometry_msgs/PoseStamped", "ros2msg", ours(), "cdr", bytes(10), "10 bytes are no geometry_msgs/PoseStamped"),
+        (
+            "geometry_msgs/PoseStamped",
+            "ros2msg",
+            ours(),
+            "cdr",
+            bytes(999),
+            "999 bytes are no geometry_msgs/",
+        ),
     ],
 )
 def test_definitions_and_messages_that_are_others_are_refused(
@@ -83,7 +93,7 @@ def test_a_type_that_is_defined_in_many_ways_is_refused() -> None:
         writer = Writer(stream, use_chunking=False)
         writer.start("ros2")
         for number in range(100):
-            writer.register_schema(POSE, "ros2msg", OURS + b"\n# %d" % number)
+            writer.register_schema(POSE, "ros2msg", ours() + b"\n# %d" % number)
         writer.finish()  # type: ignore[no-untyped-call]
     with pytest.raises(SourceError, match="it has more than 64 definitions"):
         read("other.mcap")

@@ -147,19 +147,6 @@ def solved(*words: str) -> tuple[int, str]:
     return done.exit_code, done.stderr
 
 
-def test_a_recording_with_a_clock(tmp_path: Path) -> None:
-    said = (CLOCK, CLOCK_KIND, {"clock": 7 * SECOND})
-    place = recorded(tmp_path / "in.mcap", said, ("/port/blocked", "geometry_msgs/PointStamped", PORTS))
-    out = f"mcap:{tmp_path}/out.mcap"
-    assert solved("--situation", place, "--use-sim-time", "--ros", out)[0] == 0
-    with open_source(out) as source:
-        source.listen({"/port/waypoint": "geometry_msgs/PoseStamped"})
-        stamps = []
-        while (heard := source.next(0)) is not None:
-            stamps.append(heard.fields["header"]["stamp"])
-    assert stamps == [7 * SECOND] * 2
-
-
 def test_a_recording_without_a_clock(tmp_path: Path) -> None:
     place = recorded(tmp_path / "in.mcap", ("/port/blocked", "geometry_msgs/PointStamped", PORTS))
     code, told = solved("--situation", place, "--use-sim-time")
@@ -180,28 +167,6 @@ def test_what_else_is_published_needs_a_sink(word: tuple[str, ...]) -> None:
     code, told = solved("--situation", "flight", *word)
     assert code != 0
     assert f"{word[0]} is for what is published: add --ros SINK" in told
-
-
-def test_all_that_can_be_published(tmp_path: Path) -> None:
-    out = tmp_path / "out.mcap"
-    words = ("--ros", f"mcap:{out}", "--tf", "--diagnostics", "--ros-type", "nav_msgs/Path")
-    assert solved(*words)[0] == 0
-    wanted = {
-        "/tf_static": "tf2_msgs/TFMessage",
-        "/diagnostics": "diagnostic_msgs/DiagnosticArray",
-        "/port/waypoint": "nav_msgs/Path",
-    }
-    with open_source(f"mcap:{out}") as source:
-        source.listen(wanted)
-        heard = {}
-        while (one := source.next(0)) is not None:
-            heard[one.topic] = one.fields
-    assert heard.keys() == wanted.keys()
-    assert [one["child_frame_id"] for one in heard["/tf_static"]["transforms"]][-1] == "tail/goal"
-    assert heard["/diagnostics"]["status"][0]["message"] == "solution, epoch 1"
-    code, told = solved("--ros", f"mcap:{out}", "--ros-type", "sensor_msgs/Image")
-    assert code != 0
-    assert "has the type 'sensor_msgs/Image', and there is no mapping from waypoints to it" in told
 
 
 def test_a_flight_has_frames(tmp_path: Path) -> None:
