@@ -13,7 +13,6 @@ from robochoc.communication.network.master import HELD_S, Master
 from robochoc.communication.network.members import Member, Members
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
-from robochoc.communication.network.router import Log, Refusal
 from robochoc.communication.network.settings import PATIENCE_S
 from robochoc.communication.network.transport import HEARTBEAT_S
 from robochoc.journal.events import Decided, Received, Refused, actor
@@ -102,36 +101,6 @@ def test_refusals_of_several_threads() -> None:
     for thread in threads:
         thread.join()
     assert told[-1] == "no (10,000 times so far)"
-
-
-LINE = (
-    b"2026-01-01T00:00:00Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control: "
-    b"ab12 on Interface(lo)+CertCommonName(RX3)+Transport(Tls)+ab12 is %s to Put (ingress) on rc/msg/RX2/RX1\n"
-)
-CACHED = (
-    b"2026-01-01T00:00:00Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control: "
-    b"Using cached result: %s is unauthorized to Put (ingress) on rc/msg/RX2/RX1\n"
-)
-INTERCEPTED = b"2026-01-01T00:00:00Z TRACE  rx-0 ThreadId(07) zenoh::net::routing::interceptor: Msg intercepted!\n"
-
-
-def test_the_routers_log() -> None:
-    log = Log({"RX3"})
-    refusal = Refusal("RX3", "put rc/msg/RX2/RX1", "no rule of the Authority allows it")
-    assert list(log.refusals(LINE % b"authorized")) == []
-    assert list(log.refusals(LINE % b"unauthorized")) == [], "that is only looked up"
-    assert list(log.refusals(LINE % b"unauthorized" + INTERCEPTED)) == [refusal]
-    assert list(log.refusals(CACHED % b"ab12" + INTERCEPTED)) == [refusal]
-    assert list(log.refusals(CACHED % b"cd34" + INTERCEPTED)) == [], "of somebody who has no rules at all"
-    accepted = b"DEBUG acc-0 zenoh_link_tls::unicast: Accepted TLS connection on 1: 2. Common Name: %s.\n"
-    assert list(log.refusals(accepted % b"RX3" + accepted % b"MASTER")) == []
-    assert [one.who for one in log.refusals(accepted % b"RX4")] == ["RX4"]
-
-
-def test_a_large_log_is_read() -> None:
-    log = Log({"RX3"})
-    block = (LINE % b"authorized") * 40_000 + (LINE % b"unauthorized" + INTERCEPTED) * 20_000
-    assert sum(1 for _ in log.refusals(block)) == 20_000
 
 
 def test_messages_that_zenoh_may_hold_back_are_not_missing_yet() -> None:

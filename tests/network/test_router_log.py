@@ -96,6 +96,31 @@ def test_a_line_alone_says_no_more_than_it_can(line: int) -> None:
     assert told == ([ALONE[line]] if line in ALONE else [])
 
 
+def test_what_the_router_looks_up_again_is_told_of_those_who_have_rules() -> None:
+    log = Log({"A"})
+    intercepted = LINES[7]
+
+    def told(*lines: str) -> list[Refusal]:
+        return list(log.refusals("".join(f"{line}\n" for line in lines).encode()))
+
+    assert told(LINES[6], intercepted) == TOLD[:1]
+    cached = (
+        f"{LINES[6][:28]}TRACE {ACCESS} Using cached result: 70be is unauthorized to Put (ingress) on rc/msg/MASTER/B"
+    )
+    assert told(cached, intercepted) == TOLD[:1]
+    assert told(cached.replace("70be", "cd34"), intercepted) == []
+
+
+def test_who_connects_without_rules_is_told() -> None:
+    accepted = "DEBUG acc-0 zenoh_link_tls::unicast: Accepted TLS connection on 1: 2. Common Name: {}.\n"
+    log = "".join(accepted.format(name) for name in ("A", "MASTER", "B")).encode()
+    assert [refusal.who for refusal in refusals(log)] == ["B"]
+
+
+def test_a_large_log_is_read() -> None:
+    assert sum(1 for _ in refusals(LOG * 3_000)) == 3_000 * len(TOLD)
+
+
 def test_colours_do_not_matter() -> None:
     coloured = (
         LOG.replace(b"TRACE", b"\x1b[35mTRACE\x1b[0m")
