@@ -27,6 +27,17 @@ def test_an_empty_table_is_an_error() -> None:
         pass
 
 
+def test_a_case_that_is_skipped_hides_no_failure() -> None:
+    def two_cases() -> None:
+        with cases() as each:
+            for name, end in (("first", pytest.fail), ("second", pytest.skip)):
+                with each(name):
+                    end("here")
+
+    with pytest.raises(ExceptionGroup, match="1 of 2 cases failed: first"):
+        two_cases()
+
+
 def test_passing_cases_pass() -> None:
     with cases() as each, each("a"):
         pass
