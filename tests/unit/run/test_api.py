@@ -161,19 +161,23 @@ def test_containers_that_were_not_told_all(tmp_path: Path) -> None:
 
 MASTER = """
 from robochoc import AgentsContainer
+from robochoc.communication.network.settings import NetworkSettings
 
 main_container = AgentsContainer()
 main_container.set_agent_type("MasterABT")
 main_container.add_agent("MASTER", sniff=False)
 {settings}
 events = []
-outcome = main_container.run(observer=events.append, gather_s=600)
+outcome = main_container.run(observer=events.append, gather_s=600, conditions=NetworkSettings(patience_s=600))
 print(outcome.verdict, outcome.protocol, dict(sorted(outcome.assignment.items())), outcome.verified)
 print(*sorted({{event.sender for event in events if type(event).__name__ == "Sent"}}))
 """
 ROBOT = """
 from robochoc import AgentsContainer
+from robochoc.run.networked import join
 
+join.PATIENCE_S = 600  # however long the master takes to start
+join.identity_of.__defaults__ = (None, None, join.PATIENCE_S)
 container = AgentsContainer()
 container.set_agent_type("AgentABT")
 {agents}
