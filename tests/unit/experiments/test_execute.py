@@ -161,12 +161,14 @@ def test_problems_differ_by_how_files_are_read_and_by_their_scenarios(bench: Ben
     assert len({one.digest for one in found}) == 3
 
 
-def test_files_that_have_changed_since_the_plan_are_not_run(bench: Bench, tmp_path: Path) -> None:
+def test_files_that_have_changed_since_the_plan_are_not_run(tmp_path: Path) -> None:
+    """A bench that has run the problem before would not read the files again."""
     write_team(queens3d(3), tmp_path / "team")
     planned = digest_of_files(tmp_path / "team")
     with (tmp_path / "team" / "Robot1.1.xml").open("a") as file:
         file.write("\n")
-    found = row(bench, ProblemSpec(path=str(tmp_path / "team"), digest=planned))
+    with Bench() as bench:
+        found = row(bench, ProblemSpec(path=str(tmp_path / "team"), digest=planned))
     assert found.status is Status.INVALID
     assert "has changed since the study began" in str(found.reason)
 
