@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import re
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import umsgpack
 
 from robochoc.flight.layout import Point
 from robochoc.flight.log import ClosestApproach, FlightEvent, FlightLog, LegTimes
@@ -116,3 +120,10 @@ def planar(n: int, *away: str) -> Mission:
     }
     values = {name: height % n + 1 for name, height in heights.items()}
     return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=away), team)
+
+
+def commands_of(html: bytes) -> list[dict[str, Any]]:
+    """Meshcat's commands in a scene's page."""
+    block = re.search(rb'<script id="commands"[^>]*>([^<]*)</script>', html)
+    assert block
+    return [umsgpack.unpackb(base64.b64decode(line)) for line in block[1].split()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from dataclasses import replace
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import umsgpack
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,18 +30,12 @@ from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
 from tests.support.cases import looped
 from tests.support.examples import examples
-from tests.support.flights import FPS, LEG_S, TILT, epochs_of_three, five, straight
+from tests.support.flights import FPS, LEG_S, TILT, commands_of, epochs_of_three, five, straight
 from tests.support.flights import scene_of as flown_scene_of
 from tests.support.program import robochoc_within
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 Array = npt.NDArray[np.float64]
-
-
-def commands_of(html: bytes) -> list[dict[str, Any]]:
-    block = re.search(rb'<script id="commands"[^>]*>([^<]*)</script>', html)
-    assert block
-    return [umsgpack.unpackb(base64.b64decode(line)) for line in block[1].split()]
 
 
 def playback_in(html: bytes) -> dict[str, Any]:

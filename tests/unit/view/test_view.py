@@ -10,10 +10,8 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import pytest
-import umsgpack
 
 from robochoc.flight import preview as previews
 from robochoc.flight.layout import Point
@@ -23,7 +21,7 @@ from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.page import scene_page
 from robochoc.view.scene import DrawnDrone, Scene
 from tests.support.cases import looped
-from tests.support.flights import scene_of, straight
+from tests.support.flights import commands_of, scene_of, straight
 
 HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 
@@ -60,12 +58,6 @@ def four() -> Scene:
     flying = dict(list(queens(4).items())[:10])
     away = [name.replace("V", "Robot") for name in queens(4) if name not in flying]
     return scene_of(outcome(flying, Verdict.OPTIMAL, *away))
-
-
-def commands_of(html: bytes) -> list[dict[str, Any]]:
-    block = re.search(rb'<script id="commands"[^>]*>([^<]*)</script>', html)
-    assert block
-    return [umsgpack.unpackb(base64.b64decode(line)) for line in block[1].split()]
 
 
 def tracks_of(html: bytes) -> dict[str, list[tuple[float, Point]]]:
