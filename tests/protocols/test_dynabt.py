@@ -11,6 +11,7 @@ from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
     AddValue,
+    Change,
     Constraint,
     Domain,
     Parent,
@@ -31,6 +32,7 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
 from tests.support.agents import replies, value
+from tests.support.cases import looped
 from tests.support.dynabt_robots import after, agent, change
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT, differ, triangle
@@ -129,17 +131,14 @@ def test_remove_constraint_drops_what_was_derived_from_it_far_away() -> None:
         assert len(list(dynabt.store)) == left
 
 
-def test_a_no_solution_goes_with_a_constraint_that_it_rests_on() -> None:
+def test_a_no_solution_goes_with_a_constraint_that_it_rests_on_and_no_other() -> None:
+    team, dynabt = refuted()
+    assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), lossless=False) == []
+    assert dynabt.verdict is Verdict.NO_SOLUTION
     team, dynabt = refuted()
     said = after(dynabt, team, RemoveConstraint("RB", "RA", "C"), lossless=False)
     assert (dynabt.verdict, dynabt.proof) == (None, frozenset())
     assert ("RB", Ok((1,))) in said
-
-
-def test_a_no_solution_stays_when_another_constraint_goes() -> None:
-    team, dynabt = refuted()
-    assert after(dynabt, team, RemoveConstraint("RC", "RB", "C"), lossless=False) == []
-    assert dynabt.verdict is Verdict.NO_SOLUTION
 
 
 def test_two_constraints_of_one_name_go_together() -> None:
@@ -207,23 +206,25 @@ def test_values_that_go_take_their_nogoods_along() -> None:
     assert value(dynabt) == (3,)
 
 
-def test_who_loses_its_value_takes_another_and_tells_it() -> None:
+def test_who_loses_its_value_takes_another_and_tells_it_or_says_why_it_has_none() -> None:
     team, dynabt = with_two_nogoods()
     said = after(dynabt, team, RemoveValue("C", 3), AddValue("C", 7))
     assert said == [("RD", Ok((7,)))]
-
-
-def test_who_loses_its_last_value_says_why() -> None:
     team, dynabt = with_two_nogoods()
     said = after(dynabt, team, RemoveValue("C", 3))
     assert said[0] == ("RB", Nogood({"RA": (1,)}, (2,), [CAC, CBC, "RC="]))
 
 
-def test_a_domain_that_grew_voids_the_resolvents_of_its_owner() -> None:
-    team, dynabt = ruled_out()
+@looped(("values", "changed", "left"), [
+    (2, AddValue("C", 3), []), (3, RemoveValue("C", 3), [{}]), (2, RemoveAgent("RC"), []),
+])  # fmt: skip
+def test_resolvents_are_void_once_a_domain_that_they_rest_on_grows_or_its_robot_leaves(
+    values: int, changed: Change, left: list[object]
+) -> None:
+    team, dynabt = ruled_out(values)
     assert value(dynabt) == (2,)
-    change(dynabt, team, apply_changes(team, [AddValue("C", 3)]))
-    assert list(dynabt.store) == []
+    change(dynabt, team, apply_changes(team, [changed]))
+    assert list(dynabt.store) == left
 
 
 def test_a_domain_that_grew_leaves_direct_conflicts() -> None:
@@ -232,12 +233,6 @@ def test_a_domain_that_grew_leaves_direct_conflicts() -> None:
     assert dynabt.problem.values == ((0,), (1,), (2,), (3,))
     assert [dynabt.store[index] for index in range(4)] == [None, {"RA": (1,)}, {"RB": (2,)}, None]
     assert value(dynabt) == (3,)
-
-
-def test_a_domain_that_shrank_leaves_resolvents() -> None:
-    team, dynabt = ruled_out(3)
-    change(dynabt, team, apply_changes(team, [RemoveValue("C", 3)]))
-    assert list(dynabt.store) == [{}]
 
 
 def test_a_no_solution_goes_when_a_domain_that_it_rests_on_grows() -> None:
@@ -265,12 +260,6 @@ def test_a_child_that_left_is_told_nothing_more() -> None:
     assert said == [("RC", Ok((2,)))]
 
 
-def test_nogoods_that_rest_on_a_robot_that_left_are_void() -> None:
-    team, dynabt = ruled_out()
-    change(dynabt, team, apply_changes(team, [RemoveAgent("RC")]))
-    assert list(dynabt.store) == []
-
-
 def test_a_robot_that_comes_is_told_the_value_of_its_parents() -> None:
     team = triangle()
     newcomer = Robot(
@@ -294,14 +283,10 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
 # The search goes on
 
 
-def test_after_a_quiet_epoch_nobody_says_again_what_is_known() -> None:
-    team, dynabt = with_two_nogoods()
-    assert after(dynabt, team, AddValue("A", 9), lossless=True) == []
-
-
-def test_after_an_epoch_that_was_broken_off_values_are_told_once_more() -> None:
-    team, dynabt = with_two_nogoods()
-    assert after(dynabt, team, AddValue("A", 9), lossless=False) == [("RD", Ok((3,)))]
+def test_values_are_told_once_more_after_an_epoch_that_was_broken_off_and_not_after_a_quiet_one() -> None:
+    for lossless, said in ((True, []), (False, [("RD", Ok((3,)))])):
+        team, dynabt = with_two_nogoods()
+        assert after(dynabt, team, AddValue("A", 9), lossless=lossless) == said
 
 
 def test_after_an_epoch_that_was_broken_off_links_are_asked_for_again() -> None:

@@ -50,6 +50,13 @@ def middle(team: Team, **settings: float) -> MaxSum:
     return robot
 
 
+def informed(**settings: float) -> MaxSum:
+    """B of a chain, which knows A's domain."""
+    robot = middle(chain(), **settings)
+    replies(robot, ("RA", TWO))
+    return robot
+
+
 def test_functions_over_the_same_robots_are_one_and_what_no_other_robot_is_in_is_none() -> None:
     alone, pair = np.array([9.0, 9.0]), np.array([[3.0, 1.0], [4.0, 6.0]])
     tables = [CostTable("P", (), alone), CostTable("F", ("RA",), pair), CostTable("S", ("RA",), pair)]
@@ -72,15 +79,13 @@ def test_r_is_the_least_that_a_value_costs_by_what_the_others_told() -> None:
 
 
 def test_q_is_what_a_value_costs_by_all_other_functions_less_the_least() -> None:
-    robot = middle(chain())
-    replies(robot, ("RA", TWO))
+    robot = informed()
     assert replies(robot, ("RC", R([[9, 2]]))) == [("RC", Q([[2, 0]]))]  # by the own function 3 and 1
     assert robot.edges == [[7, 0], [2, 0]]
 
 
 def test_the_value_is_that_which_costs_least_by_all_functions() -> None:
-    robot = middle(chain())
-    replies(robot, ("RA", TWO))
+    robot = informed()
     replies(robot, ("RC", R([[2, 3]])))
     assert value(robot) == (2,)
     replies(robot, ("RA", Q([[0, 5]])), ("RC", R([[0, 3]])))
@@ -96,15 +101,13 @@ def test_a_cycle_is_r_of_all_functions_and_then_q_of_all_variables() -> None:
 
 
 def test_in_the_last_cycle_no_q_is_said() -> None:
-    robot = middle(chain(), cycles=1)
-    replies(robot, ("RA", TWO))
+    robot = informed(cycles=1)
     assert replies(robot, ("RC", R([[0, 0]]))) == []
     assert robot.over
 
 
 def test_damping_keeps_a_share_of_the_last_q() -> None:
-    robot = middle(chain(), damping=0.75)
-    replies(robot, ("RA", TWO))
+    robot = informed(damping=0.75)
     assert replies(robot, ("RC", R([[0, 0]]))) == [("RC", Q([[2, 0]]))]
     robot.edges = [[0, 0], [8, 0]]
     assert replies(robot, ("RA", Q([[0, 0]])), ("RC", R([[0, 0]])))[-1] == ("RC", Q([[6.5, 0]]))
@@ -157,16 +160,14 @@ def test_a_value_that_breaks_a_hard_constraint_is_out_and_nothing_is_subtracted_
 
 
 def test_damping_leaves_what_is_out_out() -> None:
-    robot = middle(chain(), damping=0.5)
-    replies(robot, ("RA", TWO))
+    robot = informed(damping=0.5)
     replies(robot, ("RC", R([[INFINITE, 3]])))
     replies(robot, ("RA", Q([[0, 0]])), ("RC", R([[INFINITE, 3]])))
     assert robot.edges[0] == [INFINITE, 0]
 
 
 def test_a_robot_all_of_whose_values_are_out_has_proven_that_there_is_no_solution() -> None:
-    robot = middle(chain())
-    replies(robot, ("RA", TWO))
+    robot = informed()
     assert replies(robot, ("RC", R([[INFINITE, INFINITE]]))) == []
     assert robot.verdict is Verdict.NO_SOLUTION
     assert replies(robot, ("RA", Q([[0, 0]]))) == []
@@ -243,8 +244,7 @@ def test_halves_of_equal_shares_are_made_without_a_lot() -> None:
 
 
 def test_what_a_half_answers_is_in_the_q_to_the_other_one() -> None:
-    robot = middle(chain(), split=0.5)
-    replies(robot, ("RA", TWO))
+    robot = informed(split=0.5)
     replies(robot, ("RC", R([[0, 0], [0, 0]])))
     assert robot.edges == [[1, 0], [1, 0], [2, 0], [2, 0]]  # each half answers 1.5 and 0.5
 

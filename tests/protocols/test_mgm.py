@@ -40,32 +40,27 @@ def middle(*chances: float) -> MGM:
     return robot
 
 
+def informed(*chances: float) -> MGM:
+    """B, which has heard that its neighbours have the value 1 too."""
+    robot = middle(*chances)
+    assert replies(robot, ("RA", Value((1,)))) == []
+    assert replies(robot, ("RC", Value((1,)))) == [("RA", Gain(0, 10)), ("RC", Gain(0, 10))], "of the best move"
+    return robot
+
+
 def test_the_first_value_is_drawn_by_lot_and_told() -> None:
     assert started(robot_of(MGM, star(), "RB", 0.99)) == [("RA", Value((3,))), ("RC", Value((3,)))]
 
 
-def test_when_all_values_are_known_the_gain_of_the_best_move_is_told() -> None:
-    robot = middle()
-    assert replies(robot, ("RA", Value((1,)))) == []
-    assert replies(robot, ("RC", Value((1,)))) == [("RA", Gain(0, 10)), ("RC", Gain(0, 10))]
-
-
-def test_who_gains_most_moves_and_tells_its_value() -> None:
-    robot = middle(0.9)
-    replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
-    assert replies(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 9))) == [("RA", Value((3,))), ("RC", Value((3,)))]
-
-
-def test_who_does_not_stays_and_tells_its_value() -> None:
-    robot = middle()
-    replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
-    assert replies(robot, ("RA", Gain(0, 5)), ("RC", Gain(0, 11))) == [("RA", Value((1,))), ("RC", Value((1,)))]
+def test_who_gains_most_moves_who_does_not_stays_and_both_tell_their_value() -> None:
+    for chance, rival, own in ((0.9, 9, 3), (0.0, 11, 1)):
+        said = replies(informed(chance), ("RA", Gain(0, 5)), ("RC", Gain(0, rival)))
+        assert said == [("RA", Value((own,))), ("RC", Value((own,)))]
 
 
 @looped(("left", "right", "moves"), [(10, 0, False), (0, 10, True)])
 def test_of_equal_gains_the_first_in_the_order_moves(left: int, right: int, moves: bool) -> None:  # noqa: FBT001
-    robot = middle()
-    replies(robot, ("RA", Value((1,))), ("RC", Value((1,))))
+    robot = informed()
     replies(robot, ("RA", Gain(0, left)), ("RC", Gain(0, right)))
     assert value(robot) == ((2,) if moves else (1,))
 

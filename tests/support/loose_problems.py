@@ -188,11 +188,6 @@ def _variable(name: str, *values: int) -> Variable:
     return Variable(name, Domain("D", tuple(range(value, value + 1) for value in values)))
 
 
-def _first(variable: Variable) -> Variable:
-    """`variable`, which stands in no constraint, with one of its values."""
-    return _variable(variable.name, *[*variable.domain][:1])
-
-
 def _some(names: Sequence[str], chance: Random) -> list[str]:
     return [name for name in names if chance.random() < 0.4]
 

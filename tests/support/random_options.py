@@ -7,11 +7,7 @@ from random import Random
 
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName
-from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order
-
-MAX_MESSAGES = 3000
-"""Messages after which an incomplete protocol may give up."""
 
 
 def random_options(team: Team, protocol: str, chance: Random) -> Options:
@@ -31,11 +27,3 @@ def random_schedule(chance: Random) -> Options:
         delay=chance.choice((0, 3, 20, 200)) if schedule is ScheduleName.CONCURRENT else 0,
         seed=chance.getrandbits(32),
     )
-
-
-def on_runtime(options: Options, runtime: Runtime) -> Options:
-    """Return `options` for `runtime`. Schedule and delay go with the simulator only."""
-    if runtime is Runtime.SIMULATOR:
-        return options
-    defaults = Options()
-    return replace(options, runtime=runtime, schedule=defaults.schedule, delay=defaults.delay, timeout=HANG_S)
