@@ -169,6 +169,12 @@ def test_what_else_is_published_needs_a_sink(word: tuple[str, ...]) -> None:
     assert f"{word[0]} is for what is published: add --ros SINK" in told
 
 
+def test_a_type_without_a_mapping_is_refused(tmp_path: Path) -> None:
+    code, told = solved("--ros", f"mcap:{tmp_path}/out.mcap", "--ros-type", "sensor_msgs/Image")
+    assert code != 0
+    assert "has the type 'sensor_msgs/Image', and there is no mapping from waypoints to it" in told
+
+
 def test_a_flight_has_frames(tmp_path: Path) -> None:
     result, out = tmp_path / "result.json", tmp_path / "flight.mcap"
     words = ["solve", str(FOLDER), "--runtime", "simulator", "--json"]
