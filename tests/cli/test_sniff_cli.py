@@ -169,13 +169,12 @@ def test_a_run_is_shown_until_ctrl_c_and_its_result_is_told_before(teams: Path, 
         assert run.status() == 0
 
 
-@pytest.mark.more
 @pytest.mark.parametrize(
     ("signum", "watched"),
     [
-        (signal.SIGINT, True),
-        (signal.SIGTERM, False),
-        (signal.SIGKILL, True),
+        pytest.param(signal.SIGINT, True, marks=pytest.mark.more),
+        pytest.param(signal.SIGTERM, False, marks=pytest.mark.more),
+        pytest.param(signal.SIGKILL, True, marks=pytest.mark.more),
         pytest.param(signal.SIGINT, False, marks=pytest.mark.slow),
         pytest.param(signal.SIGTERM, True, marks=pytest.mark.slow),
         pytest.param(signal.SIGKILL, False, marks=pytest.mark.slow),
