@@ -205,7 +205,7 @@ class Bench:
             )
             resource.prlimit(run.pid, resource.RLIMIT_CPU, (cpu_s, cpu_s))
             resource.prlimit(run.pid, resource.RLIMIT_DATA, (MEMORY, MEMORY))
-            watch = threading.Timer(HANG_S * 5, os.killpg, (run.pid, signal.SIGKILL))
+            watch = threading.Timer(HANG_S * 15, os.killpg, (run.pid, signal.SIGKILL))
             watch.start()
             _, status, used = os.wait4(run.pid, 0)
             watch.cancel()
