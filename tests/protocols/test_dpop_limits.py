@@ -160,7 +160,7 @@ def test_who_has_no_room_does_not_proceed() -> None:
 
 
 @looped("said", [
-    dimensions({f"R{number}": 2 for number in range(100_000)}),
+    dimensions({f"R{number}": 2 for number in range(10_000)}),
     dimensions({"RA": 3}, width=-5), dimensions({"RA": 3}, most=Need(math.nan, "RC")),
     dimensions({"RA": 3}, most=Need(-1, "RC")),
 ])  # fmt: skip

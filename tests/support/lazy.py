@@ -13,4 +13,6 @@ class LazyModule:
         self._name = name
 
     def __getattr__(self, attribute: str) -> Any:  # noqa: ANN401 - whatever is in the module
+        if attribute.startswith("_"):  # pytest asks each object of a test module for names of its own
+            raise AttributeError(attribute)
         return getattr(importlib.import_module(self._name), attribute)

@@ -65,7 +65,6 @@ def test_a_label_is_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
         ("town.edgelist", "a\n", "a graph of 0 nodes"),
         ("town.edgelist", "a a\n", "the node a is linked to itself"),
         ("town.graphml", "<!DOCTYPE a [<!ENTITY b 'c'>]>" + GRAPHML, "it defines entities"),
-        ("town.edges", " " * (MAX_BYTES + 1), "it is too large"),
     ],
 )
 def test_what_is_no_graph_has_one_message(name: str, content: str, said: str, tmp_path: Path) -> None:
@@ -75,6 +74,13 @@ def test_what_is_no_graph_has_one_message(name: str, content: str, said: str, tm
         read_graph(tmp_path / name)
     assert said in str(refused.value)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_graph_of_too_many_bytes_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("networkx")
+    (tmp_path / "town.edges").write_text(" " * (MAX_BYTES + 1))
+    with pytest.raises(InvalidInputError, match="it is too large"):
+        read_graph(tmp_path / "town.edges")
 
 
 def test_a_graph_of_too_many_nodes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -71,14 +71,16 @@ FORGED: list[tuple[dict[str, Any], str]] = [
     ({"content": '["Ok",{"value":{"map":[1]}}]'}, "no JSON like"),
     ({"content": '["Ok",{"value":{"map":[[{"base64":"AA=="},1],[{"map":[]},1]]}}]'}, "no JSON like"),
     ({"content": '["Ok",{"value":' + "[" * 40 + "]" * 40 + "}]"}, "deeper than 32"),
-    ({"content": "[" * 1_000_000}, "no JSON like"),
-    ({"content": "[" + " " * MAX_JSON + "]"}, "too long"),
 ]
 
 
 def test_what_no_robot_would_send_is_no_envelope() -> None:
     with cases() as each:
-        for changed, message in FORGED:
+        long: list[tuple[dict[str, str], str]] = [
+            ({"content": "[" * 1_000_000}, "no JSON like"),
+            ({"content": "[" + " " * MAX_JSON + "]"}, "too long"),
+        ]
+        for changed, message in (*FORGED, *long):
             with each(message):
                 forged = msgspec.structs.replace(conversation().acl_of(OK, 1), **changed)
                 with pytest.raises(ACLError, match=re.escape(message)) as caught:
