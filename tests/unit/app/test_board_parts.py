@@ -16,6 +16,7 @@ from robochoc.app.sketch.edits import EditError, with_rule, without_decision
 from robochoc.app.sketch.fits import why_no_cost, why_not_private
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import MAX_VALUES, Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule, Value
+from robochoc.app.sketch.troubles import About
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch
@@ -144,6 +145,15 @@ def test_a_place_whose_cells_are_clicked_is_let_go_when_it_is_gone() -> None:
     assert desk.cells_of is None
 
 
+def test_each_element_has_its_own_troubles() -> None:
+    blocked = Sketch("t", Area(4, 3, frozenset({Cell(0, 0), Cell(1, 0)})), ROBOTS, (LEVEL,))
+    desk = Desk(cast("Project", Held(blocked)))
+    desk.troubles = troubles(blocked)
+    found = {name: [one.element for one in desk.troubles_at(About.ROBOT, name)] for name in ("North", "South", "East")}
+    assert found == {"North": ["North"], "South": ["South"], "East": []}
+    assert desk.troubles_at(About.RULE, "North") == []
+
+
 def test_pairs_are_filled_as_a_rectangle_and_emptied_again() -> None:
     rows: list[list[Value]] = [[1, 1], [9]]
     more = filled(rows, (1, 2), (1, 3), on=True)
@@ -255,6 +265,15 @@ def test_many_pairs_are_drawn_as_what_is_around_them() -> None:
         robots = tuple(SketchRobot(f"R{number}", Cell(0, 0)) for number in range(count))
         (link,) = picture.links_of(Sketch(robots=robots, decisions=(LEVEL,), rules=rules)).drawn
         assert (link["shape"], len(link["of"])) == (shape, ends)
+
+
+def test_rules_that_may_be_broken_are_drawn_softly() -> None:
+    soft = {}
+    for kind, cost in (("different", None), ("different", 5), ("little", None)):
+        rule = SketchRule("R1", kind, "level", cost=cost)
+        (link,) = picture.links_of(Sketch(robots=ROBOTS, decisions=(LEVEL,), rules=(rule,))).drawn
+        soft[kind, cost] = link["soft"]
+    assert soft == {("different", None): False, ("different", 5): True, ("little", None): True}
 
 
 def test_marks_say_who_matters_and_who_is_above() -> None:
