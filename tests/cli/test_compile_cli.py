@@ -161,6 +161,11 @@ def test_robots_without_private_constraints_need_no_solver() -> None:
     assert {robot["local_solutions"] for robot in report["robots"]} == {4}
 
 
+def test_a_terminal_shows_which_robot_is_compiled(rows: Path) -> None:
+    shown = robochoc_within("compile", rows, terminal=True).stderr
+    assert re.search(r"compiling \S+ \(1 of \d+\)", shown), shown
+
+
 def test_compile_names_the_robot_without_local_solution(torn: Path) -> None:
     done = robochoc_within("compile", torn)
     assert (done.returncode, done.stderr) == (0, "")
