@@ -274,7 +274,7 @@ def test_lengths_along_lines() -> None:
 
 def test_distances_of_lines_are_those_of_their_nearest_points() -> None:
     chance = np.random.default_rng(1)
-    points = chance.normal(size=(300, 4, 3))
+    points = chance.normal(size=(100, 4, 3))
     points[::7, 1] = points[::7, 0]
     points[::5, 3] = points[::5, 2]
     points[::11, 3] = points[::11, 2] + points[::11, 1] - points[::11, 0]
