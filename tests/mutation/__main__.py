@@ -42,10 +42,10 @@ CASES = 4
 ROUNDS = ((8.0, 6), (60.0, 25))
 """CPU time in seconds, and files, of the tests of the first process for a mutant, and of the second one."""
 LONGER = 4
-"""A mutant hangs once its tests use so many times their CPU time."""
+"""A mutant hangs if its tests use this many times their CPU time."""
 START_S = 30
 HANG_S = 120
-"""So long may one test take."""
+"""The time limit of one test."""
 MEMORY = 8 << 30
 NO_FAILURE = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 
@@ -296,7 +296,8 @@ def main(words: Sequence[str] | None = None) -> int:
                 shutil.copytree(trees[0], tree, symlinks=True)
             benches.put(Bench(tree, known))
 
-        def attempt(mutant: Mutant | None, earlier: dict[str, Any]) -> dict[str, Any]:
+        def attempt(pair: tuple[Mutant | None, dict[str, Any]]) -> dict[str, Any]:
+            mutant, earlier = pair
             if mutant is None:
                 return {"place": earlier["place"], "was": earlier.get("fate"), "fate": "not found"}
             bench = benches.get()
@@ -305,7 +306,7 @@ def main(words: Sequence[str] | None = None) -> int:
             return {"place": mutant.place, "id": str(mutant), "was": earlier.get("fate"), **result, "diff": mutant.diff}
 
         with ThreadPoolExecutor(options.jobs) as pool:
-            for result in pool.map(attempt, *zip(*work, strict=True)):
+            for result in pool.map(attempt, work):
                 fates[result["fate"]] += 1
                 results.write(json.dumps(result) + "\n")
                 results.flush()
