@@ -10,6 +10,8 @@ import pytest
 
 pytest.importorskip("cflib")
 
+from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
+
 from robochoc.ros.autopilots import cflib_autopilot
 from robochoc.ros.autopilots.autopilot import OFFBOARD, RefusedError, Telemetry
 from robochoc.ros.autopilots.cflib_autopilot import PEAK, CflibAutopilot
@@ -204,6 +206,15 @@ def test_who_is_not_heard_gets_no_command(monkeypatch: pytest.MonkeyPatch) -> No
         seen(autopilot, lambda told: told.silent_s > 1)
         with pytest.raises(RefusedError, match="it cannot arm: it is not heard"):
             autopilot.arm()
+
+
+def test_blocks_of_the_log_are_no_answer_to_a_new_link() -> None:
+    autopilot = object.__new__(CflibAutopilot)
+    autopilot._heard_at = 0.0
+    autopilot._heard(CRTPPacket(CRTPPort.LOGGING << 4 | 2))
+    assert autopilot._heard_at == 0
+    autopilot._heard(CRTPPacket(CRTPPort.LOGGING << 4 | 1))
+    assert autopilot._heard_at > 0
 
 
 @pytest.mark.more

@@ -326,6 +326,9 @@ def test_refusals_of_the_plan_name_drones() -> None:
         "b and something that is in the way are to end only 0.123 m from each other"
     )
     assert flight._refusal(NoRouteError([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
+    for drones, past in (([0], "a gets past the others"), ([0, 1], "a, b get past each other")):
+        refusal = flight._refusal(NoRouteError(drones, indoors=True), everybody)  # noqa: SLF001
+        assert refusal.startswith(f"no order of flying was found in which {past} between the walls: ")
 
 
 def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
