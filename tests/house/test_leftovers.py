@@ -31,8 +31,11 @@ def a_thread(stack: ExitStack) -> None:
 
 
 def a_process(stack: ExitStack) -> None:
-    process = stack.enter_context(subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE))
+    command = [sys.executable, "-c", "print(flush=True); input()"]
+    process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
     stack.callback(process.kill)
+    assert process.stdout
+    process.stdout.readline()  # for a moment after its start the system does not know its command line
 
 
 def a_port(stack: ExitStack) -> None:

@@ -56,6 +56,7 @@ def until(true: Callable[[], object], why: str) -> None:
 
 def text_is(page: Page, selector: str, expected: str) -> None:
     until(lambda: page.inner_text(selector).strip() == expected, f"{selector} never says {expected}")
+    drawn(page)
 
 
 def begin_again(page: Page) -> None:
@@ -87,8 +88,14 @@ _BEGIN_AGAIN = """() => {
 }"""
 
 
+def drawn(page: Page) -> None:
+    """Wait until the page has drawn what its texts already say: each of its parts draws in the next frame."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
 def rows(page: Page) -> list[int]:
     """The numbers of the messages in the table's window."""
+    drawn(page)
     numbers: list[int] = page.eval_on_selector_all(
         "#grid .row[data-message]",
         "rows => rows.filter((row) => !row.hidden).map((row) => Number(row.dataset.message))",
@@ -97,6 +104,8 @@ def rows(page: Page) -> list[int]:
 
 
 def heads(page: Page) -> list[str]:
+    """The names at the heads of the lifelines."""
+    drawn(page)
     names: list[str] = page.eval_on_selector_all(
         ".head",
         "all => all.filter((head) => !head.hidden).map((head) => head.getAttribute('aria-label').split(':')[0])",
@@ -108,6 +117,7 @@ def choose(page: Page, message: int) -> None:
     """Choose a message, as a link to it does."""
     page.evaluate(f"Sniffer.page.message({message})")
     until(lambda: page.inner_text("#message h2").startswith(f"{message:,} "), "the message was not opened")
+    drawn(page)
 
 
 def painted(page: Page) -> int:
