@@ -100,15 +100,15 @@ test-compiled: compiled  ## the same answers from compiled modules, and from the
 # when coverage.py starts as well, and it swallows them. What is killed while it writes its data spoils them: a warning.
 TESTS ?= tests
 COVERAGE := $(BIN)/coverage
-coverage: $(READY)  ## lines and branches that make test reaches, by room: out/coverage/rooms.txt, out/coverage/html
+coverage: $(READY)  ## lines and branches that make test reaches, by package: out/coverage/packages.txt, out/coverage/html
 	rm -rf out/coverage
 	$(COVERAGE) run -m pytest -n $(JOBS) --dist worksteal $(TESTS) \
 		--deselect tests/unit/communication/test_faults.py::test_a_signal_before_the_program_has_begun \
 		--deselect tests/cli/test_local_signals.py::test_a_signal_at_the_start; \
 	tests=$$?; PYTHONWARNINGS=ignore $(COVERAGE) combine --quiet && rm -f out/coverage/data.* && \
 	$(COVERAGE) json --quiet && $(COVERAGE) html --quiet && \
-	$(BIN)/python -m tests.support.coverage_by_room out/coverage/coverage.json >out/coverage/rooms.txt; \
-	table=$$?; cat out/coverage/rooms.txt; exit $$((tests | table))
+	$(BIN)/python -m tests.support.coverage_by_package out/coverage/coverage.json >out/coverage/packages.txt; \
+	table=$$?; cat out/coverage/packages.txt; exit $$((tests | table))
 
 DOCS := $(VENV)/.docs
 $(DOCS): $(READY) requirements/docs.txt
@@ -135,6 +135,7 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
+	@git ls-files 'robochoc/*.py' | xargs wc -l | awk '$$1 > 700 && $$2 != "total" {print "warning: " $$2 " has " $$1 " lines: does it have one subject?"}'
 
 type: $(READY)
 	$(BIN)/mypy

@@ -83,15 +83,15 @@ def test_every_page_of_the_navigation_is_there_and_every_page_is_in_it() -> None
     assert named - only_there == pages
 
 
-def test_the_rooms_of_the_page_stand_in_the_order_of_the_layers() -> None:
-    """`docs/explanation/house.md` against the contract that import-linter checks."""
+def test_the_packages_of_the_page_are_in_the_order_of_the_layers() -> None:
+    """`docs/explanation/architecture.md` against the contract that import-linter checks."""
     contract = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"][0]
-    layers = [room for layer in contract["layers"] for room in layer.split(" | ") if room != "__main__"]
-    page = (ROOT / "docs" / "explanation" / "house.md").read_text()
-    rooms = [room.removesuffix(".py") for room in re.findall(r"^\| `([a-z.]+)` \|", page, re.MULTILINE)]
-    assert {*rooms} == {*layers}
-    beside = {room: number for number, layer in enumerate(contract["layers"]) for room in layer.split(" | ")}
-    assert [beside[room] for room in rooms] == sorted(beside[room] for room in rooms)
+    layers = [package for layer in contract["layers"] for package in layer.split(" | ") if package != "__main__"]
+    page = (ROOT / "docs" / "explanation" / "architecture.md").read_text()
+    packages = [package.removesuffix(".py") for package in re.findall(r"^\| `([a-z.]+)` \|", page, re.MULTILINE)]
+    assert {*packages} == {*layers}
+    layer_of = {package: number for number, layer in enumerate(contract["layers"]) for package in layer.split(" | ")}
+    assert [layer_of[package] for package in packages] == sorted(layer_of[package] for package in packages)
 
 
 def test_the_readme_is_short_and_shows_where_to_read_on() -> None:

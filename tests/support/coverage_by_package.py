@@ -1,7 +1,7 @@
-"""The table of `make coverage`: lines and branches that tests have reached, by room of the package.
+"""The table of `make coverage`: lines and branches that tests have reached, by package.
 
-`python -m tests.support.coverage_by_room REPORT` reads the JSON report of coverage.py. It ends with 1 where a room has
-fewer of its branches than `FLOORS` asks for.
+`python -m tests.support.coverage_by_package REPORT` reads the JSON report of coverage.py. It ends with status 1 if the
+tests of a package reach fewer of its branches than `LEAST` requires.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-FLOORS: dict[str, float] = {
+LEAST: dict[str, float] = {
     "protocols": 100.0,
     "generators": 98.0,
     "services": 98.0,
@@ -33,11 +33,11 @@ FLOORS: dict[str, float] = {
     "ros": 86.0,
     "formats": 84.0,
 }
-"""The share of branches, in percent, that tests have to reach in a room."""
+"""The share of branches, in percent, that tests have to reach in a package."""
 
 
-def rooms(report: str) -> dict[str, Counter[str]]:
-    """Return what the report counts, by room; what stands loose at the top of the package is "robochoc"."""
+def packages(report: str) -> dict[str, Counter[str]]:
+    """Return what the report counts, by package; what stands loose at the top of the package is "robochoc"."""
     found: dict[str, Counter[str]] = {}
     for name, file in json.loads(report)["files"].items():
         parts = Path(name).parts
@@ -53,34 +53,34 @@ def share(counts: Counter[str], kind: str, of: str) -> float:
 
 
 def table(found: dict[str, Counter[str]]) -> str:
-    """Return a line for each room, and one for all."""
-    lines = [f"{'room':<14}{'lines':>8}{'reached':>9}{'branches':>10}{'reached':>9}"]
-    for room, counts in {**found, "all": sum(found.values(), Counter())}.items():
+    """Return a line for each package, and one for all."""
+    lines = [f"{'package':<14}{'lines':>8}{'reached':>9}{'branches':>10}{'reached':>9}"]
+    for package, counts in {**found, "all": sum(found.values(), Counter())}.items():
         of_lines, of_branches = (
             share(counts, kind, of)
             for kind, of in (("covered_lines", "num_statements"), ("covered_branches", "num_branches"))
         )
         numbers = f"{counts['num_statements']:>8,}{of_lines:>8.1f}%{counts['num_branches']:>10,}{of_branches:>8.1f}%"
-        lines.append(f"{room:<14}{numbers}")
+        lines.append(f"{package:<14}{numbers}")
     return "\n".join(lines)
 
 
-def below_the_floor(found: dict[str, Counter[str]], floors: dict[str, float]) -> list[str]:
-    """Return a line for each room whose branches were reached too seldom."""
+def below_least(found: dict[str, Counter[str]], least: dict[str, float]) -> list[str]:
+    """Return a line for each package whose branches were reached too seldom."""
     return [
-        f"{room}: tests reach {reached} % of the branches, and {floor:g} % are asked for"
-        for room, floor in floors.items()
-        if (reached := share(found.get(room, Counter()), "covered_branches", "num_branches")) < floor
+        f"{package}: tests reach {reached} % of the branches, and {minimum:g} % are asked for"
+        for package, minimum in least.items()
+        if (reached := share(found.get(package, Counter()), "covered_branches", "num_branches")) < minimum
     ]
 
 
 def main() -> int:
-    """Print the table, and what is below its floor."""
+    """Print the table, and what is below its minimum."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("report", type=Path, metavar="REPORT", help="the JSON report of coverage.py")
-    found = rooms(parser.parse_args().report.read_text(encoding="utf-8"))
+    found = packages(parser.parse_args().report.read_text(encoding="utf-8"))
     print(table(found))  # noqa: T201 - for make
-    failed = below_the_floor(found, FLOORS)
+    failed = below_least(found, LEAST)
     print(*failed, sep="\n", end="\n" if failed else "", file=sys.stderr)  # noqa: T201 - the same
     return bool(failed)
 

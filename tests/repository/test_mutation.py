@@ -119,19 +119,19 @@ def test_a_store_marks_each_function_that_is_called(monkeypatch: pytest.MonkeyPa
     ]
     marks = [0] * 10
     monkeypatch.setattr(builtins, NAME, marks, raising=False)
-    room: dict[str, object] = {}
-    exec(compile(with_stores(REACHED, 3), "reached.py", "exec"), room)  # noqa: S102
+    namespace: dict[str, object] = {}
+    exec(compile(with_stores(REACHED, 3), "reached.py", "exec"), namespace)  # noqa: S102
     assert marks == [0] * 10
     code = """
 plain(0); steps = list(Outer.generator()); waiting = Outer().waiting()
 try: waiting.send(None)
 except StopIteration as end: steps.append(end.value)
 """
-    exec(code, room)  # noqa: S102
+    exec(code, namespace)  # noqa: S102
     assert marks == [0, 0, 0, 1, 1, 1, 1, 0, 0, 0]
-    assert room["steps"] == [1, 3]
-    assert room["__doc__"] == room["plain"].__doc__ == "A docstring."
-    assert room["plain"].__annotations__ == {"x": "int", "return": "Unknown"}
+    assert namespace["steps"] == [1, 3]
+    assert namespace["__doc__"] == namespace["plain"].__doc__ == "A docstring."
+    assert namespace["plain"].__annotations__ == {"x": "int", "return": "Unknown"}
 
 
 def test_a_mutant_meets_the_nearest_cases_that_reach_its_function(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from tests.support.coverage_by_room import below_the_floor, rooms, table
+from tests.support.coverage_by_package import below_least, packages, table
 
 
 def summary(lines: int, of_lines: int, branches: int, of_branches: int) -> dict[str, object]:
@@ -23,18 +23,18 @@ REPORT = json.dumps(
 )
 
 
-def test_lines_and_branches_by_room() -> None:
-    assert table(rooms(REPORT)).splitlines() == [
-        "room             lines  reached  branches  reached",
+def test_lines_and_branches_by_package() -> None:
+    assert table(packages(REPORT)).splitlines() == [
+        "package          lines  reached  branches  reached",
         "protocols           20    75.0%     2,000    99.9%",
         "robochoc             3   100.0%         0   100.0%",
         "all                 23    78.2%     2,000    99.9%",
     ]
 
 
-def test_almost_all_is_below_a_floor_of_all() -> None:
-    found = rooms(REPORT)
-    assert below_the_floor(found, {"protocols": 99.9, "robochoc": 100}) == []
-    assert below_the_floor(found, {"protocols": 100}) == [
+def test_almost_all_is_less_than_all() -> None:
+    found = packages(REPORT)
+    assert below_least(found, {"protocols": 99.9, "robochoc": 100}) == []
+    assert below_least(found, {"protocols": 100}) == [
         "protocols: tests reach 99.9 % of the branches, and 100 % are asked for"
     ]
