@@ -110,7 +110,7 @@ class Clash(NamedTuple):
 
 Proof = StandsAt | StandsWhere | HasOnly | Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash
 NOTHING: tuple[Proof, ...] = ()
-"""The proofs of a message that proves none. It has a rule, unlike a message whose `proves` returns None."""
+"""The proofs of a message that gives none here. It has a rule, unlike a message whose `proves` returns None."""
 AT_THE_END = (2**62,)
 """The stamp of a value that is not changed any more."""
 FINITE = float(2**53)

@@ -40,16 +40,20 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     shareable: ClassVar[bool] = False
     """True if its receivers change nothing in it: in the simulator all of them are given the same object."""
 
+    proves_nothing: ClassVar[bool] = False
+    """True if its receivers learn nothing of other robots' problems from the message: the rule of such a message."""
+
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for those that have words
         """Return what the sender says: `V1.1 = 1 from now on`. Empty: the message is shown by its fields."""
         return ""
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:  # noqa: ARG002 - for those that have a rule
-        """Return what the message proves to its receiver about other robots (`model/disclosure.py`).
+        """Return the proofs that the message gives its receiver about other robots (`model/disclosure.py`).
 
-        None: there is no rule. Then it is not known what the receiver has learnt.
+        None: there is no rule, and the receiver's knowledge is unknown. A message with `proves_nothing` needs no
+        override.
         """
-        return None
+        return () if self.proves_nothing else None
 
 
 class Envelope(NamedTuple):

@@ -23,13 +23,11 @@ class Proposal(wire.Message, frozen=True):
     act = Act(Performative.QUERY_REF, "the sender asks what its proposal would cost the receiver")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if self.value is None:
             return "I propose no other value in this cycle"
         return f"{words.own_value(self.value)} is what I propose: what would it cost you?"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return NOTHING if self.value is None else [can_take(hearing.sender, self.value)]
 
 
@@ -42,7 +40,6 @@ class Sides(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the answer to `Proposal`")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"my side costs {saving_in_words(*self.now)} now, and {saving_in_words(*self.proposed)} as you propose"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:

@@ -16,7 +16,6 @@ class RowRequest(Message, frozen=True):
     act = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side charges with each of its values")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"what does your side add for each of my {counted(len(self.values), 'value')}?"
 
 
@@ -28,5 +27,4 @@ class Row(Message, frozen=True):
     act = Act(Performative.INFORM, "the answer to `RowRequest`")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"for your values my side adds {costs_text(self.costs)}"

@@ -21,7 +21,6 @@ class SideRequest(Message, frozen=True):
     act = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side of constraints adds to the cost")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} for now; what does your side of it add?"
 
 
@@ -34,5 +33,4 @@ class Side(Message, frozen=True):
     act = Act(Performative.INFORM, "the answer to `SideRequest`")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"my side of it adds {cost_text(self.cost)}"

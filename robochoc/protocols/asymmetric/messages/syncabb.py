@@ -24,12 +24,10 @@ class CPA(Message, frozen=True):
     act = acts.PROPOSE_CPA
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values, known = words.partial(self.values), incumbent_text(self.best.bound)
         return f"so far {values}, which costs {cost_text(self.paid)}; {known}; it is {words.receiver}'s turn"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         values = [can_take(*chosen) for chosen in zip(hearing.order, self.values, strict=False)]
         return [*values, *best_proves(self.best, hearing)]
 
@@ -49,12 +47,10 @@ class CPABack(Message, frozen=True):
     act = ASK
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = words.assigned([(self.robot, self.value)])
         return f"with {values} it costs {cost_text(self.paid)} so far; what does your side of it add?"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(self.robot, self.value)]
 
 
@@ -71,12 +67,10 @@ class FullBack(Message, frozen=True):
     act = ASK
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = words.partial(self.values)
         return f"all have values: {values}, which costs {cost_text(self.paid)} so far; what does your side add?"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(*chosen) for chosen in zip(hearing.order, self.values, strict=False)]
 
 
@@ -88,7 +82,6 @@ class Priced(Message, frozen=True):
     act = Act(Performative.INFORM, "the answer to `CPABack` or `FullBack`: what the CPA costs")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"with {words.receiver}'s value it costs {cost_text(self.paid)} in all"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
@@ -111,11 +104,7 @@ class TooCostly(Message, frozen=True):
     """The CPA with the receiver's value costs the bound or more, with the own sides of robots before."""
 
     act = acts.REJECT_VALUE
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"with {words.receiver}'s value it costs too much"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

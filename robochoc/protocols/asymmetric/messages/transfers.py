@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording
 from robochoc.protocols.local_search.messages.mgm import saving_in_words
@@ -20,16 +17,10 @@ class Transfer(Message, frozen=True):
     entry: tuple[int, int | float] | None
 
     act = Act(Performative.INFORM, "the receiver comes to know what its move has cost the sender, if that is too much")
+    # The entry may contain costs that were handed over before.
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if self.entry is None:
             return "I have no costs to hand over to you"
         return f"you pay my side of our two values from now on: {saving_in_words(*self.entry)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing by itself.
-
-        The entry may have costs in it that were handed over before.
-        """
-        return NOTHING

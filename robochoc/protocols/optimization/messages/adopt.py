@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from robochoc.model import message
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
+from robochoc.model.disclosure import Hearing, Proof, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
@@ -22,11 +22,9 @@ class Value(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on (change {self.counter})"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(hearing.sender, self.value)]
 
 
@@ -40,11 +38,9 @@ class Cost(Message, frozen=True):
     act = acts.TELL_BOUNDS
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return bounds_in_words(words, self.context, self.lb, self.ub)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return bounds_prove(self.context, self.lb, self.ub, hearing)
 
 
@@ -55,13 +51,9 @@ class Threshold(Message, frozen=True):
     context: dict[str, message.Value]
 
     act = Act(Performative.REQUEST, "the receiver is to keep its value while it costs no more")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = {robot: (value, 0) for robot, value in self.context.items()}
         allowed = cost_text(self.threshold)
         return f"{words.context(values)}your subtree may cost {allowed} before you try other values"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

@@ -18,7 +18,6 @@ class Value(bnb_adopt.Value, frozen=True):
     allowance: Number = 0
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         change = f"{words.own_value(self.value)} from now on (change {self.counter})"
         if not self.allowance and math.isinf(self.threshold):
             return change

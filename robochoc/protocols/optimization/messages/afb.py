@@ -36,7 +36,6 @@ class CPA(Message, frozen=True):
     act = acts.PROPOSE_CPA
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = words.partial([value for value, _ in self.assignments])
         if self.least:
             known = incumbent_text(self.bound)
@@ -67,12 +66,10 @@ class FBCPA(Message, frozen=True):
     act = Act(Performative.QUERY_REF, "the sender asks which costs the receiver adds to the CPA")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = words.partial([value for value, _ in self.assignments])
         return f"so far {values}; what does a value of yours add to it at least?"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return partial_assignment(hearing.order, [value for value, _ in self.assignments])
 
 
@@ -88,7 +85,6 @@ class FBEstimate(Message, frozen=True):
     act = Act(Performative.INFORM, "the answer to `FBCPA`")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         length = counted(len(self.stamp), "value")
         last = f"a value of mine adds at least {cost_text(self.estimates[-1])} to a CPA of {length}"
         shorter = self.estimates[:-1]
@@ -124,7 +120,6 @@ class NewSolution(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the best solution so far")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"the best solution so far costs {cost_text(self.cost)}: {words.partial(self.values)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
@@ -139,7 +134,6 @@ class Terminate(Message, frozen=True):
     act = acts.TERMINATE
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "the search is over: no solution is better than the best one so far"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from robochoc.model import message
-from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof, StandsAt
+from robochoc.model.disclosure import HasOnly, Hearing, Proof, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text
@@ -24,14 +24,12 @@ class Value(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         change = f"{words.own_value(self.value)} from now on (change {self.counter})"
         if math.isinf(self.threshold):
             return change
         return f"{change}; your subtree may cost {cost_text(self.threshold)} then"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(hearing.sender, self.value)]
 
 
@@ -46,12 +44,10 @@ class Cost(Message, frozen=True):
     act = acts.TELL_BOUNDS
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         asked = "; tell me my threshold again" if self.threshold_request else ""
         return f"{bounds_in_words(words, self.context, self.lb, self.ub)}{asked}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return bounds_prove(self.context, self.lb, self.ub, hearing)
 
 
@@ -63,11 +59,9 @@ class Domain(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.domain(self.values)}; what do you cost at least with each of them?"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
@@ -77,12 +71,8 @@ class Floor(Message, frozen=True):
     costs: list[Number]
 
     act = acts.TELL_BOUNDS
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         told = ", ".join(cost_text(cost) for cost in self.costs)
         return f"with your values, one by one, my subtree costs at least {told}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

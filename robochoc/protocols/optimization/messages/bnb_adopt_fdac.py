@@ -27,11 +27,9 @@ class Domain(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.domain(self.values)}; what can you move to each of them?"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
@@ -46,7 +44,6 @@ class Moved(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know costs that it is to count as its own")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         told = ", ".join(cost_text(cost) for cost in self.costs)
         return f"count as your own, with your values one by one: {told}"
 
@@ -67,7 +64,6 @@ class Value(bnb_adopt.Value, frozen=True):
     """The sender's value, the number of its changes (ID), and the receiver's threshold (TH) after what it moved up."""
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         change = f"{words.own_value(self.value)} from now on (change {self.counter})"
         if math.isinf(self.threshold):
             return change
@@ -78,7 +74,6 @@ class Cost(bnb_adopt.Cost, frozen=True):
     """Bounds on the cost of the sender's subtree in `context`, after what it moved up, and a threshold request."""
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         told = bounds_in_words(words, self.context, self.lb, self.ub)
         beyond = "" if math.isinf(self.lb) else " more than it has moved up"
         return f"{told}{beyond}{'; tell me my threshold again' if self.threshold_request else ''}"

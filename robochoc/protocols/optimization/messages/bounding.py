@@ -31,12 +31,10 @@ class Terminate(Message, frozen=True):
     act = acts.TERMINATE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         condition = words.context(self.context).removeprefix("as long as ").removesuffix(", ")
         return f"all above you have taken their last values{': ' if condition else ''}{condition}"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(robot, value) for robot, (value, _) in self.context.items()]
 
 

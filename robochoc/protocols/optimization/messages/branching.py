@@ -31,15 +31,11 @@ class Members(Message, frozen=True):
     linked: dict[str, list[str]]
 
     act = Act(Performative.INFORM, "the receiver comes to know who below it is linked with whom above")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         told = [f"{listed(names)} with {robot}" for robot, names in self.linked.items()]
         return f"in my subtree constraints are shared by {listed(told)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Request(Message, frozen=True):
@@ -50,11 +46,9 @@ class Request(Message, frozen=True):
     act = Act(Performative.QUERY_REF, "the sender asks for a lower bound on the receiver's cost")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} for now; what will you cost at least?"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(hearing.sender, self.value)]
 
 
@@ -66,7 +60,6 @@ class Report(Message, frozen=True):
     act = acts.TELL_BOUNDS
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if math.isinf(self.bound):
             return "no value of mine is allowed with your value and those above you"
         return f"with your value and those above you, I cost at least {cost_text(self.bound)}"
@@ -88,7 +81,6 @@ class Result(Message, frozen=True):
     act = acts.TELL_BOUNDS
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if math.isinf(self.cost):
             return "my subtree has nothing that costs less than you allow"
         return f"my subtree costs {cost_text(self.cost)}, with {words.assigned(self.values.items())}"
@@ -116,11 +108,9 @@ class Terminate(Message, frozen=True):
     act = acts.TERMINATE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"the search is over, with {words.assigned(self.values.items())}"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(robot, value, AT_THE_END) for robot, value in self.values.items()]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from robochoc.model import message
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof, table_proves
+from robochoc.model.disclosure import HasOnly, Hearing, Proof, table_proves
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, listed
 from robochoc.protocols import acts
@@ -27,11 +27,9 @@ class Domain(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.domain(self.values)}; my depth in the tree is {self.level}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
@@ -50,13 +48,11 @@ class PreUtil(Message, frozen=True):
     act = acts.TELL_BOUNDS
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         names = listed(name for name, _, _ in self.axes)
         told = f"my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
         return f"{told}; left out: {listed(name for name, _, _ in self.dropped)}" if self.dropped else told
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return bounds_prove(self.axes, self.costs, hearing)
 
 
@@ -70,14 +66,10 @@ class CPA(Message, frozen=True):
     places: dict[str, int]
 
     act = acts.PROPOSE_CPA
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"search your subtree {allowance(self.bound)}, with {places_in_words(self.places)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class InferCtxt(Message, frozen=True):
@@ -86,14 +78,10 @@ class InferCtxt(Message, frozen=True):
     places: dict[str, int]
 
     act = Act(Performative.REQUEST, "the receiver is to infer a tighter lower bound")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"what does your subtree cost at least with {places_in_words(self.places)}?"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class CtxtUtil(Message, frozen=True):
@@ -105,7 +93,6 @@ class CtxtUtil(Message, frozen=True):
     act = acts.TELL_BOUNDS
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         names = listed(name for name, _, _ in self.axes)
         return f"with these values my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -20,11 +20,9 @@ class Greedy(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} in the first assignment"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(hearing.sender, self.value)]
 
 
@@ -34,11 +32,7 @@ class Search(Message, frozen=True):
     bound: Number
 
     act = Act(Performative.REQUEST, "the receiver is to search its subtree")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"search your subtree {allowance(self.bound)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

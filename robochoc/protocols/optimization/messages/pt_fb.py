@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, SomeValuePays
+from robochoc.model.disclosure import Hearing, Proof, SomeValuePays
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, listed
 from robochoc.protocols import acts
@@ -24,7 +24,6 @@ class CPA(Message, frozen=True):
     act = acts.PROPOSE_CPA
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         asked = f"search your subtree {allowance(self.bound)}"
         if not self.reports:
             return asked
@@ -42,11 +41,7 @@ class Reduce(Message, frozen=True):
     bound: Number
 
     act = Act(Performative.INFORM, "the receiver comes to know a lower bound for its search")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"search on, {allowance(self.bound)}" if self.bound else "search no further"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Self
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Pays, Proof, StandsAt, Total
+from robochoc.model.disclosure import HasOnly, Hearing, Pays, Proof, StandsAt, Total
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, along, cost_text, counted, incumbent_text, listed
 from robochoc.protocols.optimization.interchangeable import Run, cut_off, expanded, grouped
@@ -31,12 +31,10 @@ class Above(Message, frozen=True):
         return cls(*grouped(domains))
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         return f"above you there are {_sizes(words.order, domains)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         domains = expanded(self.domains, cut_off(self.runs, len(hearing.order)))
         return [HasOnly(robot, tuple(values)) for robot, values in zip(hearing.order, domains, strict=False)]
 
@@ -66,7 +64,6 @@ class Below(Message, frozen=True):
         return expanded(list(zip(self.domains, self.charges, strict=True)), self.runs)
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         if not domains:
             return "nobody is below me"
@@ -75,7 +72,6 @@ class Below(Message, frozen=True):
         return f"below you there are {_sizes(names, domains)}; all together they cost at most {cost_text(self.most)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         below = hearing.order[hearing.order.index(hearing.receiver) + 1 :]
         found: list[Proof] = []
         for robot, (values, charges) in zip(below, self.robots, strict=False):
@@ -99,7 +95,6 @@ class CPAs(Message, frozen=True):
     act = Act(Performative.PROPOSE, "partial assignments, for the receiver to extend or to drop")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         known = incumbent_text(self.least if self.least < self.ceiling else math.inf)
         return f"{counted(self.count, 'partial assignment')} for {words.receiver} to extend; {known}"
 
@@ -116,14 +111,10 @@ class Explored(Message, frozen=True):
     """The end of the exploration of the oldest unanswered `CPAs` from the receiver."""
 
     act = Act(Performative.INFORM, "what was proposed with `CPAs` has been seen to the end")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "nothing is left of the oldest partial assignments that I have had from you and have not answered"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Solution(Message, frozen=True):
@@ -135,7 +126,6 @@ class Solution(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know a solution that costs less")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         places = listed([str(place + 1) for place in self.places])
         return (
             f"a solution costs {cost_text(self.cost)}, less than all before;"
@@ -143,7 +133,6 @@ class Solution(Message, frozen=True):
         )
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         view = _chosen(hearing.order, self.places, hearing)
         return [*(StandsAt(*one) for one in view.items()), Total(view, self.cost)]
 

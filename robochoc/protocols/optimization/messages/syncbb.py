@@ -31,14 +31,12 @@ class Path(Message, frozen=True):
     act = acts.PROPOSE_CPA
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = words.partial([value for value, _ in self.assignments])
         paid = cost_text(sum(cost for _, cost in self.assignments))
         known = incumbent_text(self.best.bound)
         return f"so far {values}, which costs {paid}; {known}; it is {words.receiver}'s turn"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         found = best_proves(self.best, hearing)
         view: dict[str, Value] = {}
         for robot, (value, cost) in zip(hearing.order, self.assignments, strict=False):
@@ -56,14 +54,12 @@ class Backtrack(Message, frozen=True):
     backtracks = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if math.isinf(self.best.bound):
             return f"{words.receiver}'s value leads to no solution: take another one"
         bound = cost_text(self.best.bound)
         return f"{words.receiver}'s value leads to nothing that costs less than {bound}: take another one"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         found = best_proves(self.best, hearing)
         path = hearing.last(Path, hearing.receiver, hearing.sender)
         if path is not None and hearing.is_lowest(hearing.sender):
@@ -81,14 +77,12 @@ class Terminate(Message, frozen=True):
     act = acts.TERMINATE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if math.isinf(self.best.bound):
             return "the search is over, and there is no solution"
         values = words.partial(self.best.values)
         return f"the search is over: nothing costs less than {cost_text(self.best.bound)}, with {values}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         stands = [StandsAt(robot, value) for robot, value in zip(hearing.order, self.best.values, strict=False)]
         return [*stands, *best_proves(self.best, hearing)]
 

@@ -25,7 +25,6 @@ class Ok(Message, frozen=True):
     shareable = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{_one_of(words, words.sender, self.values)} from now on"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
@@ -43,14 +42,12 @@ class Nogood(Message, frozen=True):
     backtracks = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         while_they = listed([_one_of(words, robot, values) for robot, values in self.lhs.items()])
         condition = f"as long as {while_they}, " if while_they else ""
         rest = "" if while_they else ", whatever the others do"
         return f"{condition}it cannot be that {_one_of(words, words.receiver, self.values)}{rest}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         # A nogood of any but the lowest robot may follow from constraints of those below it.
         if not hearing.fixed_holders or not hearing.is_lowest(hearing.sender):
             return NOTHING
@@ -69,28 +66,20 @@ class Narrow(Message, frozen=True):
     act = Act(
         Performative.REQUEST, "with all of the receiver's aggregate no value of the sender goes, with a part some"
     )
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"please keep to this: {_one_of(words, words.receiver, self.values)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class AddLink(Message, frozen=True):
     """A request of a lower-priority robot to be sent the receiver's aggregates from now on (`add-link`)."""
 
     act = acts.ADD_LINK
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"tell me {words.variables(words.receiver)} from now on"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 def _one_of(words: Wording, robot: str, values: Sequence[Value]) -> str:

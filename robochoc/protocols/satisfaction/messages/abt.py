@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
+from robochoc.model.disclosure import Hearing, Proof, StandsAt
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -18,11 +18,9 @@ class Ok(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(hearing.sender, self.value)]
 
 
@@ -30,11 +28,7 @@ class AddLink(Message, frozen=True):
     """A request of a lower-priority robot to be sent the receiver's value from now on (`adl`)."""
 
     act = acts.ADD_LINK
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"tell me {words.variables(words.receiver)} from now on"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, listed
 from robochoc.protocols import acts
@@ -22,11 +22,9 @@ class Ok(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on; {_not_ruled_out(self.left)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         # Once the order has changed, the sender need not say when it takes another value.
         return [can_take(hearing.sender, self.value)]
 
@@ -43,15 +41,11 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
+    # It may follow from any robot's constraints.
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.nogood(self.lhs, self.value)}; without that value, {_not_ruled_out(self.left)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        # It may follow from any robot's constraints.
-        return NOTHING
 
 
 class Order(Message, frozen=True):
@@ -61,28 +55,20 @@ class Order(Message, frozen=True):
     counters: Counters
 
     act = acts.TELL_ORDER
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"the order is now {listed(self.names)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class AddLink(Message, frozen=True):
     """A request to be sent the receiver's value from now on, while the receiver has higher priority."""
 
     act = acts.ADD_LINK
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"tell me {words.variables(words.receiver)} from now on, whenever you are above me"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 def _not_ruled_out(left: int) -> str:

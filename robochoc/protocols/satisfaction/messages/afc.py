@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
+from robochoc.model.disclosure import INFINITE, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -23,11 +23,9 @@ class CPA(Message, frozen=True):
     act = acts.PROPOSE_CPA
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return _partial(self.assignments, self.sc, hearing)
 
 
@@ -40,11 +38,9 @@ class FcCPA(Message, frozen=True):
     act = Act(Performative.INFORM, "a copy of the CPA, for forward checking; the receiver need not extend it")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"so far {words.partial(self.assignments)}; look which of your values still go with it"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return _partial(self.assignments, self.sc, hearing)
 
 
@@ -57,11 +53,9 @@ class NotOk(Message, frozen=True):
     act = Act(Performative.DISCONFIRM, "the receiver takes the CPA to be right, and it has no solution")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         # The sender has found it by forward checking, with its own constraints alone.
         return [EveryValuePays(hearing.sender, dict(zip(hearing.branch, self.assignments, strict=False)), INFINITE)]
 
@@ -77,15 +71,11 @@ class BacktrackCPA(Message, frozen=True):
 
     act = Act(Performative.REJECT_PROPOSAL, "the CPA that was proposed comes back")
     backtracks = True
+    # It may follow from any robot's constraints.
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"no solution has {words.partial(self.assignments)}: take another value"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        # It may follow from any robot's constraints.
-        return NOTHING
 
 
 def _partial(assignments: Assignments, sc: int, hearing: Hearing) -> Sequence[Proof]:

@@ -23,11 +23,9 @@ class CPA(Message, frozen=True):
     shareable = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"so far {words.partial([value for value, _ in self.assignments])}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         values = [value for value, _ in self.assignments]
         counters = tuple([counter for _, counter in self.assignments])
         stands = [
@@ -46,11 +44,9 @@ class Solved(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the solution")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"a solution is found, and the search is over: {words.assigned(self.solution.items())}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         robots = [robot for robot in hearing.order if robot in self.solution]
         values = [self.solution[robot] for robot in robots]
         return [*(StandsAt(*one, AT_THE_END) for one in self.solution.items()), *partial_assignment(robots, values)]

@@ -22,10 +22,8 @@ class Accept(Message, frozen=True):
     act = acts.ACCEPT
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = f", with {words.assigned(self.subtree.items())}" if self.subtree else ""
         return f"all below {words.receiver}, from me down, accept its partial assignment{values}"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(robot, value) for robot, value in self.subtree.items()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
@@ -24,12 +24,10 @@ class Ok(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         left = f"I have {self.left} of {counted(self.size, 'value')} left"
         return f"{words.own_value(self.value)} from now on; {words.condition(self.lhs)}{left}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         # Once the order has changed, the sender need not say when it takes another value.
         return [can_take(hearing.sender, self.value)]
 
@@ -41,28 +39,20 @@ class Order(Message, frozen=True):
     termination: TerminationVector
 
     act = acts.TELL_ORDER
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if self.places and not 0 <= min(self.places) <= max(self.places) < len(words.order):
             numbers = listed([str(place + 1) for place in self.places])
             return f"the order is now, by the places of the first one, {numbers}"
         return f"the order is now {listed([words.order[place] for place in self.places])}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class AddLink(Message, frozen=True):
     """A request to be sent the receiver's value from now on, while the receiver has higher priority (`adl`)."""
 
     act = acts.ADD_LINK
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"tell me {words.variables(words.receiver)} from now on, whenever I am below you"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

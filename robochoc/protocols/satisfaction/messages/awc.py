@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
+from robochoc.model.disclosure import Hearing, Proof, StandsAt
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, is_withdrawn, listed
 from robochoc.protocols import acts
@@ -19,11 +19,9 @@ class Ok(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on, with priority {self.priority}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(hearing.sender, self.value)]
 
 
@@ -34,32 +32,24 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
+    # It may follow from any robot's constraints.
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         values = {robot: value for robot, (value, _) in self.nogood.items() if not is_withdrawn(value)}
         facts = [fact for robot, value in values.items() for fact in words.facts(robot, value)]
         if len(facts) == 1:
             return f"{facts[0]} cannot stand, whatever the others do"
         return f"{listed(facts)} cannot {'both' if len(facts) == len('ab') else 'all'} stand"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        # It may follow from any robot's constraints.
-        return NOTHING
-
 
 class AddLink(Message, frozen=True):
     """A new link between sender and receiver because of a nogood: each sends the other its value from now on."""
 
     act = acts.ADD_LINK
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return (
             f"from now on let us tell each other {words.variables(words.sender)} and {words.variables(words.receiver)}"
         )
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

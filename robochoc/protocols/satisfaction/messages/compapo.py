@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import FINITE, NOTHING, Clash, HasOnly, Hearing, Pays, Proof, StandsAt
+from robochoc.model.disclosure import FINITE, Clash, HasOnly, Hearing, Pays, Proof, StandsAt
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
@@ -53,11 +53,9 @@ class Init(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return words.domain(self.values)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, self.values), StandsAt(hearing.sender, self.values[0], (0,))]
 
 
@@ -70,11 +68,9 @@ class Ok(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(hearing.sender, self.value, (self.count,))]
 
 
@@ -86,16 +82,12 @@ class Evaluate(Message, frozen=True):
     tables: bool
 
     act = Act(Performative.REQUEST, "the sender wants to mediate, and needs the receiver to keep its value for now")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         known = f"I know the constraints of {counted(self.priority, 'robot')}"
         more = "; tell me yours" if self.tables else ""
         return f"let me mediate: keep {words.variables(words.receiver)} until I say more ({known}{more})"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Evaluation(Message, frozen=True):
@@ -112,7 +104,6 @@ class Evaluation(Message, frozen=True):
     act = Act(Performative.AGREE, "the sender keeps its value until the mediation session is over")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         told = f"; my constraints are {counted(len(self.tables), 'table')}" if self.tables else ""
         return f"do mediate: I keep my value number {self.place + 1}{told}"
 
@@ -130,28 +121,20 @@ class Wait(Message, frozen=True):
     session: int
 
     act = Act(Performative.REFUSE, "the sender is in a mediation session of higher priority")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "wait with your mediation: another one is going on here that comes first"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Free(Message, frozen=True):
     """The sender, which told the receiver to wait, is in no session any more."""
 
     act = Act(Performative.INFORM, "the receiver may ask again to mediate")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "you need not wait for me any more"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Assign(Message, frozen=True):
@@ -163,7 +146,6 @@ class Assign(Message, frozen=True):
     act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"the mediation is over: take your value number {self.place + 1}{_with(self.changes)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
@@ -181,11 +163,9 @@ class Release(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver need not keep its value any more")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"the mediation is over: {words.variables(words.receiver)} may change again{_with(self.changes)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return _stands(self.changes, hearing)
 
 

@@ -29,7 +29,6 @@ class Improve(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if not self.weight:
             return f"I violate nothing; for {counted(self.counter, 'cycle')} nobody near me has"
         return f"what I violate weighs {self.weight:,}, and my move would make that {self.reduction:,} less"

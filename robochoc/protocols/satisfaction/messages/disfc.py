@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsWhere
+from robochoc.model.disclosure import Hearing, Proof, StandsWhere
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
@@ -19,14 +19,12 @@ class Ok(Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         left = counted(sum(byte.bit_count() for byte in self.allowed), "value")
         return (
             f"my assignment number {self.counter} stands from now on; it leaves {words.receiver} {left} of its domain"
         )
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         upwards = hearing.order.index(hearing.sender) > hearing.order.index(hearing.receiver)
         return [StandsWhere(hearing.sender, hearing.receiver, self.allowed, parts_only=upwards)]
 
@@ -39,29 +37,21 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
+    # Only the senders of these counters know which values they stand for.
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         named = [f"{robot} keeps its assignment number {counter}" for robot, counter in self.lhs.items()]
         condition = f"as long as {listed(named)}, " if named else ""
         rest = "" if named else ", whatever the others do"
         return f"{condition}{words.receiver} cannot keep its assignment number {self.counter}{rest}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        # Only the senders of these counters know which values they stand for.
-        return NOTHING
 
 
 class AddLink(Message, frozen=True):
     """A request of a lower-priority robot to be sent the receiver's assignments from now on (`adl`)."""
 
     act = acts.ADD_LINK
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "tell me of each new assignment of yours from now on"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING

@@ -15,11 +15,9 @@ class Placed(Message, frozen=True):
     value: Value | None
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if self.value is None:
             return "I withdraw"
         return f"I fly, with {words.own_value(self.value, 'a value')}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return NOTHING if self.value is None else [StandsAt(hearing.sender, self.value)]

@@ -20,11 +20,9 @@ class Nogood(Message, frozen=True):
     backtracks = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return words.nogood(self.lhs, self.value)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         broken = {**self.lhs, hearing.receiver: self.value}
         if not hearing.fixed_holders:
             return NOTHING

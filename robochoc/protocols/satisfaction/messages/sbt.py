@@ -18,11 +18,9 @@ class CPA(Message, frozen=True):
     act = acts.PROPOSE_CPA
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         stands = [StandsAt(robot, value) for robot, value in zip(hearing.branch, self.assignments, strict=False)]
         return [*stands, *partial_assignment(hearing.branch, self.assignments)]
 
@@ -34,11 +32,9 @@ class Backtrack(Message, frozen=True):
     backtracks = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"nobody below {words.receiver} has a value left that goes with its own: take another one"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         cpa = hearing.last(CPA, hearing.receiver, hearing.sender)
         if cpa is None or not hearing.is_lowest(hearing.sender):
             return NOTHING
