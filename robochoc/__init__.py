@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from robochoc.model.outcome import Outcome, Verdict
     from robochoc.modelling.array_problem import ArrayProblem
     from robochoc.modelling.cpmpy_models import from_cpmpy
+    from robochoc.modelling.errors import ModelError
     from robochoc.modelling.functions import (
         all_different,
         allowed,
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
         minimum,
     )
     from robochoc.modelling.model import Model
-    from robochoc.modelling.places import ModelError
     from robochoc.modelling.solution import Solution
     from robochoc.modelling.terms import all_of, any_of
 
@@ -91,7 +91,7 @@ _PLACES = {
     "ArrayProblem": "robochoc.modelling.array_problem",
     "from_cpmpy": "robochoc.modelling.cpmpy_models",
     "Model": "robochoc.modelling.model",
-    "ModelError": "robochoc.modelling.places",
+    "ModelError": "robochoc.modelling.errors",
     "Solution": "robochoc.modelling.solution",
 }
 

@@ -1,6 +1,6 @@
-"""Problems of very many robots, made from numpy arrays: no files, no objects, one variable for each robot.
+"""Problems of very many robots as numpy arrays: no files, no objects, one variable for each robot.
 
-They are for the runtime of arrays (docs/guides/arrays.md).
+They are solved by the runtime `arrays` (docs/guides/arrays.md).
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ MOST_ROBOTS = 1 << 31
 
 @dataclass(frozen=True)
 class ArraySolution:
-    """What a run of arrays comes to.
+    """The result of a run on arrays.
 
     Attributes:
-        verdict: `solution`, or `no-solution`, or `unknown`: all cycles break a hard constraint.
-        values: The values of the cheapest cycle, by robot; None where no cycle breaks nothing.
-        cost: What they cost; None where there are none.
-        costs: The cost of every cycle, from 0; `inf` where a hard constraint is broken.
-        metrics: Messages by type, bytes, checks, NCCCs (0 where they were not counted), as in the simulator.
+        verdict: `solution`, or `no-solution`, or `unknown`: every cycle violates a hard constraint.
+        values: The values of the cheapest cycle, by robot. None: every cycle violates a hard constraint.
+        cost: The cost of the values. None: there are none.
+        costs: The cost of every cycle, from 0; `inf` where a hard constraint is violated.
+        metrics: Messages by type, bytes, checks, NCCCs (0 if not counted), as in the simulator.
     """
 
     verdict: Verdict
@@ -74,16 +74,16 @@ class ArrayProblem:
     Args:
         robots: The number of robots.
         values: The number of values of each variable.
-        edges: The pairs of robots that a table of costs connects, a row for each.
-        tables: What pairs of values cost: row and column are the values of an edge's first and second robot. One
-            table for all edges, or one for each, or several that `which` chooses from. Whole numbers of 0 or more,
-            and `inf` for what is forbidden.
+        edges: The pairs of robots with a table of costs, one row for each pair.
+        tables: The costs of pairs of values: row and column are the values of an edge's first and second robot. One
+            table for all edges, or one for each, or several from which `which` chooses. Integers of 0 or more,
+            and `inf` for forbidden pairs.
         which: The number of the table of each edge.
-        charges: What each value costs each robot alone, a row for each robot.
-        names: The names of the robots, on which their random numbers depend. None: R0, R1, ...
+        charges: The unary costs of the values, one row for each robot.
+        names: The names of the robots, which determine their random numbers. None: R0, R1, ...
 
     Raises:
-        ValueError: for arrays that do not fit.
+        ValueError: if the arrays are invalid.
 
     Example:
         >>> import numpy as np
@@ -125,22 +125,22 @@ class ArrayProblem:
         ncccs: bool = True,
         **settings: object,
     ) -> ArraySolution:
-        """Solve the problem by a protocol that has a form as arrays, and check the answer with the tables.
+        """Solve the problem by a protocol that supports arrays, and check the answer with the tables.
 
         Args:
             protocol: The protocol: dsa, mgm, mgm2 or maxsum.
             seed: The seed of the robots' random numbers.
-            timeout: A limit in seconds, looked at after each cycle.
-            ncccs: Whether NCCCs are counted; that takes up to a fifth of the time.
+            timeout: A limit in seconds, checked after each cycle.
+            ncccs: Whether to count NCCCs, which takes up to a fifth of the time.
             **settings: The protocol's settings, such as `cycles` or `variant`.
 
         Returns:
-            The cheapest cycle (anytime), and what the run took.
+            The cheapest cycle (anytime), and the metrics of the run.
 
         Raises:
             UnknownProtocolError: if no such protocol is installed.
-            UnsupportedError: if it has no form as arrays, or a setting is not allowed, or costs are too large.
-            RefutedError: if the answer costs something else than the run says.
+            UnsupportedError: if the protocol does not support arrays, a setting is not allowed, or costs are too large.
+            RefutedError: if the cost of the answer differs from the run's.
             ValueError: if an option has a value that is not allowed.
             TypeError: if an option has a value of a wrong type.
         """
@@ -154,22 +154,22 @@ class ArrayProblem:
         return self._solution(run, time.monotonic() - began)
 
     def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
-        """Return a run that has not begun, for those who look at each cycle (`walk`). For the rest see `solve`."""
+        """Return a run that has not started, for callers that need each cycle (`walk`). Arguments as in `solve`."""
         options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
         kind = protocol_named(options.protocol)
         refuse_settings(options.protocol, kind, options.settings)
         form = form_of(kind)
         if not issubclass(kind, CycleProtocol):
-            raise UnsupportedError(f"{options.protocol} goes through no cycles")
+            raise UnsupportedError(f"{options.protocol} does not work in cycles")
         known = settings_of(kind, options.settings)
         chosen = known if isinstance(known, type(kind.settings)) else kind.settings
         return form(self.layout, chosen, options.seed, clocks=ncccs)
 
     def cost(self, values: ArrayLike) -> float:
-        """Return what `values` of all robots cost. Raise `ValueError` where a robot has none, or no such value."""
+        """Return the cost of the values of all robots. Raise `ValueError` if a value is missing or invalid."""
         values = _whole("values", values)
         if values.shape != (self.robots,) or not _within(values, self.values):
-            raise ValueError(f"each of {self.robots:,} robots has a value below {self.values:,}")
+            raise ValueError(f"expected a value from 0 to {self.values - 1:,} for each of {self.robots:,} robots")
         first, second = self.edges.T
         paid = exact_sum(self.tables[self.which, values[first], values[second]])
         if self.charges is not None:
@@ -178,7 +178,7 @@ class ArrayProblem:
 
     @cached_property
     def layout(self) -> Layout:
-        """The problem as runs need it; made once."""
+        """The arrays of the runtime; computed once."""
         return Layout(self._described())
 
     def __repr__(self) -> str:
@@ -202,7 +202,7 @@ class ArrayProblem:
         )
 
     def _held(self) -> Held:
-        """Return the constraints, as both robots of each edge know them."""
+        """Return the constraints of both robots of each edge."""
         first, second = self.edges.T
         turned = self.tables.swapaxes(1, 2)
         alike = bool((turned == self.tables).all())
@@ -220,7 +220,7 @@ class ArrayProblem:
         values[run.layout.robots] = rows
         cost = min(run.costs, default=INFINITE)
         if run.costs and self.cost(values) != cost:
-            raise RefutedError(f"the answer costs {self.cost(values):g}, and the run says {cost:g}")
+            raise RefutedError(f"the answer costs {self.cost(values):g}, but the run reported {cost:g}")
         found = cost < INFINITE and run.verdict is None
         verdict = run.verdict or (Verdict.SOLUTION if found else Verdict.UNKNOWN)
         return ArraySolution(
@@ -235,65 +235,66 @@ class ArrayProblem:
         return np.arange(len(self.tables)) if several else np.zeros(len(self.edges), np.int64)
 
     def _check_shapes(self) -> None:
-        """Raise `ValueError` for numbers and shapes that do not fit, before others are compared with them."""
+        """Raise `ValueError` for invalid numbers and shapes, with which `_check` compares others."""
         shape = (self.values, self.values)
         _refuse_first(
             {
-                "robots and values are numbers of 1 or more": self.robots < 1 or self.values < 1,
-                f"there are {MOST_ROBOTS:,} robots at most": self.robots > MOST_ROBOTS,
-                "edges have two columns": self.edges.shape[1:] != (_PAIR,),
-                f"tables have the shape {shape}, one after the other": self.tables.shape[1:] != shape,
+                "robots and values must be 1 or more": self.robots < 1 or self.values < 1,
+                f"there can be at most {MOST_ROBOTS:,} robots": self.robots > MOST_ROBOTS,
+                "edges must have two columns": self.edges.shape[1:] != (_PAIR,),
+                f"tables must have the shape {shape} or (number, *{shape})": self.tables.shape[1:] != shape,
             }
         )
 
     def _check(self) -> None:
-        """Raise `ValueError` for entries that do not fit."""
+        """Raise `ValueError` for invalid entries."""
         _refuse_first(
             {
-                "an edge is a pair of different robots": bool((self.edges[:, 0] == self.edges[:, 1]).any()),
-                f"robots are numbers below {self.robots:,}": not _within(self.edges, self.robots),
-                "there is a table for each edge": self.which.shape != (len(self.edges),),
-                "`which` names tables by their number": not _within(self.which, len(self.tables)),
-                f"charges have the shape {(self.robots, self.values)}": self.charges is not None
+                "an edge must connect two different robots": bool((self.edges[:, 0] == self.edges[:, 1]).any()),
+                f"robots in edges must be numbers from 0 to {self.robots - 1:,}": not _within(self.edges, self.robots),
+                "there must be one table for each edge": self.which.shape != (len(self.edges),),
+                "`which` must contain numbers of tables": not _within(self.which, len(self.tables)),
+                f"charges must have the shape {(self.robots, self.values)}": self.charges is not None
                 and self.charges.shape != (self.robots, self.values),
-                "costs are whole numbers of 0 or more, or inf": not _are_costs(self.tables),
-                "charges are whole numbers of 0 or more": self.charges is not None
+                "costs must be integers of 0 or more, or inf": not _are_costs(self.tables),
+                "charges must be integers of 0 or more": self.charges is not None
                 and not (_are_costs(self.charges) and np.isfinite(self.charges).all()),
-                "each robot has a name": self.names is not None and not _are_names(self.names, self.robots),
+                "each robot must have a unique name": self.names is not None
+                and not _are_names(self.names, self.robots),
             }
         )
 
 
 def _refuse_first(faults: Mapping[str, bool]) -> None:
-    """Raise `ValueError` with the first rule that is broken."""
+    """Raise `ValueError` with the first violated rule."""
     for rule, broken in faults.items():
         if broken:
-            raise ValueError(f"{rule}; these arrays do not fit")
+            raise ValueError(f"invalid arrays: {rule}")
 
 
 def _index(name: str, given: int) -> int:
     try:
         return operator.index(given)
     except TypeError:
-        raise ValueError(f"{name} is a whole number, not {given!r}") from None
+        raise ValueError(f"{name} must be an integer, not {given!r}") from None
 
 
 def _numbers(name: str, given: ArrayLike) -> NDArray[Any]:
-    """Return `given` as an array. Raise `ValueError` where it holds something else than real numbers."""
+    """Return `given` as an array. Raise `ValueError` unless it contains only real numbers."""
     try:
         found = np.asarray(given)
     except (ValueError, TypeError):  # rows of several lengths
-        raise ValueError(f"{name} are no array of numbers") from None
+        raise ValueError(f"{name} are not an array of numbers") from None
     if found.dtype.kind not in "biuf":
-        raise ValueError(f"{name} are no array of numbers: numpy takes them for {found.dtype}")
+        raise ValueError(f"{name} are not an array of numbers: numpy converts them to {found.dtype}")
     return found
 
 
 def _whole(name: str, given: ArrayLike) -> Integers:
-    """Return `given` as an array of integers. Raise `ValueError` where it holds something else."""
+    """Return `given` as an array of integers. Raise `ValueError` unless it contains only integers."""
     found = _numbers(name, given)
     if found.dtype.kind == "b" or not (np.isfinite(found) & (np.floor(found) == found)).all():
-        raise ValueError(f"{name} are no array of whole numbers")
+        raise ValueError(f"{name} are not an array of integers")
     whole: Integers = found.astype(np.int64)
     return whole
 
@@ -319,5 +320,5 @@ class _Names(Sequence[str]):
     def __len__(self) -> int:
         return self._many
 
-    def __getitem__(self, place):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN204 - a number is all that is asked
+    def __getitem__(self, place):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN204 - always an integer
         return f"R{place}"

@@ -1,7 +1,7 @@
 """Domains of users' values as domains of integers, and back.
 
-Numbers are coded as themselves, times the least number that makes them integers; members of an `IntEnum` and truth
-values as their integers. All else becomes symbols: the value 2 stands for the third symbol of the model.
+The code of a number is the number times the least factor that makes all values integers; the code of a member of an
+`IntEnum` or of a truth value is its integer. All other values become symbols: code 2 is the model's third symbol.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.names import BEYOND
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.ranges import merge_ranges
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import exact, is_number, is_truth
-from robochoc.modelling.places import ModelError, ModelTypeError, Place
 
 MAX_VALUES = 100_000
 """The maximum size of a domain."""
 
 
-class Kind(NamedTuple):
-    """A kind of values. Only values of one kind are compared."""
+class ValueKind(NamedTuple):
+    """A kind of values. Only values of the same kind can be compared."""
 
     name: str
     type: type | None = None
@@ -37,37 +37,37 @@ class Kind(NamedTuple):
         return self.name
 
 
-NUMBER = Kind("a number")
-BOOLEAN = Kind("a truth value")
+NUMBER = ValueKind("a number")
+BOOLEAN = ValueKind("a truth value")
 
 
-def kind_of(value: object) -> Kind:
+def kind_of(value: object) -> ValueKind:
     """Return the kind of a value."""
     if is_truth(value):
         return BOOLEAN
     if is_number(value):
         return NUMBER
     if isinstance(value, str) and not isinstance(value, Enum):
-        return Kind("a text", str)
-    return Kind(f"a {type(value).__name__}", type(value))
+        return ValueKind("a text", str)
+    return ValueKind(f"a {type(value).__name__}", type(value))
 
 
 @dataclass(frozen=True)
-class Codes:
-    """A domain, and what its integers stand for.
+class DomainCodes:
+    """A domain as integers (codes), and the user's value of each.
 
     Attributes:
         kind: The kind of its values.
         ranges: The integers.
-        scale: Of numbers: an integer is so many times the value.
-        told: The user's values, by integer, where they are not the integers themselves.
-        later: Integers that events add.
+        scale: For numbers: code = value * scale.
+        user_values: The user's values by code. None: the codes are the values.
+        later: DomainCodes of values that events add.
     """
 
-    kind: Kind
+    kind: ValueKind
     ranges: tuple[range, ...]
     scale: int = 1
-    told: Mapping[int, Hashable] | None = None
+    user_values: Mapping[int, Hashable] | None = None
     later: tuple[int, ...] = ()
 
     def __len__(self) -> int:
@@ -79,25 +79,25 @@ class Codes:
 
     @property
     def symbolic(self) -> bool:
-        """Whether the integers stand for symbols."""
+        """Whether the codes are those of symbols."""
         return self.kind not in {NUMBER, BOOLEAN}
 
     def value(self, code: int) -> object:
-        """Return the user's value for an integer."""
-        return code if self.told is None else self.told.get(code, code)
+        """Return the user's value of a code."""
+        return code if self.user_values is None else self.user_values.get(code, code)
 
     @property
     def ever(self) -> tuple[int, ...]:
-        """The integers of the domain, and those that events add."""
+        """The codes of the domain, and those that events add."""
         return (*self, *(code for code in self.later if not any(code in part for part in self.ranges)))
 
     @property
     def ends(self) -> tuple[int, int]:
-        """The least and the greatest of `ever`."""
+        """The least and the greatest code of `ever`."""
         return min([self.ranges[0][0], *self.later]), max([self.ranges[-1][-1], *self.later])
 
     def code(self, value: object) -> int | None:
-        """Return the integer for a user's value, or None where the domain never has such a value."""
+        """Return the code of a user's value. None: the domain never has this value."""
         if self.symbolic:
             return self._by_value.get(value)
         if not is_number(value):
@@ -106,50 +106,50 @@ class Codes:
         known = scaled == int(scaled) and (scaled in self.later or any(int(scaled) in part for part in self.ranges))
         return int(scaled) if known else None
 
-    def with_value(self, value: Hashable, symbols: Symbols) -> tuple[Codes, int]:
-        """Return these codes with a value that an event adds, and its integer.
+    def with_value(self, value: Hashable, symbols: Symbols) -> tuple[DomainCodes, int]:
+        """Return the domain extended by a value that an event adds, and the value's code.
 
         Raises:
-            ModelError: if it is of another kind, or no multiple of the domain's unit.
+            ModelError: if the value is of another kind, or not a multiple of the domain's unit.
         """
         if kind_of(value) != self.kind:
             raise ModelTypeError(f"{value!r} is {kind_of(value)}, and the domain has {self.kind}")
         scaled = symbols.code(value) if self.symbolic else exact(exact(value) * self.scale)
         if not isinstance(scaled, int):
-            raise ModelError(f"{value!r} is no multiple of 1/{self.scale}, the unit of the domain")
-        told = None if self.told is None else {scaled: value, **self.told}
-        return replace(self, told=told, later=(*self.later, scaled)), scaled
+            raise ModelError(f"{value!r} is not a multiple of 1/{self.scale}, the unit of the domain")
+        user_values = None if self.user_values is None else {scaled: value, **self.user_values}
+        return replace(self, user_values=user_values, later=(*self.later, scaled)), scaled
 
     @cached_property
     def _by_value(self) -> dict[object, int]:
-        return {value: code for code, value in (self.told or {}).items()}
+        return {value: code for code, value in (self.user_values or {}).items()}
 
 
 class Symbols:
-    """The symbols of a model, which all its symbolic domains share."""
+    """The symbols of a model, shared by all its symbolic domains."""
 
     def __init__(self) -> None:
         self._codes: dict[str, int] = {}
-        self._words: dict[tuple[Kind, object], str] = {}
+        self._words: dict[tuple[ValueKind, object], str] = {}
 
     @property
     def all(self) -> tuple[str, ...]:
-        """All symbols, in the order of their integers."""
+        """All symbols, in the order of their codes."""
         return tuple(self._codes)
 
     def add(self, word: str) -> int:
-        """Return the integer for a symbol, which may be a new one."""
+        """Return the code of a symbol; a new symbol is added."""
         return self._codes.setdefault(word, len(self._codes))
 
     def code(self, value: Hashable) -> int:
-        """Return the integer for a user's value."""
+        """Return the code of a user's value; a new value is added."""
         kind = kind_of(value)
         if (kind, value) not in self._words:
             self._words[kind, value] = self._word(kind, value)
         return self.add(self._words[kind, value])
 
-    def _word(self, kind: Kind, value: object) -> str:
-        """Return a symbol for a value: a text or a member's name where it can be one, else something like it."""
+    def _word(self, kind: ValueKind, value: object) -> str:
+        """Return a free symbol for a value: its text or member name, adapted where it is not a valid symbol."""
         text = value.name if isinstance(value, Enum) else str(value)
         word = text if _is_symbol(text) else "_".join(re.findall(r"[A-Za-z0-9.]+", text))[:80]
         word = word if _is_symbol(word) else f"v{word}"
@@ -169,72 +169,72 @@ def _is_symbol(word: str) -> bool:
     return True
 
 
-def codes_of(domain: object, symbols: Symbols, place: Place) -> Codes:
-    """Return the codes of a domain: of a range, an `Enum`, `bool`, or values of one kind.
+def codes_of(domain: object, symbols: Symbols, place: SourceLine) -> DomainCodes:
+    """Return the codes of a domain, given as a range, an `Enum`, `bool`, or values of one kind.
 
     Raises:
-        ModelError: if it is no domain.
+        ModelError: if the domain is invalid.
     """
     if isinstance(domain, range) and domain.step == 1:
-        _check_size(max(0, domain.stop - domain.start), place)  # `len` takes no more than 64 bits
+        _check_size(max(0, domain.stop - domain.start), place)  # `len` is limited to 64 bits
         return _integers([domain], place)
     if domain is bool:
         domain = (False, True)
     if isinstance(domain, str):
-        raise ModelTypeError(f"{domain!r} is one text", f"a domain is a list of values: {domain.split()!r}", place)
+        raise ModelTypeError(f"the domain {domain!r} is one text", f"use a list of values: {domain.split()!r}", place)
     if not isinstance(domain, Iterable):
-        raise ModelTypeError(f"{domain!r} is no domain", "expected a range, an Enum, or a list of values", place)
+        raise ModelTypeError(f"invalid domain {domain!r}", "expected a range, an Enum, or a list of values", place)
     values = list(itertools.islice(domain, MAX_VALUES + 1))
     _check_size(len(values), place)
     for value in values:
         try:
             hash(value)
         except TypeError:
-            hint = "use values that cannot, such as tuples"
-            raise ModelTypeError(f"the value {value!r} can change", hint, place) from None
+            hint = "use immutable values, such as tuples"
+            raise ModelTypeError(f"the value {value!r} of a domain is not hashable", hint, place) from None
     return _listed(values, symbols, place)
 
 
-def _listed(values: list[Hashable], symbols: Symbols, place: Place) -> Codes:
+def _listed(values: list[Hashable], symbols: Symbols, place: SourceLine) -> DomainCodes:
     kinds = dict.fromkeys(map(kind_of, values))
     if len(kinds) > 1:
         one, other = list(kinds)[:2]
-        raise ModelTypeError(f"a domain with {one} and {other}", "the values of a domain are of one kind", place)
+        raise ModelTypeError(f"the domain mixes {one} and {other}", "use values of one kind", place)
     if len(set(values)) < len(values):
         twice = next(value for number, value in enumerate(values) if value in values[:number])
-        raise ModelError(f"the value {twice!r} stands twice in the domain", "delete one", place)
+        raise ModelError(f"the value {twice!r} occurs twice in the domain", "remove the duplicate", place)
     (kind,) = kinds
     if kind == NUMBER:
         return _numbers(values, place)
     if kind == BOOLEAN:
-        told: dict[int, Hashable] = {int(bool(value)): bool(value) for value in values}
-        return Codes(kind, _ranges(told), told=told)
-    told = {symbols.code(value): value for value in values}
-    return Codes(kind, _ranges(told), told=told)
+        user_values: dict[int, Hashable] = {int(bool(value)): bool(value) for value in values}
+        return DomainCodes(kind, _ranges(user_values), user_values=user_values)
+    user_values = {symbols.code(value): value for value in values}
+    return DomainCodes(kind, _ranges(user_values), user_values=user_values)
 
 
-def _numbers(values: list[Hashable], place: Place) -> Codes:
+def _numbers(values: list[Hashable], place: SourceLine) -> DomainCodes:
     numbers = {value: exact(value) for value in values}
     scale = math.lcm(*(Fraction(number).denominator for number in numbers.values()))
-    told = {int(number * scale): value for value, number in numbers.items()}
+    user_values = {int(number * scale): value for value, number in numbers.items()}
     if all(type(value) is int for value in values):
-        return _integers(_ranges(told), place)
-    return replace(_integers(_ranges(told), place), scale=scale, told=told)
+        return _integers(_ranges(user_values), place)
+    return replace(_integers(_ranges(user_values), place), scale=scale, user_values=user_values)
 
 
-def _integers(ranges: Iterable[range], place: Place) -> Codes:
+def _integers(ranges: Iterable[range], place: SourceLine) -> DomainCodes:
     kept = tuple(ranges)
     if any(not -BEYOND < end < BEYOND for part in kept for end in (part[0], part[-1])):
-        raise ModelError("a value of more than 18 digits", "integers have at most 18", place)
-    return Codes(NUMBER, kept)
+        raise ModelError("a value of the domain has more than 18 digits", "use at most 18 digits", place)
+    return DomainCodes(NUMBER, kept)
 
 
 def _ranges(codes: Iterable[int]) -> tuple[range, ...]:
     return merge_ranges(tuple(range(code, code + 1) for code in sorted(codes)))
 
 
-def _check_size(size: int, place: Place) -> None:
+def _check_size(size: int, place: SourceLine) -> None:
     if not size:
-        raise ModelError("a domain without values", "a variable needs one at least", place)
+        raise ModelError("the domain is empty", "a variable needs at least one value", place)
     if size > MAX_VALUES:
-        raise ModelError(f"a domain of more than {MAX_VALUES:,} values", "make it smaller", place)
+        raise ModelError(f"the domain has more than {MAX_VALUES:,} values", "make it smaller", place)

@@ -46,11 +46,11 @@ def from_cpmpy(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
         name: The name of the team.
 
     Returns:
-        The model. Its variables are called as CPMpy calls them, with `_` for what no name here has: `x[0]` is `x_0`.
+        The model. Its variables have CPMpy's names, with `_` in place of characters invalid in names: `x[0]` is `x_0`.
 
     Raises:
         ImportError: if CPMpy is not installed.
-        ValueError: if the model has what has no counterpart, is too large, or a variable has no owner.
+        ValueError: if an expression has no counterpart, the model is too large, or a variable has no owner.
 
     Example:
         >>> import cpmpy, robochoc
@@ -70,9 +70,9 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
         from cpmpy.transformations.get_variables import get_variables  # noqa: PLC0415 - the same
         from cpmpy.transformations.normalize import toplevel_list  # noqa: PLC0415 - the same
     except ImportError as error:
-        raise ImportError(f"from_cpmpy needs CPMpy; say: pip install 'robochoc[cpmpy]' ({error})") from error
+        raise ImportError(f"from_cpmpy requires CPMpy: run pip install 'robochoc[cpmpy]' ({error})") from error
     if not isinstance(model, cpmpy.Model):
-        raise TypeError(f"from_cpmpy takes a cpmpy.Model, not a {type(model).__name__}")
+        raise TypeError(f"from_cpmpy requires a cpmpy.Model, not a {type(model).__name__}")
     constraints = toplevel_list(model.constraints)
     has_objective = hasattr(model.objective_, "name")
     own = {one.name: one for one in get_variables([*constraints, *([model.objective_] if has_objective else [])])}
@@ -101,7 +101,7 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
 
 
 class _Robots:
-    """The robots of variables: those of the model, and further ones of CPMpy's decompositions.
+    """The robots of variables: of the model's, and of the further ones in CPMpy's decompositions.
 
     Args:
         owned: The robot of each variable of the model.
@@ -145,7 +145,7 @@ def _owner_of(variable: str, owner: Owner | None) -> str:
     if callable(owner):
         return str(owner(variable))
     if variable not in owner:
-        raise ValueError(f"owner says no robot for the variable {variable!r}")
+        raise ValueError(f"owner has no robot for the variable {variable!r}")
     return str(owner[variable])
 
 
@@ -161,7 +161,7 @@ def _values(variable: Any) -> range:  # noqa: ANN401 - CPMpy's expressions
     low, high = integer_of(variable.lb), integer_of(variable.ub)
     if high - low >= MAX_VALUES:
         message = f"the variable {variable.name} has {high - low + 1:,} values"
-        raise ValueError(f"{message}; {MAX_VALUES:,} are supported")
+        raise ValueError(f"{message}; the maximum is {MAX_VALUES:,}")
     return range(low, high + 1)
 
 
@@ -170,7 +170,7 @@ def _as_range(values: Sequence[int]) -> range:
 
 
 def _posting(own: Mapping[str, Any], names: Names) -> Posting:
-    """Return the variables of a CPMpy model, with nothing posted on them."""
+    """Return the variables of a CPMpy model, without constraints."""
     values = {name: _values(variable) for name, variable in own.items()}
     pretty = {name: _pretty(name) for name in own}
     clear = len(set(pretty.values())) == len(pretty)
@@ -196,7 +196,7 @@ def _post_definitions(translation: Translation) -> None:
 
 
 def _post(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
-    """Post a constraint that must hold: tables and tasks as such, all else as predicates."""
+    """Post a constraint that must hold: tables and tasks directly, all others as predicates."""
     if _post_as_such(constraint, translation):
         return
     if hasattr(constraint, "decompose") and constraint.name not in TRANSLATED:
@@ -240,7 +240,7 @@ def _post_table(constraint: Any, translation: Translation) -> bool:  # noqa: ANN
 
 
 def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
-    """Post a comparison with a member that variables choose, on whichever side it is."""
+    """Post a comparison with an element of an array, on either side."""
     left, right = constraint.args
     operator = COMPARISONS[constraint.name]
     if not _is_element(left):
@@ -253,7 +253,7 @@ def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: A
 
 
 def _is_element(term: Any) -> bool:  # noqa: ANN401 - CPMpy's expressions
-    """Return whether distinct variables choose a member of an array, all of whose members have values."""
+    """Return whether `term` is an element with distinct variables as indexes, of an array without terms."""
     if getattr(term, "name", "") not in {"element", "nd_element"}:
         return False
     array, *indexes = term.args

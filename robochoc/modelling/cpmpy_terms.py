@@ -1,4 +1,4 @@
-"""CPMpy's expressions as ours. CPMpy's operators are recognised by name; CPMpy is never imported.
+"""Translates CPMpy's expressions. CPMpy's operators are recognised by name; CPMpy is never imported.
 
 A partial function (a quotient, an element of an array) has CPMpy's relational semantics: the nearest Boolean expression
 around it is false where it has no value. `Translation.boolean` attaches that condition, and nothing rewrites a CPMpy
@@ -37,7 +37,7 @@ from robochoc.modelling.translation import may_be_undefined
 COMPARISONS = {"==": "eq", "!=": "ne", "<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
 
 
-class Definition(NamedTuple):
+class VariableDefinition(NamedTuple):
     """A constraint that defines a further variable of a decomposition.
 
     Attributes:
@@ -57,11 +57,11 @@ def integer_of(value: object) -> int:
         return int(bool(value))
     if isinstance(value, float) and value.is_integer():
         return int(value)
-    raise MistakeError(f"the number {value}", "CPMpy models have integers here: scale the others")
+    raise MistakeError(f"{value} is not an integer", "scale the numbers of the CPMpy model")
 
 
 def is_variable(term: object) -> bool:
-    """Return whether `term` is a variable of CPMpy, and no negation of one."""
+    """Return whether `term` is a variable of CPMpy, not a negation."""
     return hasattr(term, "lb") and hasattr(term, "ub") and not hasattr(term, "_bv")
 
 
@@ -74,12 +74,12 @@ class Translation:
 
     Attributes:
         posting: The variables.
-        definitions: The definitions of further variables, which are still to be posted.
+        definitions: The definitions of further variables that are not posted yet.
     """
 
     def __init__(self, posting: Posting, add_variable: Callable[[Any], Expression]) -> None:
         self.posting = posting
-        self.definitions: list[Definition] = []
+        self.definitions: list[VariableDefinition] = []
         self._add_variable = add_variable
         self._names: dict[str, Expression] = {theirs: Name(ours) for theirs, ours in posting.names.items()}
         self._conditions: list[Expression] = []
@@ -95,7 +95,7 @@ class Translation:
             self._conditions = outside
 
     def integer(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
-        """Return `term` as an integer. Raises `MistakeError` for what has no counterpart."""
+        """Return `term` as an integer. Raises `MistakeError` if it has no counterpart."""
         if not hasattr(term, "name"):
             return Constant(integer_of(term))
         if is_variable(term):
@@ -148,13 +148,13 @@ class Translation:
         return [self.boolean(term) for term in (terms.flat if hasattr(terms, "flat") else terms)]
 
     def decomposed(self, term: Any, *, must_hold: bool = False) -> Any:  # noqa: ANN401 - CPMpy's expressions
-        """Return CPMpy's decomposition of a global constraint or function, and note the definitions that belong to it.
+        """Return CPMpy's decomposition of a global constraint or function, and record its definitions.
 
         The conditions under which its arguments have values become those of the expression around it.
 
         Args:
             term: The global constraint or function.
-            must_hold: Whether it is a constraint that must hold, which CPMpy may decompose into less.
+            must_hold: Whether it is a constraint that must hold: its decomposition may be smaller.
         """
         for argument in _leaves(term.args):
             self.integer(argument)
@@ -165,7 +165,7 @@ class Translation:
             except Exception as error:  # noqa: BLE001 - CPMpy's own exceptions, and CPMpy is not imported here
                 raise MistakeError(f"CPMpy cannot decompose its '{term.name}'", str(error)) from None
             defined = _guarded(self._conditions, TRUE)
-            self.definitions += [Definition(one, defined) for one in definitions]
+            self.definitions += [VariableDefinition(one, defined) for one in definitions]
             self._decompositions[key] = term, found
         return self._decompositions[key][1]
 
@@ -175,11 +175,11 @@ class Translation:
         return self.integer(self.decomposed(term))
 
     def sum_is(self, one: Expression, other: Expression, result: Expression) -> Expression:
-        """Return that two integers add up to a third."""
+        """Return the condition that `one` + `other` = `result`."""
         return compare("eq", plus(one, other), result)
 
     def limits(self, expression: Expression) -> Interval:
-        """Return an interval in which the values of `expression` lie."""
+        """Return an interval that contains the values of `expression`."""
         ends = {name: self.posting.domain(Name(name)) for name in names(expression)}
         return bounds(expression, {name: Interval(min(one), max(one)) for name, one in ends.items()})
 
@@ -204,7 +204,7 @@ class Translation:
         return Apply("pow", (base, exponent))
 
     def element(self, terms: Sequence[Any]) -> Expression:
-        """Return the member that indexes choose in an array of as many dimensions."""
+        """Return the element at the given indexes of an array."""
         indexes, cells = self.cells(terms)
         chosen = []
         for place, cell in cells.items():
@@ -213,7 +213,7 @@ class Translation:
         return total([part for part in chosen if part != Constant(0)])
 
     def cells(self, terms: Sequence[Any]) -> tuple[list[Expression], dict[tuple[int, ...], Expression]]:
-        """Return the indexes of an element, and the members of its array by place. It has a value at these places."""
+        """Return the indexes of an element, and the elements of its array by position."""
         array, *others = terms
         shape = array.shape if hasattr(array, "shape") else (len(array),)
         members, indexes = self.integers(array), self.integers(others)
@@ -224,13 +224,13 @@ class Translation:
         return indexes, dict(zip(itertools.product(*map(range, shape)), members, strict=True))
 
     def table(self, terms: Sequence[Any]) -> Expression:
-        """Return that a list has one of some tuples of values."""
+        """Return the condition that a list of terms equals a row of a table."""
         members = self.integers(terms[0])
         rows = [[Constant(integer_of(value)) for value in row] for row in terms[1]]
         return some([every([compare("eq", *pair) for pair in zip(members, row, strict=True)]) for row in rows])
 
     def pairs(self, terms: Iterable[Any]) -> Iterable[tuple[Expression, Expression]]:
-        """Return the pairs of members of a list."""
+        """Return all pairs of elements of a list."""
         return itertools.combinations(self.integers(terms), 2)
 
 
@@ -244,9 +244,9 @@ def _leaves(arguments: Any) -> Iterator[Any]:  # noqa: ANN401 - CPMpy's expressi
 
 
 def _guarded(conditions: Sequence[Expression], found: Expression) -> Expression:
-    """Return `found`, or false where a condition does not hold: then `found` is not evaluated.
+    """Return `found`, or false where a condition does not hold; `found` is not evaluated there.
 
-    A condition may have a value only where those before it hold. Those that always have one are evaluated together.
+    A condition may be defined only where the previous conditions hold. Those always defined are evaluated together.
     """
     if not conditions:
         return found
@@ -321,4 +321,4 @@ _BOOLEANS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
 }
 
 TRANSLATED = frozenset((*_INTEGERS, *_BOOLEANS))
-"""CPMpy's names of the operators, global constraints and functions that are translated here."""
+"""CPMpy's names of the translated operators, global constraints and functions."""

@@ -1,4 +1,4 @@
-"""Constraints before the unit of the team's costs is known: what a condition or a sum of costs becomes."""
+"""Drafts: constraints and cost functions of a model before the unit of the team's costs is known."""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ from robochoc.model.constraint import (
 from robochoc.model.constraint import Term as Actual
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.magnitudes import MAX_COST
+from robochoc.modelling.errors import ModelError, SourceLine
 from robochoc.modelling.numbers import Exact, exact, is_infinite, places_of, rounded, shown
-from robochoc.modelling.places import ModelError, Place
 from robochoc.modelling.tables import Price, Row, commonest, in_short, listed_rows, prices, truths
-from robochoc.modelling.tabulated import Tabled
-from robochoc.modelling.terms import Applied, Linear, Term, Variable
+from robochoc.modelling.terms import Linear, ModelVariable, Operation, TableTerm, Term
 from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
 
 _FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
@@ -35,26 +34,26 @@ _FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
 
 @dataclass(frozen=True)
 class Draft:
-    """A constraint to be.
+    """A constraint whose costs have no unit yet.
 
     Attributes:
         name: Its name.
         scope: Its variables. Empty: its truth or cost is constant (`model/assembly.py`).
         place: Where it was made.
         body: The expression of a condition or of a cost, over `X0`, `X1`, ... for the variables.
-        rows: The rows of a table, where it is one.
-        semantics: What the rows mean. None: `body` is a condition, or its value the cost.
+        rows: The rows of a table, if it is a table.
+        semantics: The meaning of the rows. None: `body` is a condition, or its value the cost.
         is_cost: Whether the value of `body` is a cost.
-        cost: What breaking a condition costs. None: it is hard.
-        default: What rows of a soft table cost that it does not list.
-        is_penalty: Whether the costs of a soft table are what breaking a condition costs: they count against a sum
+        cost: The cost of violating a condition. None: it is hard.
+        default: The cost of rows that a soft table does not list.
+        is_penalty: Whether the costs of a soft table are costs of violating a condition: they count against a sum
             that is maximised.
         when_absent: Its meaning when a robot is absent. None: as its form implies.
     """
 
     name: str
-    scope: tuple[Variable, ...]
-    place: Place
+    scope: tuple[ModelVariable, ...]
+    place: SourceLine
     body: Expression | None = None
     rows: Mapping[Row, Price] = field(default_factory=dict)
     semantics: Semantics | None = None
@@ -72,7 +71,7 @@ class Draft:
             body = None if self.body is None else Predicate("", formals, self.body)
             if body is None or not can_be_restated(Constraint(self.name, body, names, names)):
                 hint = (
-                    "it is not a sum, count, all_of, any_of, minimum or maximum of alike terms, compared with a number"
+                    "it must be a sum, count, all_of, any_of, minimum or maximum of alike terms, compared with a number"
                 )
                 raise ModelError(f"{self.name} cannot be restated for fewer robots", hint, self.place)
         return replace(self, when_absent=when_absent) if when_absent else self
@@ -84,23 +83,23 @@ class Draft:
 
     @property
     def places(self) -> int:
-        """How many decimal places its costs have. Raises `ModelError`: too many."""
+        """The number of decimal places of its costs. Raises `ModelError` if there are too many."""
         found = [one for one in {*self.rows.values(), self.default, self.cost or 0} if not isinstance(one, float)]
         return max(places_of(one, self.place) for one in found) if self.soft else 0
 
 
-def conditions(term: Term, name: str, place: Place, *, in_pairs: bool = True) -> Iterator[Draft]:
-    """Yield drafts that require `term`: one for each part of a conjunction, and for each pair of `all_different`.
+def conditions(term: Term, name: str, place: SourceLine, *, in_pairs: bool = True) -> Iterator[Draft]:
+    """Yield the drafts of a hard constraint: one for each part of a conjunction, and for each pair of `all_different`.
 
     Without `in_pairs`, `all_different` is one constraint.
     """
-    if isinstance(term, Applied) and term.operator == "and":
+    if isinstance(term, Operation) and term.operator == "and":
         for part in term.arguments:
             yield from conditions(part, name, place, in_pairs=in_pairs)
-    elif isinstance(term, Applied) and term.operator == "different" and in_pairs:
+    elif isinstance(term, Operation) and term.operator == "different" and in_pairs:
         for number, one in enumerate(term.arguments):
             for other in term.arguments[:number]:
-                yield from conditions(Applied("ne", other, one), name, place)
+                yield from conditions(Operation("ne", other, one), name, place)
     elif not term.variables:
         if not truths(term, place)[0]:
             yield Draft(name, (), place, _FALSE)
@@ -108,8 +107,8 @@ def conditions(term: Term, name: str, place: Place, *, in_pairs: bool = True) ->
         yield draft
 
 
-def soft_condition(term: Term, cost: Exact, name: str, place: Place) -> Draft:
-    """Return what says that it costs something where `term` does not hold."""
+def soft_condition(term: Term, cost: Exact, name: str, place: SourceLine) -> Draft:
+    """Return the draft of a soft constraint, which costs `cost` where `term` does not hold."""
     body = _body(term)
     if body is not None and (cost >= 0 or not may_be_undefined(body)):  # where it is undefined, it is broken as well
         return Draft(name, term.variables, place, body, cost=cost)
@@ -120,45 +119,45 @@ def soft_condition(term: Term, cost: Exact, name: str, place: Place) -> Draft:
     return Draft(name, term.variables, place, rows=rows, semantics=Semantics.SOFT, default=default, is_penalty=True)
 
 
-class Part(NamedTuple):
+class ObjectiveTerm(NamedTuple):
     """A term of a sum that is minimised or maximised.
 
     Attributes:
         factor: Its factor.
         term: The term.
-        place: The line that made it.
+        place: The line that added it.
         places: The decimal places to which costs are rounded. None: they are exact.
     """
 
     factor: Exact
     term: Term
-    place: Place
+    place: SourceLine
     places: int | None = None
 
 
-def costs_of(parts: Iterable[Part], name: str) -> list[Draft]:
-    """Return the costs of a sum: one draft for all terms over the same variables that are rounded alike."""
-    groups: dict[tuple[frozenset[str], int | None], list[Part]] = {}
+def costs_of(parts: Iterable[ObjectiveTerm], name: str) -> list[Draft]:
+    """Return the cost functions of a sum: one draft for all terms with the same variables and rounding."""
+    groups: dict[tuple[frozenset[str], int | None], list[ObjectiveTerm]] = {}
     for part in parts:
         key = frozenset(one.name for one in part.term.variables), part.places
         groups.setdefault(key, []).append(part)
     return [_sum(group, f"{name}{number}") for number, group in enumerate(groups.values(), 1)]
 
 
-def split(term: Term, place: Place, places: int | None = None) -> tuple[list[Part], Exact]:
+def split(term: Term, place: SourceLine, places: int | None = None) -> tuple[list[ObjectiveTerm], Exact]:
     """Return the terms of a sum with their factors, and its constant."""
     if isinstance(term, Linear):
-        return [Part(factor, one, place, places) for factor, one in term.parts], rounded(term.constant, places)
-    return [Part(1, term, place, places)], 0
+        return [ObjectiveTerm(factor, one, place, places) for factor, one in term.parts], rounded(term.constant, places)
+    return [ObjectiveTerm(1, term, place, places)], 0
 
 
-def _sum(group: Sequence[Part], name: str) -> Draft:
+def _sum(group: Sequence[ObjectiveTerm], name: str) -> Draft:
     place, places = group[0].place, group[0].places
     whole = Linear(tuple((part.factor, part.term) for part in group))
     parts, scope = whole.parts, whole.variables
     if len(parts) == 1:
         factor, table = parts[0]
-        if isinstance(table, Tabled) and (rows := listed_rows(table)) is not None:
+        if isinstance(table, TableTerm) and (rows := listed_rows(table)) is not None:
             priced = {row: _scaled(value, factor, places) for row, value in rows.items()}
             return _table(name, scope, place, priced, _scaled(table.default, factor, places))
     try:
@@ -172,17 +171,19 @@ def _sum(group: Sequence[Part], name: str) -> Draft:
     return _table(name, scope, place, found, commonest(found))
 
 
-def _check_digits(found: Mapping[Row, Price], term: Term, place: Place) -> None:
-    """Raise `ModelError` where a cost has more digits than files allow."""
+def _check_digits(found: Mapping[Row, Price], term: Term, place: SourceLine) -> None:
+    """Raise `ModelError` if a cost has more digits than files allow."""
     for price in found.values():
         if price != math.inf and not -MAX_COST <= price <= MAX_COST:
             message = f"the cost {in_short(term)} reaches {shown(exact(price))}"
             raise ModelError(message, "costs have at most 18 digits: use smaller values or coefficients", place)
 
 
-def _table(name: str, scope: tuple[Variable, ...], place: Place, rows: Mapping[Row, Price], default: Price) -> Draft:
+def _table(
+    name: str, scope: tuple[ModelVariable, ...], place: SourceLine, rows: Mapping[Row, Price], default: Price
+) -> Draft:
     listed = {row: price for row, price in rows.items() if price != default}
-    listed = listed or {_first_row(scope): default}  # files tell from the rows which columns hold symbols
+    listed = listed or {_first_row(scope): default}  # readers infer the columns of symbols from the rows
     return Draft(name, scope, place, rows=listed, semantics=Semantics.SOFT, default=default)
 
 
@@ -190,9 +191,9 @@ def _scaled(value: object, factor: Exact, places: int | None) -> Price:
     return math.inf if is_infinite(value) else rounded(exact(exact(value) * factor), places)
 
 
-def _condition(term: Term, name: str, place: Place) -> Draft | None:
+def _condition(term: Term, name: str, place: SourceLine) -> Draft | None:
     """Return a hard constraint. None: it always holds."""
-    if isinstance(term, Tabled) and (listed := listed_rows(term)) is not None:
+    if isinstance(term, TableTerm) and (listed := listed_rows(term)) is not None:
         return _listed(term, listed, name, place)
     body = _body(term)
     if body is not None:
@@ -207,8 +208,8 @@ def _condition(term: Term, name: str, place: Place) -> Draft | None:
     return Draft(name, term.variables, place, rows=dict.fromkeys(fails if few else holds, 0), semantics=semantics)
 
 
-def _listed(term: Tabled, listed: Mapping[Row, object], name: str, place: Place) -> Draft | None:
-    """Return what a table of allowed or forbidden rows becomes. None: it forbids nothing."""
+def _listed(term: TableTerm, listed: Mapping[Row, object], name: str, place: SourceLine) -> Draft | None:
+    """Return the draft of a table of allowed or forbidden rows. None: it forbids nothing."""
     rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
     if not rows:
         return None if term.default else _never(name, term.variables[0], place)
@@ -216,13 +217,13 @@ def _listed(term: Tabled, listed: Mapping[Row, object], name: str, place: Place)
     return Draft(name, term.variables, place, rows=rows, semantics=semantics)
 
 
-def _never(name: str, variable: Variable, place: Place) -> Draft:
-    """Return what no value of a variable satisfies."""
+def _never(name: str, variable: ModelVariable, place: SourceLine) -> Draft:
+    """Return a constraint that no value of `variable` satisfies."""
     rows: dict[Row, Price] = dict.fromkeys([(code,) for code in variable.codes.ever], 0)
     return Draft(name, (variable,), place, rows=rows, semantics=Semantics.CONFLICTS)
 
 
-def _first_row(scope: Sequence[Variable]) -> Row:
+def _first_row(scope: Sequence[ModelVariable]) -> Row:
     return tuple(variable.codes.ever[0] for variable in scope)
 
 
@@ -233,12 +234,12 @@ def _body(term: Term) -> Expression | None:
         return None
 
 
-def _formals(scope: Sequence[Variable]) -> dict[Variable, str]:
+def _formals(scope: Sequence[ModelVariable]) -> dict[ModelVariable, str]:
     return {variable: f"X{number}" for number, variable in enumerate(scope)}
 
 
 class Definitions:
-    """Names for definitions: the same one for the same, and none that is taken."""
+    """Names of definitions: equal definitions share a name, and no name is in `taken`."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self._taken = set(taken)
@@ -256,7 +257,7 @@ class Definitions:
         Args:
             draft: The draft.
             places: The decimal places of the team's costs.
-            sign: -1 where the sum is maximised, in which what is broken counts against it.
+            sign: -1 if the sum is maximised: violations then count against it.
         """
         unit = 10**places
         names = tuple(variable.name for variable in draft.scope)
@@ -269,7 +270,7 @@ class Definitions:
         cost = INFINITE if draft.cost is None else int(draft.cost * unit) * sign
         actual = _predefined(draft.body, dict(zip(formals, names, strict=True)))
         names_symbol = any(variable.codes.symbolic for variable in draft.scope) and len(names) == 1
-        if actual and not names_symbol:  # a scope has no symbols
+        if actual and not names_symbol:  # the terms of a scope cannot be symbols
             predicate, terms = actual
             return Constraint(draft.name, predicate, terms, terms, cost=cost)
         own = self._named("P", Predicate("", formals, draft.body))
@@ -309,7 +310,7 @@ def _units(price: Price, factor: int) -> float:
 
 
 def _predefined(body: Expression, names: Mapping[str, str]) -> tuple[Predicate, tuple[Actual, ...]] | None:
-    """Return the predefined predicate that compares two terms, and these. None: the body is something else."""
+    """Return the predefined predicate that compares two terms, and the terms. None: the body is no such comparison."""
     if not isinstance(body, Apply) or body.operator not in PREDEFINED:
         return None
     terms: list[Actual] = []

@@ -6,10 +6,10 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from robochoc.model.problem import AddValue, RemoveAgent, RemoveValue, WhenAbsent
-from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
+from robochoc.modelling.constraints import ModelConstraint
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, UnknownNameError, calling_line
 from robochoc.modelling.robots import ModelRobot, check_robot
-from robochoc.modelling.rules import Rule
-from robochoc.modelling.terms import Variable
+from robochoc.modelling.terms import ModelVariable
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class Removal:
     """The removal of one constraint, or of all with a name, and the line of the user's code."""
 
-    def __init__(self, removed: Rule | str, place: Place) -> None:
+    def __init__(self, removed: ModelConstraint | str, place: SourceLine) -> None:
         self.removed, self.place = removed, place
 
     @property
@@ -28,14 +28,14 @@ class Removal:
         return self.removed if isinstance(self.removed, str) else self.removed.name
 
 
-Step = RemoveAgent | RemoveValue | AddValue | ModelRobot | Rule | Removal
-"""A change of an event, as a model keeps it."""
+Step = RemoveAgent | RemoveValue | AddValue | ModelRobot | ModelConstraint | Removal
+"""A change of an event."""
 
 
-class Event:
-    """Changes that happen together. `Model.after_solution` and `Model.after_messages` make it."""
+class ModelEvent:
+    """Simultaneous changes. `Model.after_solution` and `Model.after_messages` create events."""
 
-    def __init__(self, model: Model, after: int | None, place: Place) -> None:
+    def __init__(self, model: Model, after: int | None, place: SourceLine) -> None:
         self.after, self.place = after, place
         self._steps: list[Step] = []
         self._model = model
@@ -56,20 +56,20 @@ class Event:
         self._add(RemoveAgent(name))
 
     def robot(self, name: str, *, weight: int = 1) -> ModelRobot:
-        """Add a robot. It takes the lowest priority; constraints with it are added by this event's `add`."""
-        made = self._model.add_robot(check_robot(name, self._model.robots, weight), 0, weight, here())
+        """Add a robot with the lowest priority. Its constraints are added by this event's `add`."""
+        made = self._model.add_robot(check_robot(name, self._model.robots, weight), 0, weight, calling_line())
         made.joins = self
         self._add(made)
         return made
 
-    def remove_value(self, variable: Variable, value: object) -> None:
+    def remove_value(self, variable: ModelVariable, value: object) -> None:
         """Remove a value of a variable's domain."""
         code = variable.codes.code(value)
         if code is None:
             raise ModelError(f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain[:1000]))
         self._add(RemoveValue(variable.name, code))
 
-    def add_value(self, variable: Variable, value: Hashable) -> None:
+    def add_value(self, variable: ModelVariable, value: Hashable) -> None:
         """Add a value to a variable's domain."""
         variable.codes, code = variable.codes.with_value(value, self._model.symbols)
         self._add(AddValue(variable.name, code))
@@ -80,13 +80,13 @@ class Event:
         cost: object = None,
         name: str | None = None,
         when_absent: WhenAbsent | str | None = None,
-    ) -> Rule:
+    ) -> ModelConstraint:
         """Add constraints, each between variables of several robots. See `Model.add`."""
         rule = self._model.rule(constraints, cost, name, self, when_absent)
         self._add(rule)
         return rule
 
-    def remove_constraint(self, constraint: Rule | str) -> None:
+    def remove_constraint(self, constraint: ModelConstraint | str) -> None:
         """Remove a constraint between robots.
 
         Args:
@@ -96,11 +96,11 @@ class Event:
         Raises:
             ModelError: if the model has no such constraint.
         """
-        if not isinstance(constraint, (Rule, str)):
-            raise ModelTypeError(f"{constraint!r} is not a constraint that was added", "use a result of add()")
-        if isinstance(constraint, Rule) and not any(one is constraint for one in self._model.rules):
+        if not isinstance(constraint, (ModelConstraint, str)):
+            raise ModelTypeError(f"{constraint!r} is not a constraint of a model", "use a result of add(), or a name")
+        if isinstance(constraint, ModelConstraint) and not any(one is constraint for one in self._model.rules):
             raise ModelError(f"{constraint!r} is not a constraint of {self._model!r}", "use a result of add()")
-        self._add(Removal(constraint, here()))
+        self._add(Removal(constraint, calling_line()))
 
     def _add(self, step: Step) -> None:
         self._steps.append(step)

@@ -1,4 +1,4 @@
-"""Terms that no operator makes: all different, tables, elements of arrays, resources, functions of the user's."""
+"""Terms without an operator: all different, tables, elements of arrays, resources, Python functions."""
 
 from __future__ import annotations
 
@@ -7,16 +7,25 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from robochoc.modelling.codes import NUMBER, kind_of
+from robochoc.modelling.errors import ModelError, ModelTypeError, calling_line
 from robochoc.modelling.numbers import exact, is_infinite, is_number
-from robochoc.modelling.places import ModelError, ModelTypeError, here
-from robochoc.modelling.tabulated import Called, Tabled
-from robochoc.modelling.terms import Applied, Term, Variable, all_of, condition, number, term_of
+from robochoc.modelling.terms import (
+    FunctionCall,
+    ModelVariable,
+    Operation,
+    TableTerm,
+    Term,
+    all_of,
+    condition,
+    number,
+    term_of,
+)
 
 
 def all_different(*terms: object) -> Term:
-    """Return the condition that no two of `terms` are equal. It takes them one by one, or as one list.
+    """Return the condition that no two of `terms`, given one by one or as one list, are equal.
 
-    As a hard constraint it becomes one of each pair, so that every protocol can work on it.
+    A hard constraint is split into one for each pair, which all protocols support.
 
     Raises:
         ModelTypeError: if they are of different kinds.
@@ -25,8 +34,8 @@ def all_different(*terms: object) -> Term:
     kinds = {term.kind for term in found} - {None}
     if len(kinds) > 1:
         one, other = sorted(map(str, kinds))[:2]
-        raise ModelTypeError(f"{one} and {other} in all_different", "they are never equal: give terms of one kind")
-    return Applied("different", *found) if len(found) > 1 else term_of(value=True)
+        raise ModelTypeError(f"all_different mixes {one} and {other}", "they are never equal: use terms of one kind")
+    return Operation("different", *found) if len(found) > 1 else term_of(value=True)
 
 
 def minimum(*terms: object) -> Term:
@@ -41,36 +50,36 @@ def maximum(*terms: object) -> Term:
 
 def if_then_else(test: object, then: object, otherwise: object) -> Term:
     """Return a number: `then` where the condition `test` holds, else `otherwise`."""
-    return Applied("if", condition(test), number(then), number(otherwise))
+    return Operation("if", condition(test), number(then), number(otherwise))
 
 
 def element(array: Iterable[object], index: object) -> Term:
-    """Return the number at `index` in `array`, whose elements are numbers or terms. The first has the index 0.
+    """Return the number at `index` (from 0) in `array`, whose elements are numbers or terms.
 
-    A constraint in which the index is outside of the array is violated. There are no negative indices.
+    A constraint is violated where the index is outside the array. Negative indices are outside.
     """
     found = [number(one) for one in array]
     if not found:
-        raise ModelError("an array without elements")
-    return Applied("element", number(index), *found)
+        raise ModelError("the array of element() is empty")
+    return Operation("element", number(index), *found)
 
 
 def cumulative(
     starts: Sequence[object], durations: Sequence[object], demands: Sequence[object], capacity: object
 ) -> Term:
-    """Return the condition that tasks never need more of a resource at a time than there is.
+    """Return the condition that the demand of simultaneous tasks never exceeds the capacity of a resource.
 
     Args:
-        starts: When each task begins.
-        durations: How long each takes. It does not run any more at its start plus that.
-        demands: How much each needs while it runs.
-        capacity: How much there is.
+        starts: The start of each task.
+        durations: The duration of each task, which runs until just before start + duration.
+        demands: The demand of each task while it runs.
+        capacity: The capacity of the resource.
 
     Raises:
-        ModelError: if there are not as many durations and demands as starts.
+        ModelError: if the numbers of starts, durations and demands differ.
     """
     if not len(starts) == len(durations) == len(demands):
-        raise ModelError(f"{len(starts)} starts, {len(durations)} durations and {len(demands)} demands")
+        raise ModelError(f"cumulative has {len(starts)} starts, {len(durations)} durations and {len(demands)} demands")
     tasks = [(number(start), number(length), number(need)) for start, length, need in zip(starts, durations, demands)]  # noqa: B905 - checked above
     peaks = []
     for start, _, _ in tasks:
@@ -80,28 +89,28 @@ def cumulative(
 
 
 def allowed(terms: object, rows: Iterable[object]) -> Term:
-    """Return the condition that the values of `terms` are one of `rows`.
+    """Return the condition that the values of `terms` are in `rows`.
 
     Args:
         terms: The terms, or one.
-        rows: Tuples of values; of one term, values.
+        rows: Tuples of values; for a single term, values.
     """
     scope = _scope(terms)
-    return Tabled(scope, dict.fromkeys(_rows(scope, rows), True), default=False)
+    return TableTerm(scope, dict.fromkeys(_rows(scope, rows), True), default=False)
 
 
 def forbidden(terms: object, rows: Iterable[object]) -> Term:
-    """Return the condition that the values of `terms` are none of `rows`. See `allowed`."""
+    """Return the condition that the values of `terms` are not in `rows`. See `allowed`."""
     scope = _scope(terms)
-    return Tabled(scope, dict.fromkeys(_rows(scope, rows), False), default=True)
+    return TableTerm(scope, dict.fromkeys(_rows(scope, rows), False), default=True)
 
 
 def costs(terms: object, table: Mapping[Any, object], default: object = 0) -> Term:
-    """Return the number that a table has for the values of `terms`.
+    """Return the entry of a table for the values of `terms`.
 
     Args:
         terms: The terms, or one.
-        table: Numbers by rows of values, or by values if it is one term. `math.inf` forbids a row.
+        table: Numbers by tuples of values; for a single term, by values. `math.inf` forbids a row.
         default: The number for all other rows; `math.inf` forbids them.
     """
     scope = _scope(terms)
@@ -109,57 +118,57 @@ def costs(terms: object, table: Mapping[Any, object], default: object = 0) -> Te
     rows = {(key,) if single else tuple(_row(key)): value for key, value in table.items()}
     for value in (*rows.values(), default):
         if not _is_cost(value):
-            raise ModelTypeError(f"{value!r} is no cost", "expected a number, or math.inf to forbid")
-    return Tabled(scope, {key: rows[key] for key in _rows(scope, rows)}, _cost(default))
+            raise ModelTypeError(f"invalid cost {value!r}", "expected a number, or math.inf to forbid")
+    return TableTerm(scope, {key: rows[key] for key in _rows(scope, rows)}, _cost(default))
 
 
 def function(function: Callable[..., object], *terms: object) -> Term:
-    """Return the term that a Python function computes from the values of `terms`.
+    """Return a term whose value a Python function computes from the values of `terms`.
 
-    A function that returns truth values is a condition, one that returns numbers can be minimised; `math.inf` forbids.
-    It is called with all combinations of values when the problem is solved or saved; robots get the table.
+    A function that returns truth values is a condition; one that returns numbers can be minimised; `math.inf` forbids.
+    It is called with all combinations of values when the problem is solved or saved; robots receive the table.
 
     Args:
-        function: The function. It gets the values in the order of `terms`, and returns the same for the same ones.
+        function: The function. It receives the values in the order of `terms`, and must be deterministic.
         *terms: Variables, or terms of them.
     """
-    return Called(function, tuple(map(term_of, terms)), here())
+    return FunctionCall(function, tuple(map(term_of, terms)), calling_line())
 
 
 def _several(terms: tuple[object, ...]) -> list[Term]:
     given = terms[0] if len(terms) == 1 and not isinstance(terms[0], Term) else terms
     if not isinstance(given, Iterable) or isinstance(given, str):
-        raise ModelTypeError(f"{given!r} is no list of terms")
+        raise ModelTypeError(f"{given!r} is not a list of terms")
     return [term_of(one) for one in given]
 
 
 def _extreme(operator: str, terms: tuple[object, ...]) -> Term:
     found = [number(one) for one in _several(terms)]
     if not found:
-        raise ModelError("the least or greatest of nothing")
-    return Applied(operator, *found) if len(found) > 1 else found[0]
+        raise ModelError(f"{operator} of an empty list")
+    return Operation(operator, *found) if len(found) > 1 else found[0]
 
 
 def _scope(terms: object) -> tuple[Term, ...]:
     found = _several((terms,)) if not isinstance(terms, Term) else [terms]
     if not found:
-        raise ModelError("a table over nothing")
+        raise ModelError("a table without terms")
     return tuple(found)
 
 
 def _row(row: object) -> Sequence[object]:
     if isinstance(row, str) or not isinstance(row, Sequence):
-        raise ModelTypeError(f"{row!r} is no row of values", "write a tuple: (1, 2)")
+        raise ModelTypeError(f"{row!r} is not a row of values", "write a tuple: (1, 2)")
     return row
 
 
 def _rows(scope: tuple[Term, ...], rows: Iterable[object]) -> list[tuple[object, ...]]:
-    """Return rows as tuples, if they are as long as the scope and of its kinds. Raises `ModelError`."""
+    """Return `rows` as tuples. Raises `ModelError` if their lengths or kinds do not match the scope."""
     found = []
     for one in rows:
         row = (one,) if _is_value(scope, one) else tuple(_row(one))
         if len(row) != len(scope):
-            raise ModelError(f"the row {row!r} has {len(row)} values, and there are {len(scope)} terms")
+            raise ModelError(f"the row {row!r} has {len(row)} values for {len(scope)} terms")
         for term, value in zip(scope, row, strict=True):
             _check_value(term, value)
         found.append(row)
@@ -167,7 +176,7 @@ def _rows(scope: tuple[Term, ...], rows: Iterable[object]) -> list[tuple[object,
 
 
 def _is_value(scope: tuple[Term, ...], row: object) -> bool:
-    """Return whether `row` is a value of the only term of `scope`, and no row with that."""
+    """Return whether `row` is a value of the only term of `scope`, not a tuple with that value."""
     if len(scope) > 1:
         return False
     if scope[0].kind == kind_of(()):
@@ -178,8 +187,8 @@ def _is_value(scope: tuple[Term, ...], row: object) -> bool:
 def _check_value(term: Term, value: object) -> None:
     if is_number(value) and term.kind in {NUMBER, None}:
         return
-    if isinstance(term, Variable) or not is_number(value):
-        _ = term == value  # raises where the kinds differ, or it is no value of the variable
+    if isinstance(term, ModelVariable) or not is_number(value):
+        _ = term == value  # raises if the kinds differ, or the variable does not have the value
 
 
 def _is_cost(value: object) -> bool:

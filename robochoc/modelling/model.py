@@ -10,7 +10,7 @@
     >>> outcome.cost
     2
 
-Robots know what their own file would say. Who shares what with whom, and who is whose parent, follows.
+Each robot knows the content of its file. Shared constraints, parents and children follow from the model.
 """
 
 from __future__ import annotations
@@ -29,41 +29,41 @@ from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.model.wording import counted
-from robochoc.modelling.building import built, saved_order
 from robochoc.modelling.codes import Symbols
-from robochoc.modelling.drafts import Part, split
-from robochoc.modelling.events import Event
-from robochoc.modelling.given import Given, given_by, given_variable
+from robochoc.modelling.constraints import ModelConstraint, absence_or_none, check_owned, conditions_in, exact_or_none
+from robochoc.modelling.drafts import ObjectiveTerm, split
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, UnknownNameError, calling_line
+from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.numbers import Exact, check_places, whole_number
-from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
-from robochoc.modelling.rules import Rule, absence_or_none, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.solution import NamedValues, Solution, UserValues
 from robochoc.modelling.solving import Solvable
-from robochoc.modelling.terms import Variable, all_of, number
+from robochoc.modelling.team_builder import build_team, saved_order
+from robochoc.modelling.team_contents import TeamContents, contents_of, model_variable
+from robochoc.modelling.terms import ModelVariable, all_of, number
 from robochoc.system.suggestions import did_you_mean
 
 
 class Model(Solvable):
-    """A problem in Python: robots with variables, constraints, costs, and changes over time."""
+    """A problem written in Python: robots with variables, constraints, costs, and changes over time."""
 
     def __init__(self, name: str = "model") -> None:
         self._name = name
         self._robots: dict[str, ModelRobot] = {}
-        self._variables: dict[str, Variable] = {}
-        self._constraints: list[Rule] = []
+        self._variables: dict[str, ModelVariable] = {}
+        self._constraints: list[ModelConstraint] = []
         self.symbols = Symbols()
-        self._events: list[Event] = []
-        self._objective: list[Part] = []
+        self._events: list[ModelEvent] = []
+        self._objective: list[ObjectiveTerm] = []
         self.constant: Exact = 0
         self.maximized: bool | None = None
-        self.given: Given | None = None
+        self.given: TeamContents | None = None
         self._team: Team | None = None
         self._named = 0
 
     @classmethod
     def load(cls, folder: Path | str) -> Model:
-        """Return the model of the team whose files are in `folder`. More can be added to it.
+        """Return the model of the team whose files are in `folder`. It can be extended.
 
         Raises:
             InvalidInputError: if the files are invalid.
@@ -72,21 +72,21 @@ class Model(Solvable):
 
     @classmethod
     def of(cls, team: Team) -> Model:
-        """Return the model of a team. More can be added to it."""
+        """Return the model of a team. It can be extended."""
         model = cls(team.name)
-        model.given = given_by(team)
+        model.given = contents_of(team)
         units = model.given.units
         model.maximized = units.maximize if units != PLAIN_COSTS else None
-        place = here()
+        place = calling_line()
         for robot in team.robots:
             added = model.add_robot(robot.name, 0, robot.weight, place)
             added.add_topics(*robot.topics)
             for variable in robot.variables:
-                made = given_variable(variable, robot.name, model.symbols, place)
+                made = model_variable(variable, robot.name, model.symbols, place)
                 added.add_variable(variable.name, made)
         return model
 
-    # Views: a change of one would not reach the team, so they are read-only.
+    # Read-only views: changes of them would not reach the team.
 
     @property
     def name(self) -> str:
@@ -104,22 +104,22 @@ class Model(Solvable):
         return MappingProxyType(self._robots)
 
     @property
-    def variables(self) -> Mapping[str, Variable]:
+    def variables(self) -> Mapping[str, ModelVariable]:
         """The variables of all robots, by their names in the team."""
         return MappingProxyType(self._variables)
 
     @property
-    def constraints(self) -> tuple[Rule, ...]:
+    def constraints(self) -> tuple[ModelConstraint, ...]:
         """The constraints, without removed ones, in the order in which they were added."""
         return tuple(self._constraints)
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[ModelEvent, ...]:
         """The events, in order."""
         return tuple(self._events)
 
     @property
-    def objective(self) -> tuple[Part, ...]:
+    def objective(self) -> tuple[ObjectiveTerm, ...]:
         """The terms of the sum that is minimised or maximised: factor, term, and the line that added it."""
         return tuple(self._objective)
 
@@ -128,26 +128,26 @@ class Model(Solvable):
 
         Args:
             name: Its name.
-            priority: Robots with a higher one come first; of equal ones, those that were made first.
-            weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
+            priority: Robots with a higher priority come first; robots with the same priority, in the order of creation.
+            weight: The weight of its withdrawal: one robot of weight 3 counts as much as three of weight 1.
 
         Raises:
-            ModelError: if there is one of that name, or it cannot be a name.
+            ModelError: if the name is invalid, or another robot has it.
         """
-        return self.add_robot(check_robot(name, self.robots, weight), priority, weight, here())
+        return self.add_robot(check_robot(name, self.robots, weight), priority, weight, calling_line())
 
-    def add_robot(self, name: str, priority: float, weight: int, place: Place) -> ModelRobot:
-        """Add a robot of a name that is free. See `robot`."""
+    def add_robot(self, name: str, priority: float, weight: int, place: SourceLine) -> ModelRobot:
+        """Add a robot whose name is valid and free. See `robot`."""
         self._robots[name] = ModelRobot(self, name, priority, weight, place)
         self.changed()
         return self._robots[name]
 
-    def add_variable(self, variable: Variable) -> None:
+    def add_variable(self, variable: ModelVariable) -> None:
         """Add a variable; its name must be free. See `ModelRobot.variable`."""
         self._variables[variable.name] = variable
         self.changed()
 
-    def __getitem__(self, name: str) -> Variable:
+    def __getitem__(self, name: str) -> ModelVariable:
         """Return the variable that is called `name` in the team, such as `drone3.slot`."""
         if name not in self.variables:
             raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
@@ -159,14 +159,14 @@ class Model(Solvable):
         cost: object = None,
         name: str | None = None,
         when_absent: WhenAbsent | str | None = None,
-    ) -> Rule:
-        """Add constraints. Those over variables of one robot are private: no other robot learns them.
+    ) -> ModelConstraint:
+        """Add constraints. Constraints over variables of one robot are private: no other robot learns them.
 
         Args:
             *constraints: Conditions, or lists of them.
-            cost: What it costs if they do not all hold. It counts against a sum that is
+            cost: The cost if they do not all hold. It counts against a sum that is
                 maximised. None: they must hold.
-            name: A name, by which an event can remove them.
+            name: A name, by which an event can remove the constraints.
             when_absent: Their meaning when a robot of their scopes withdraws, is lost or leaves: `restate` them for the
                 others, `drop` them, or `fail`. None: as their form implies (docs/reference/absence.md).
 
@@ -174,18 +174,18 @@ class Model(Solvable):
             The constraint, under one name.
 
         Raises:
-            ModelError: if one is not a condition over variables of this model, or cannot be restated.
+            ModelError: if a constraint is not a condition over variables of this model, or cannot be restated.
         """
         rule = self.rule(constraints, cost, name, when_absent=when_absent)
         self._constraints.append(rule)
         self.changed()
         return rule
 
-    def remove(self, constraint: Rule) -> None:
-        """Remove a constraint, a result of `add` or of a robot's `knows`. Others of its name stay.
+    def remove(self, constraint: ModelConstraint) -> None:
+        """Remove a constraint, a result of `add` or of a robot's `knows`. Other constraints of its name stay.
 
         Raises:
-            ModelError: if the model does not contain the constraint; one that an event adds does not count.
+            ModelError: if the model does not contain the constraint. Constraints added by events do not count.
         """
         if any(one is constraint for one in self._constraints):
             self._constraints.remove(constraint)
@@ -203,18 +203,18 @@ class Model(Solvable):
         return self
 
     def minimize(self, costs: object, *, places: int | None = None) -> None:
-        """Minimise a sum of terms: robots pay for the terms over their variables.
+        """Minimise a sum of terms. Repeated calls add up.
 
-        Terms over the same variables become one cost. Said again, the sums add up. Integers, `Decimal` and `Fraction`
-        count exactly; a float counts as it is written, 0.1 as one tenth.
+        Terms over the same variables become one cost function. Integers, `Decimal` and `Fraction`
+        are exact; a float has the value of its text, 0.1 one tenth.
 
         Args:
             costs: The sum.
             places: The decimal places to which each cost is rounded, 0 to 9: for distances and other real numbers.
-                None: costs are exact, and one with more than 9 places is refused.
+                None: costs are exact, and costs with more than 9 places are rejected.
 
         Raises:
-            ModelError: if it is no number, or another sum of the model is maximised.
+            ModelError: if the sum is not a number, or another sum of the model is maximised.
         """
         self._optimize(costs, places, maximize=False)
 
@@ -223,12 +223,12 @@ class Model(Solvable):
         self._optimize(utilities, places, maximize=True)
 
     def _optimize(self, given: object, places: int | None, *, maximize: bool) -> None:
-        place = here()
+        place = calling_line()
         if self.maximized not in {None, maximize}:
             words = ("minimised", "maximised")
             raise ModelError(
-                f"a sum is {words[maximize]} here, and another one is {words[not maximize]}",
-                "write the costs of one with the other sign",
+                f"a sum is {words[maximize]} here, and another sum of the model is {words[not maximize]}",
+                "change the sign of one sum, and minimise or maximise both",
             )
         term = number(given)
         check_owned(term, self.variables, place)
@@ -245,26 +245,26 @@ class Model(Solvable):
         name: str | None,
         event: object = None,
         when_absent: WhenAbsent | str | None = None,
-    ) -> Rule:
-        """Return a constraint, which is not added yet."""
-        place = here()
+    ) -> ModelConstraint:
+        """Return a constraint without adding it."""
+        place = calling_line()
         term = all_of(conditions_in(constraints, place))
         check_owned(term, self.variables, place, event)
         absence = absence_or_none(when_absent, place)
-        rule = Rule(name or self._free_name(), term, exact_or_none(cost), place, absence)
+        rule = ModelConstraint(name or self._free_name(), term, exact_or_none(cost), place, absence)
         if absence == WhenAbsent.RESTATE:
             list(rule.drafts())
         return rule
 
     @property
-    def rules(self) -> tuple[Rule, ...]:
+    def rules(self) -> tuple[ModelConstraint, ...]:
         """All constraints: those of the model, the parts that robots know, and those that events add."""
         parts = [part for robot in self._robots.values() for part in robot.parts]
-        later = [step for event in self._events for step in event.steps if isinstance(step, Rule)]
+        later = [step for event in self._events for step in event.steps if isinstance(step, ModelConstraint)]
         return (*self._constraints, *parts, *later)
 
     def free_prefix(self, prefix: str) -> str:
-        """Return `prefix`, or something like it, with which no name of a constraint begins."""
+        """Return `prefix`, with `_` appended until no constraint's name begins with it."""
         taken = {rule.name for rule in self.constraints} | (self.given.names if self.given else set())
         while any(name.startswith(prefix) for name in taken):
             prefix += "_"
@@ -275,31 +275,31 @@ class Model(Solvable):
         self._named = next(number for number in itertools.count(self._named + 1) if f"C{number}" not in taken)
         return f"C{self._named}"
 
-    def after_solution(self) -> Event:
-        """Add an event: what changes once the problem before it is solved."""
+    def after_solution(self) -> ModelEvent:
+        """Add an event: changes made once the problem before it is solved."""
         return self._event(None)
 
-    def after_messages(self, count: int) -> Event:
-        """Add an event: what changes after so many messages, or once the problem before it is solved."""
+    def after_messages(self, count: int) -> ModelEvent:
+        """Add an event: changes made after `count` messages, or once the problem before it is solved."""
         whole = whole_number(count)
         if whole is None or whole < 0:
             raise ModelTypeError(f"{count!r} is not a number of messages", "expected an integer, 0 or more")
         return self._event(whole)
 
-    def _event(self, after: int | None) -> Event:
-        self._events.append(Event(self, after, here()))
+    def _event(self, after: int | None) -> ModelEvent:
+        self._events.append(ModelEvent(self, after, calling_line()))
         self.changed()
         return self._events[-1]
 
     def changed(self) -> None:
-        """Forget the team: the model has changed."""
+        """Discard the cached team: the model has changed."""
         self._team = None
 
     @property
     def team(self) -> Team:
-        """The team, as it stands now. Raises `ModelError` for what no team can be."""
+        """The team of the model's current state. Raises `ModelError` if the model is invalid."""
         if self._team is None:
-            self._team = built(self)
+            self._team = build_team(self)
         return self._team
 
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
@@ -307,32 +307,32 @@ class Model(Solvable):
         return UserValues(self._variables, None)(assignment)
 
     def save(self, folder: Path | str, *, replace: bool = False) -> None:
-        """Write the robots' files, and `scenario.xml` if something changes over time: all of them, or none.
+        """Write the robots' files, and `scenario.xml` if there are events: all of the files, or none.
 
         Args:
-            folder: The folder to be written. Its name is that of the team when it is read.
-            replace: Whether a team that is there already is replaced.
+            folder: The folder to write. Its name is the team's name when the files are read.
+            replace: Whether to replace an existing team.
 
         Raises:
-            ModelError: if the model has a mistake.
-            InvalidInputError: if files cannot say it, or the folder is there and is not replaced.
-            OSError: if it cannot be written.
+            ModelError: if the model is invalid.
+            InvalidInputError: if the files cannot express the model, or the folder exists and `replace` is false.
+            OSError: if the folder cannot be written.
         """
-        team = built(self, saved_order(self.team))
+        team = build_team(self, saved_order(self.team))
         if not replace and Path(folder).exists():
             hint = "choose another folder, or replace this one: save(folder, replace=True)"
-            raise InvalidInputError([Diagnostic(encodable(str(folder)), 0, "it exists already", hint)])
+            raise InvalidInputError([Diagnostic(encodable(str(folder)), 0, "the folder exists already", hint)])
         write_team(team, Path(folder), replace=replace)
 
     def _repr_html_(self) -> str:
-        from robochoc.model.notebook.tables import heading  # noqa: PLC0415 - the same
+        from robochoc.model.notebook.tables import heading  # noqa: PLC0415 - notebooks only
         from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
 
         try:
             team = self.team
         except (ModelError, InvalidInputError) as unfinished:
             return heading(repr(self), str(unfinished))
-        coded = {name: one.domain for name, one in self.variables.items() if one.codes.told is not None}
+        coded = {name: one.domain for name, one in self.variables.items() if one.codes.user_values is not None}
         return team_html(team, coded)
 
     def _team_to_solve(self) -> Team:
@@ -346,11 +346,11 @@ class Model(Solvable):
         return Solution.of(outcome, team, dict(self.variables))
 
     def __copy__(self) -> Self:
-        """Return a model of its own: what is added to one does not change the other."""
+        """Return an independent copy."""
         return copy.deepcopy(self)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return what a copy begins with: all but the team, which follows from it."""
+        """Return the state without the cached team."""
         return {**vars(self), "_team": None}
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Exact numbers: what users write as a number, as an integer or a fraction."""
+"""Exact numbers: the numbers of users as integers or fractions."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from fractions import Fraction
 from numbers import Integral, Rational, Real
 
 from robochoc.model.cost_units import MAX_PLACES
-from robochoc.modelling.places import ModelError, ModelTypeError, Place
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 
 Exact = int | Fraction
-"""An exact number; a `Fraction` only where it is no integer."""
+"""An exact number; a `Fraction` only if it is not an integer."""
 
 _FAR = 400
-"""Decimals that are larger or smaller by this power of ten are refused: fractions of them fill the memory."""
+"""Decimals beyond this power of ten are rejected: fractions of them would fill the memory."""
 
 
 def is_number(value: object) -> bool:
@@ -26,7 +26,7 @@ def is_number(value: object) -> bool:
 
 
 def is_truth(value: object) -> bool:
-    """Return whether `value` is a truth value of Python or NumPy, which is not imported."""
+    """Return whether `value` is a truth value of Python or NumPy, without importing NumPy."""
     return isinstance(value, bool) or (type(value).__module__ == "numpy" and type(value).__name__ in {"bool", "bool_"})
 
 
@@ -36,15 +36,15 @@ def whole_number(value: object) -> int | None:
 
 
 def is_infinite(value: object) -> bool:
-    """Return whether `value` is a float that is infinite: the cost that forbids."""
+    """Return whether `value` is an infinite float: the cost that forbids."""
     return isinstance(value, Real) and not isinstance(value, Rational) and math.isinf(value)
 
 
 def exact(value: object) -> Exact:
-    """Return the number `value` exactly. A float is what it is written as: 0.1 is one tenth.
+    """Return the number `value` exactly. A float has the value of its text: 0.1 is one tenth.
 
     Raises:
-        ModelError: if it is no finite number, or one that is too large to compute with.
+        ModelError: if it is not a finite number, or too large or too small.
     """
     if is_truth(value):
         return 1 if value else 0
@@ -54,57 +54,57 @@ def exact(value: object) -> Exact:
         return _whole_if_possible(Fraction(value))
     if isinstance(value, Decimal) and value.is_finite():
         if value and not -_FAR <= value.adjusted() <= _FAR:
-            raise ModelError(f"{value} is too large, or too small", "a cost has at most 18 digits")
+            raise ModelError(f"the number {value} is too large, or too small", "a cost has at most 18 digits")
         return _whole_if_possible(Fraction(value))
     if isinstance(value, Real) and math.isfinite(value):
         return _whole_if_possible(Fraction(str(value)))
     if hasattr(value, "__index__"):
         return operator.index(value)
-    raise ModelTypeError(f"{value!r} is no finite number", "int, Decimal, Fraction or float")
+    raise ModelTypeError(f"{value!r} is not a finite number", "expected int, Decimal, Fraction or float")
 
 
 def _whole_if_possible(value: Fraction) -> Exact:
     return value.numerator if value.denominator == 1 else value
 
 
-def places_of(value: Exact, place: Place | None = None) -> int:
-    """Return how many decimal places `value` has.
+def places_of(value: Exact, place: SourceLine | None = None) -> int:
+    """Return the number of decimal places of a cost.
 
     Args:
         value: A cost.
-        place: Where it was made.
+        place: The line that created it.
 
     Raises:
-        ModelError: if it cannot be written with at most nine places.
+        ModelError: if it has more than nine places.
     """
     places = _places(value)
     if places is not None:
         return places
     hint = "round it: minimize(..., places=3) and maximize(..., places=3) round every cost, round(cost, 3) rounds one"
-    told = float(value) or f"close to {'-' * (value < 0)}0"
-    raise ModelError(f"the cost {told} has more than {MAX_PLACES} decimal places", hint, place)
+    text = float(value) or f"close to {'-' * (value < 0)}0"
+    raise ModelError(f"the cost {text} has more than {MAX_PLACES} decimal places", hint, place)
 
 
 def check_places(places: object) -> int | None:
     """Return the number of decimal places to which costs are rounded; None: costs are exact. Raises `ModelError`."""
     whole = whole_number(places)
     if places is not None and (whole is None or not 0 <= whole <= MAX_PLACES):
-        raise ModelTypeError(f"places={places!r}", f"expected an integer from 0 to {MAX_PLACES}")
+        raise ModelTypeError(f"invalid places={places!r}", f"expected an integer from 0 to {MAX_PLACES}")
     return whole
 
 
 def rounded(value: Exact, places: int | None) -> Exact:
-    """Return `value`, rounded half to even to `places` decimal places unless these are None."""
+    """Return `value` rounded half to even to `places` decimal places. None: not rounded."""
     return value if places is None else _whole_if_possible(round(Fraction(value), places))
 
 
 def shown(value: Exact) -> str:
-    """Return a number as a decimal where it is one that costs can be, and else as a fraction."""
+    """Return the text of a number: a decimal if it has few enough places for a cost, otherwise a fraction."""
     places = _places(value)
     return str(value) if places is None else f"{Decimal(int(value * 10**places)).scaleb(-places):f}"
 
 
 def _places(value: Exact) -> int | None:
-    """Return the decimal places of a number. None: it has more than a cost may have."""
+    """Return the number of decimal places. None: more than a cost may have."""
     denominator = Fraction(value).denominator
     return next((places for places in range(MAX_PLACES + 1) if 10**places % denominator == 0), None)

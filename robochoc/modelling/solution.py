@@ -1,4 +1,4 @@
-"""What `solve` returns: an outcome that speaks of the user's variables and values, and shows itself in notebooks."""
+"""`Solution`, the result of `solve`: an outcome with the user's variables and values, displayed in notebooks."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from robochoc.formats.result import result_json
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome
 from robochoc.model.problem import Team
-from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.places import ModelTypeError, UnknownNameError
-from robochoc.modelling.terms import Term, Variable
+from robochoc.modelling.errors import ModelTypeError, UnknownNameError
+from robochoc.modelling.operators import UndefinedTermError
+from robochoc.modelling.terms import ModelVariable, Term
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from robochoc.modelling.notebook.scenes import ScenePage
+    from robochoc.modelling.scene_page import ScenePage
 
 
 class NamedValues(dict[str, object]):
-    """Values by the names of variables. A call returns only the values, like `values()` of other mappings."""
+    """Values by the names of variables. Calling it returns only the values, like `values()` of other mappings."""
 
     def __call__(self) -> ValuesView[object]:
         """Return the values without names."""
@@ -45,26 +45,26 @@ class SolutionEpoch(EpochOutcome):
 
 @dataclass(frozen=True, repr=False)
 class Solution(Outcome, Mapping[str, object]):
-    """An outcome, whose values are those that the user wrote.
+    """An outcome with the user's values.
 
-    It is a mapping from the names of variables to their values, and true if there is an assignment.
-    `solution[variable]` is the value of a variable, of a term of variables, or of the variable of that name.
+    It maps the names of variables to their values, and is true if there is an assignment.
+    `solution[x]` is the value of a variable, of a term of variables, or of the variable named `x`.
 
-    `assignment` of the outcome, of its `epochs` and of its `optima` contains the integers that robots compute with:
+    `assignment` of the outcome, of its `epochs` and of its `optima` contains the integers with which robots compute:
     codes of symbols, multiples of a common unit. `values` contains the user's values.
 
     Attributes:
         epochs: The epochs, if there were several, each with its `values`.
         variables: The variables of the model, by name; empty for a problem from files.
-        problem: The team that has solved it. None: it is not known.
+        problem: The team that solved it. None: unknown.
     """
 
     epochs: tuple[SolutionEpoch, ...] = ()
-    variables: Mapping[str, Variable] = field(default_factory=dict, compare=False)
+    variables: Mapping[str, ModelVariable] = field(default_factory=dict, compare=False)
     problem: Team | None = field(default=None, compare=False)
 
     @classmethod
-    def of(cls, outcome: Outcome, team: Team, variables: Mapping[str, Variable] | None = None) -> Solution:
+    def of(cls, outcome: Outcome, team: Team, variables: Mapping[str, ModelVariable] | None = None) -> Solution:
         """Return an outcome of `team` as a solution."""
         same = _fields(outcome, Outcome)
         values = UserValues(variables or {}, team)
@@ -74,13 +74,13 @@ class Solution(Outcome, Mapping[str, object]):
         return cls(**same | {"epochs": tuple(epochs)}, variables=variables or {}, problem=team)
 
     @cached_property
-    def values(self) -> NamedValues:  # a method of other mappings: it can be called
+    def values(self) -> NamedValues:  # callable, since it is a method of other mappings
         """The values of all variables of the robots that are not withdrawn, by name."""
         return self.values_of(self.assignment)
 
     @cached_property
     def listed(self) -> tuple[NamedValues, ...]:
-        """The optima, or solutions, that a protocol such as `list-dpop` has listed: the values of each."""
+        """The values of each optimum or solution listed by a protocol such as `list-dpop`."""
         return tuple(map(self.values_of, self.optima.assignments)) if self.optima else ()
 
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
@@ -96,15 +96,15 @@ class Solution(Outcome, Mapping[str, object]):
         return len(self.assignment)
 
     def __getitem__(self, what: Term | str) -> object:
-        """Return the value of a variable or a term, or of the variable that is called so.
+        """Return the value of a variable or a term, or of the variable of that name.
 
         Variables of a copy of the model, such as one solved in another process, count as variables of this solution.
 
         Raises:
-            UnknownNameError: if it has none: there is no solution, or its robot is withdrawn.
-            ModelTypeError: if it is neither a term nor a name.
+            UnknownNameError: if it has no value: there is no solution, or its robot is withdrawn.
+            ModelTypeError: if the key is neither a term nor a name.
         """
-        if isinstance(what, Variable):
+        if isinstance(what, ModelVariable):
             return self._value(what.name, what)
         if isinstance(what, Term):
             try:
@@ -112,18 +112,18 @@ class Solution(Outcome, Mapping[str, object]):
             except UndefinedTermError:
                 raise UnknownNameError(f"{what!r} has no value: a division by zero") from None
         if not isinstance(what, str):
-            raise ModelTypeError(f"{what!r} has no value", "expected a variable, a term of variables, or a name")
+            raise ModelTypeError(f"{what!r} is not a key", "expected a variable, a term of variables, or a name")
         return self._value(what)
 
-    def _value(self, name: str, variable: Variable | None = None) -> object:
+    def _value(self, name: str, variable: ModelVariable | None = None) -> object:
         if name not in self.values:
             raise UnknownNameError(f"{name!r} has no value", self._why(name))
         if variable is not None and self._is_foreign(variable):
-            raise UnknownNameError(f"{name!r} is a variable of another model", "its robot or its domain is another")
+            raise UnknownNameError(f"{name!r} is a variable of another model", "its robot or its domain differs")
         return self.values[name]
 
     def __contains__(self, what: object) -> bool:
-        """Return whether a variable, a term, or the variable of that name, has a value."""
+        """Return whether a variable, a term, or the variable of that name has a value."""
         try:
             return isinstance(what, Term | str) and (self[what], True)[1]
         except UnknownNameError:
@@ -136,30 +136,30 @@ class Solution(Outcome, Mapping[str, object]):
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON result as a dictionary (docs/reference/result.md)."""
         numbers = {name: one for name, one in self.values.items() if isinstance(one, Real | Decimal)}
-        told_otherwise = {name: _in_json(one) for name, one in numbers.items() if one != self.assignment[name]}
-        told: dict[str, Any] = json.loads(result_json(self, values=told_otherwise))
-        return told
+        changed = {name: _in_json(one) for name, one in numbers.items() if one != self.assignment[name]}
+        result: dict[str, Any] = json.loads(result_json(self, values=changed))
+        return result
 
     def __repr__(self) -> str:
         robots = len(self.problem.robots) if self.problem else len(self.assignment)
         return f"<{self.team}: {describe_outcome(self, robots)}; {self.protocols}, {self.runtime}>"
 
     def scene(self, *, height: int = 520) -> ScenePage:
-        """Return the scene: the drones fly to where the team has decided, in calm air.
+        """Return the scene of the drones' flight, in calm air, to the positions that the team decided.
 
         Args:
             height: Its height in a notebook, in pixels.
         """
-        from robochoc.modelling.notebook.scenes import ScenePage  # noqa: PLC0415 - numpy and the viewer: start-up
+        from robochoc.modelling.scene_page import ScenePage  # noqa: PLC0415 - numpy and the viewer: start-up
 
         return ScenePage(self, self.problem, height=height)
 
     def _repr_html_(self) -> str:
-        from robochoc.modelling.notebook.pages import solution_html  # noqa: PLC0415 - notebooks only
+        from robochoc.modelling.solution_html import solution_html  # noqa: PLC0415 - notebooks only
 
         return solution_html(self)
 
-    def _is_foreign(self, variable: Variable) -> bool:
+    def _is_foreign(self, variable: ModelVariable) -> bool:
         own = self.variables.get(variable.name)
         if own is None or own is variable:
             return own is None and bool(self.variables)
@@ -171,13 +171,13 @@ class Solution(Outcome, Mapping[str, object]):
         owner = self.problem.owner.get(name) if self.problem else None
         if owner in self.withdrawn:
             return f"{owner} is withdrawn"
-        return did_you_mean(name, self.assignment, "it is no variable of this problem")
+        return did_you_mean(name, self.assignment, "it is not a variable of this problem")
 
 
 class UserValues:
-    """The user's values for the integers of assignments: by the variables of a model, or the domains of a team."""
+    """Converts the integers of assignments into the user's values, by a model's variables or a team's domains."""
 
-    def __init__(self, variables: Mapping[str, Variable], team: Team | None) -> None:
+    def __init__(self, variables: Mapping[str, ModelVariable], team: Team | None) -> None:
         self._variables = variables
         self._known = team.variables if team else {}
 

@@ -1,4 +1,4 @@
-"""`solve`, for problems from files and from Python: the options of a run by name, with hints where one is wrong."""
+"""`solve`, for problems from files and from Python: the options of a run, with hints if an option is invalid."""
 
 from __future__ import annotations
 
@@ -68,51 +68,51 @@ class Solvable(ABC):
     ) -> Solution:
         """Let the robots solve the problem together.
 
-        The runtime `network` starts processes that import the program: it calls this below
-        `if __name__ == "__main__":`. Those of the runtime `processes` import nothing.
+        Processes of the runtime `network` import the main program, which must call this below
+        `if __name__ == "__main__":`. Those of the runtime `processes` do not.
 
         Args:
-            protocol: The name of the protocol, in any case. None, or `auto`: one that suits the problem.
+            protocol: The name of the protocol, in upper or lower case. None, or `auto`: one that suits the problem.
             runtime: `processes`, `simulator`, `network` or `arrays`.
             order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
-                first. None: the one that suits a protocol that was chosen; otherwise that of the team, or `max-degree`
-                where nobody has given it one. `given`: that of the team.
-            withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: none may.
+                first. None: the order that suits an automatically chosen protocol; otherwise the team's order, or
+                `max-degree` if the team has none. `given`: the team's order.
+            withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: no robot.
             settings: Settings of the protocol, by name.
-            observer: It is called with every event of the run.
-            environment: It gets each answer, and returns what changes next.
-            seed: The seed of the simulator, of the order `random`, and of protocols that draw lots.
+            observer: FunctionCall with every event of the run.
+            environment: Receives each answer, and returns the next changes.
+            seed: The seed of the simulator, of the order `random`, and of randomised protocols.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
-            deadline: The same, when the best assignment that is known counts as an answer.
-            improve: For how many seconds after the deadline robots search on for what is better. None: not at all.
+            deadline: The same; the best assignment known at that time is the answer.
+            improve: For how many seconds after the deadline robots search for better assignments. None: not at all.
             messages: A limit on the number of messages. None: no limit.
             ncccs: A limit on non-concurrent constraint checks, in the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
-            verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
+            verify: Whether the central solver checks a `no-solution` or a minimum cost found by the robots.
             count: Whether the central solver counts all solutions, or `count-dpop` all optima.
-            central_with: Who decides with the protocol `central`: `ace` or `ortools`.
-            cache: Whether solutions of local problems are kept in the user's cache folder.
+            central_with: The solver of the protocol `central`: `ace` or `ortools`.
+            cache: Whether solutions of local problems are stored in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The longest delay of a message in the simulator, in constraint checks.
-            channel: A channel model: the simulator counts seconds of computing and radio.
-            message_loss: The probability that a message is lost, for good.
-            on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are
+            channel: A channel model, with which the simulator counts seconds of computing and radio.
+            message_loss: The probability that a message is lost and never repeated.
+            on_loss: The reaction to the loss of a robot: `fail` or `withdraw`. None: the run fails, unless there are
                 `spares`.
-            spares: How many robots that are lost come back.
-            patience: A robot whose process is stopped for so many seconds is lost. None: it is waited for.
+            spares: How many lost robots are replaced.
+            patience: A robot whose process is suspended for so many seconds counts as lost. None: it never does.
             kill: Robots whose processes are killed, and when.
-            filters: The names of the channel filters that messages on a network go through, in this order.
-            bounds: Whether events tell the observer what is proven to be the least cost (processes and simulator).
-            preprocess: What robots do before the protocol: `ac`, they make their domains arc consistent. None: nothing.
-            **unknown: There are no other options.
+            filters: The names of the channel filters of messages on a network, in the order of application.
+            bounds: Whether events report the proven lower bound of the cost (processes and simulator).
+            preprocess: Preprocessing before the protocol: `ac`, making domains arc consistent. None: nothing.
+            **unknown: No other options are allowed.
 
         Returns:
-            The solution: a verdict, the values, their cost, and what the run took.
+            The solution: a verdict, the values, their cost, and the metrics of the run.
 
         Raises:
-            UnsupportedError: if problem, protocol, runtime and options do not go together.
-            RobotsLostError: if robots were lost, and the options do not say how to go on.
+            UnsupportedError: if problem, protocol, runtime and options cannot be combined.
+            RobotsLostError: if robots were lost, and the options do not allow continuing without them.
             RefutedError: if the checker refutes the answer.
             ValueError: if an option has a value that is not allowed.
             TypeError: if there is no such option.
@@ -141,12 +141,12 @@ class Solvable(ABC):
         """Return the team, with its problem."""
 
     def _robots_called(self, team: Team) -> Mapping[str, str]:
-        """Return the names of the robots in `team` by those that users have for them."""
+        """Return the names of the robots in `team` by the user's names of them."""
         return {name: name for name in team.order}
 
     @property
     def _is_ordered(self) -> bool:
-        """Whether somebody has given the robots their order."""
+        """Whether the user determined the priority order."""
         return True
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
@@ -154,15 +154,15 @@ class Solvable(ABC):
 
 
 def _refuse(unknown: Iterable[str]) -> None:
-    """Raise `TypeError` for options that there are not."""
+    """Raise `TypeError` for unknown options."""
     for name in unknown:
         known = [one for one in inspect.signature(Solvable.solve).parameters if one not in {"self", "unknown"}]
-        hint = did_you_mean(name, known, f"there are {', '.join(known)}")
+        hint = did_you_mean(name, known, f"its options: {', '.join(known)}")
         raise TypeError(f"solve() has no option {name!r}; {hint}")
 
 
 def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
-    """Return `options` with the names that robots have in the team. Raises `ValueError` for an unknown robot.
+    """Return `options` with the team's names of robots. Raises `ValueError` for an unknown robot.
 
     Args:
         options: The options, with the user's names of robots.

@@ -1,4 +1,4 @@
-"""Terms as tables: what no expression says is computed for all combinations of values, within bounds."""
+"""Terms as tables: the values for all combinations of the variables' values, where no expression is possible."""
 
 from __future__ import annotations
 
@@ -7,24 +7,23 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from robochoc.modelling.meanings import UndefinedTermError
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import Exact, exact, is_infinite, is_number, is_truth
-from robochoc.modelling.places import ModelError, ModelTypeError, Place
-from robochoc.modelling.tabulated import Tabled
-from robochoc.modelling.terms import Term, Variable
+from robochoc.modelling.operators import UndefinedTermError
+from robochoc.modelling.terms import ModelVariable, TableTerm, Term
 
 MAX_COMBINATIONS = 100_000
-"""The maximum number of combinations of values of which a table is computed."""
+"""The maximum number of combinations of values in a computed table."""
 
 Row = tuple[int, ...]
-"""Integers of a relation."""
+"""A row of codes."""
 
 Price = Exact | float
 """A cost; `math.inf` forbids."""
 
 
-def truths(term: Term, place: Place) -> tuple[list[Row], list[Row]]:
-    """Return the rows of `term.variables` in which a condition holds, and those in which it does not."""
+def truths(term: Term, place: SourceLine) -> tuple[list[Row], list[Row]]:
+    """Return the rows of `term.variables` in which a condition holds, and the rows in which it does not."""
     holds: list[Row] = []
     fails: list[Row] = []
     for row, values in _combinations(term.variables, place, term):
@@ -36,8 +35,8 @@ def truths(term: Term, place: Place) -> tuple[list[Row], list[Row]]:
     return holds, fails
 
 
-def prices(parts: Sequence[tuple[Exact, Term]], scope: Sequence[Variable], place: Place) -> dict[Row, Price]:
-    """Return what a weighted sum of terms is for each row of `scope`; `math.inf` where it has no value."""
+def prices(parts: Sequence[tuple[Exact, Term]], scope: Sequence[ModelVariable], place: SourceLine) -> dict[Row, Price]:
+    """Return the value of a weighted sum of terms for each row of `scope`; `math.inf` where it is undefined."""
     found: dict[Row, Price] = {}
     for row, values in _combinations(scope, place, parts[0][1]):
         try:
@@ -47,9 +46,9 @@ def prices(parts: Sequence[tuple[Exact, Term]], scope: Sequence[Variable], place
     return found
 
 
-def listed_rows(term: Tabled) -> dict[Row, object] | None:
-    """Return the rows of a table over distinct variables. None: it is over other terms."""
-    variables = [one for one in term.arguments if isinstance(one, Variable)]
+def listed_rows(term: TableTerm) -> dict[Row, object] | None:
+    """Return the rows of a table over distinct variables, as codes. None: it is over other terms."""
+    variables = [one for one in term.arguments if isinstance(one, ModelVariable)]
     if len(term.variables) < len(term.arguments) or len(variables) < len(term.arguments):
         return None
     found = {}
@@ -61,41 +60,43 @@ def listed_rows(term: Tabled) -> dict[Row, object] | None:
 
 
 def commonest(found: Mapping[Row, Price]) -> Price:
-    """Return the price of most rows."""
+    """Return the most frequent price."""
     return Counter(found.values()).most_common(1)[0][0] if found else 0
 
 
-def _combinations(scope: Sequence[Variable], place: Place, term: Term) -> Iterator[tuple[Row, dict[Variable, object]]]:
+def _combinations(
+    scope: Sequence[ModelVariable], place: SourceLine, term: Term
+) -> Iterator[tuple[Row, dict[ModelVariable, object]]]:
     size = math.prod(len(variable.codes.ever) for variable in scope)
     if size > MAX_COMBINATIONS:
         raise ModelError(
-            f"{in_short(term)} has {size:,} combinations of values, and files can express it only as a table",
-            f"{MAX_COMBINATIONS:,} are computed: split it, or write it with integers",
+            f"{in_short(term)} can be expressed only as a table, and has {size:,} combinations of values",
+            f"the maximum is {MAX_COMBINATIONS:,}: split it, or write it with integers",
             place,
         )
     values = [[(code, variable.codes.value(code)) for code in variable.codes.ever] for variable in scope]
     for row in itertools.product(*values):
-        told = {variable: value for variable, (_, value) in zip(scope, row, strict=True)}
-        yield tuple(code for code, _ in row), told
+        named = {variable: value for variable, (_, value) in zip(scope, row, strict=True)}
+        yield tuple(code for code, _ in row), named
 
 
 def in_short(term: Term) -> str:
-    """Return a term as users wrote it, shortened for a message."""
+    """Return the text of a term, shortened for a message."""
     return repr(term) if len(repr(term)) <= 60 else f"{repr(term)[:57]}..."  # noqa: PLR2004 - of a message
 
 
-def _truth(value: object, term: Term, place: Place) -> bool:
+def _truth(value: object, term: Term, place: SourceLine) -> bool:
     if is_truth(value):
         return bool(value)
-    raise ModelTypeError(f"{term!r} gives {value!r}, no truth value", "let it return True or False", place)
+    raise ModelTypeError(f"{term!r} returns {value!r}, not a truth value", "return True or False", place)
 
 
-def _price(term: Term, values: Mapping[Variable, object], place: Place) -> Price:
+def _price(term: Term, values: Mapping[ModelVariable, object], place: SourceLine) -> Price:
     value = term.value(values)
     if is_infinite(value):
         return math.inf
     if not is_number(value) or value != value:  # noqa: PLR0124 - not a number
-        raise ModelTypeError(f"{term!r} gives {value!r}, no number", "let it return a number", place)
+        raise ModelTypeError(f"{term!r} returns {value!r}, not a number", "return a number", place)
     return exact(value)
 
 

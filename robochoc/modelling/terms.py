@@ -1,44 +1,57 @@
-"""Terms: what users write with operators over variables, as a tree that knows its kinds and its meaning.
+"""Terms: expressions over variables, written with Python's operators, as trees with kinds and values.
 
-`value` computes a term as Python would, in exact numbers: `//` and `%` round down. `modelling/translation.py` says the
-same in the language of files.
+`value` computes a term as Python would, in exact numbers: `//` and `%` round down. `modelling/translation.py`
+translates terms into expressions of files.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from functools import cached_property
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
-from robochoc.modelling.codes import BOOLEAN, NUMBER, Codes, Kind, kind_of
-from robochoc.modelling.extents import ALONE, Extent, extent_of
-from robochoc.modelling.meanings import MEANINGS, PARTIAL
-from robochoc.modelling.numbers import Exact, exact, is_number, shown
-from robochoc.modelling.places import ModelError, ModelTypeError, Place
+from robochoc.modelling.codes import BOOLEAN, NUMBER, DomainCodes, ValueKind, kind_of
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
+from robochoc.modelling.numbers import Exact, exact, is_number, is_truth, shown
+from robochoc.modelling.operators import OPERATORS, PARTIAL, UndefinedTermError
 from robochoc.system.suggestions import did_you_mean
 
-Values = Mapping["Variable", object]
+MAX_DEPTH = 200
+MAX_TERMS = 1_000_000
+
+Values = Mapping["ModelVariable", object]
 """The users' values of variables."""
+
+
+class TermSize(NamedTuple):
+    """The depth of a term, and the number of its subterms; repeated ones count repeatedly."""
+
+    depth: int
+    terms: int
+
+
+_ALONE = TermSize(0, 1)
+"""The size of a variable or a constant."""
 
 
 class Term:
     """A number, a truth value or a symbol that depends on variables.
 
-    Numbers take `+ - * // % ** abs()` and comparisons; `==` and `!=` compare anything of one kind. Conditions take
+    Numbers have `+ - * // % ** abs()` and comparisons; `==` and `!=` compare anything of one kind. Conditions have
     `& | ~ ^` and `implies`; where a number is expected they count as 0 or 1.
     """
 
     __array_priority__ = -1.0
-    """NumPy's scalars (-1000000) leave operators to a term, its arrays (0) do not."""
-    kind: Kind | None = NUMBER
-    """What it is. None: only its values say."""
+    """NumPy's scalars (-1000000) delegate operators to a term, its arrays (0) do not."""
+    kind: ValueKind | None = NUMBER
+    """The kind of its values. None: unknown before they are computed."""
     arguments: tuple[Term, ...] = ()
-    extent: Extent = ALONE
+    size: TermSize = _ALONE
 
     @cached_property
-    def variables(self) -> tuple[Variable, ...]:
+    def variables(self) -> tuple[ModelVariable, ...]:
         """The distinct variables, in the order in which they appear."""
         return tuple(dict.fromkeys(_leaves(self)))
 
@@ -48,19 +61,19 @@ class Term:
         return any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
-        """Return the term's value. Raises `UndefinedTermError` where it has none: a division by zero."""
+        """Return the term's value. Raises `UndefinedTermError` where it has none, such as a division by zero."""
         raise NotImplementedError
 
     def implies(self, other: object) -> Term:
-        """Return the condition that `other` holds where this one does."""
-        return Applied("implies", condition(self), condition(other))
+        """Return the condition that `other` holds wherever this condition does."""
+        return Operation("implies", condition(self), condition(other))
 
     def is_in(self, values: Iterable[object]) -> Term:
-        """Return the condition that this has one of `values`."""
+        """Return the condition that this term has one of `values`."""
         equations = [condition(self == value) for value in values]
         members = [one.arguments[1] for one in equations]
-        if len(members) > 1 and all(isinstance(one, Constant) for one in members):
-            return Applied("in", self, *members)
+        if len(members) > 1 and all(isinstance(one, ConstantTerm) for one in members):
+            return Operation("in", self, *members)
         return any_of(equations)
 
     def __add__(self, other: object) -> Term:
@@ -83,39 +96,39 @@ class Term:
 
     def __mul__(self, other: object) -> Term:
         factor = _operand(other)
-        if isinstance(factor, Constant):
+        if isinstance(factor, ConstantTerm):
             return linear(((exact(factor.given), self),))
-        return Applied("mul", number(self), number(factor))
+        return Operation("mul", number(self), number(factor))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: object) -> Term:
         if isinstance(other, Term) or not is_number(other):
-            raise ModelTypeError("'/' divides by a number only", "write // for the quotient, rounded down")
+            raise ModelTypeError("'/' requires a number as divisor", "write // for the quotient, rounded down")
         if exact(other) == 0:
-            raise ModelError("a division by zero")
+            raise ModelError("division by zero")
         return linear(((Fraction(1) / exact(other), self),))
 
     def __floordiv__(self, other: object) -> Term:
-        return Applied("floordiv", number(self), number(other))
+        return Operation("floordiv", number(self), number(other))
 
     def __rfloordiv__(self, other: object) -> Term:
-        return Applied("floordiv", number(other), number(self))
+        return Operation("floordiv", number(other), number(self))
 
     def __mod__(self, other: object) -> Term:
-        return Applied("mod", number(self), number(other))
+        return Operation("mod", number(self), number(other))
 
     def __rmod__(self, other: object) -> Term:
-        return Applied("mod", number(other), number(self))
+        return Operation("mod", number(other), number(self))
 
     def __pow__(self, other: object) -> Term:
-        return Applied("pow", number(self), number(other))
+        return Operation("pow", number(self), number(other))
 
     def __rpow__(self, other: object) -> Term:
-        return Applied("pow", number(other), number(self))
+        return Operation("pow", number(other), number(self))
 
     def __abs__(self) -> Term:
-        return Applied("abs", number(self))
+        return Operation("abs", number(self))
 
     def __eq__(self, other: object) -> Term:  # type: ignore[override] # a condition, not a truth value
         return _equation("eq", self, other)
@@ -127,16 +140,16 @@ class Term:
         return object.__hash__(self)
 
     def __lt__(self, other: object) -> Term:
-        return Applied("lt", number(self), number(other))
+        return Operation("lt", number(self), number(other))
 
     def __le__(self, other: object) -> Term:
-        return Applied("le", number(self), number(other))
+        return Operation("le", number(self), number(other))
 
     def __gt__(self, other: object) -> Term:
-        return Applied("gt", number(self), number(other))
+        return Operation("gt", number(self), number(other))
 
     def __ge__(self, other: object) -> Term:
-        return Applied("ge", number(self), number(other))
+        return Operation("ge", number(self), number(other))
 
     def __and__(self, other: object) -> Term:
         return _flat("and", (self, other))
@@ -151,28 +164,28 @@ class Term:
         return _flat("or", (other, self))
 
     def __xor__(self, other: object) -> Term:
-        return Applied("xor", condition(self), condition(other))
+        return Operation("xor", condition(self), condition(other))
 
     __rxor__ = __xor__
 
     def __invert__(self) -> Term:
         term = condition(self)
-        if isinstance(term, Applied) and term.operator in _OPPOSITES:
-            return Applied(_OPPOSITES[term.operator], *term.arguments)
-        return Applied("not", term)
+        if isinstance(term, Operation) and term.operator in _OPPOSITES:
+            return Operation(_OPPOSITES[term.operator], *term.arguments)
+        return Operation("not", term)
 
     def __bool__(self) -> NoReturn:
         raise ModelTypeError(
-            f"{self!r} has no truth value yet: it gets one when the problem is solved",
-            "write & | ~ and .implies() for and, or, not and if; (1 < x) & (x < 3) for 1 < x < 3; .is_in() for in;"
-            " all_of, any_of, minimum and maximum for all, any, min and max",
+            f"{self!r} has no truth value before the problem is solved",
+            "in place of and, or, not, if, in, write & | ~ .implies() .is_in(); of 1 < x < 3, (1 < x) & (x < 3);"
+            " of all, any, min, max, all_of, any_of, minimum, maximum",
         )
 
     def __iter__(self) -> NoReturn:
-        raise ModelTypeError(f"{self!r} is one term, no list of them")
+        raise ModelTypeError(f"{self!r} is one term, not a list of terms")
 
     def __deepcopy__(self, memo: dict[int, object]) -> Term:
-        """Return a copy. What is deepest is copied first: Python does not call itself as deep as terms may be."""
+        """Return a copy. The deepest terms are copied first: recursion may exceed Python's limit."""
         waiting = [self]
         while waiting:
             below = [one for one in waiting[-1].arguments if id(one) not in memo]
@@ -180,22 +193,22 @@ class Term:
             if not below and id(term := waiting.pop()) not in memo:
                 made = memo[id(term)] = object.__new__(type(term))
                 vars(made).update(copy.deepcopy(vars(term), memo))
-        copied: Term = memo[id(self)]  # type: ignore[assignment] # what is there is its copy
+        copied: Term = memo[id(self)]  # type: ignore[assignment] # memo holds objects
         return copied
 
 
-class Variable(Term):
-    """A decision of a robot. `Robot.variable` makes it.
+class ModelVariable(Term):
+    """A decision of a robot. `Robot.variable` creates it.
 
     Attributes:
         name: Its name in the team.
         codes: Its domain.
         owner: The name of its robot.
-        place: Where it was made.
-        joins: The event with which its robot joins. None: it is there from the beginning.
+        place: The line that created it.
+        joins: The event with which its robot joins. None: the robot belongs to the team from the beginning.
     """
 
-    def __init__(self, name: str, codes: Codes, owner: str, place: Place, joins: object = None) -> None:
+    def __init__(self, name: str, codes: DomainCodes, owner: str, place: SourceLine, joins: object = None) -> None:
         self.name, self.codes, self.owner, self.place, self.joins = name, codes, owner, place, joins
         self.kind = codes.kind
         self.domain_name = ""
@@ -213,8 +226,8 @@ class Variable(Term):
         return self.name
 
 
-class Constant(Term):
-    """A value that depends on nothing."""
+class ConstantTerm(Term):
+    """A constant."""
 
     def __init__(self, given: object) -> None:
         self.given, self.kind = given, kind_of(given)
@@ -230,7 +243,7 @@ class Constant(Term):
 class Linear(Term):
     """A weighted sum: pairs of a factor and a term, and a constant.
 
-    A long `sum(...)` makes one for each of its terms, so what equal terms add up to is computed when it is asked for.
+    A long `sum(...)` creates a sum for each of its terms, so equal terms are merged only on demand.
     """
 
     def __init__(self, pairs: tuple[tuple[Exact, Term], ...], constant: Exact = 0) -> None:
@@ -238,19 +251,19 @@ class Linear(Term):
 
     @cached_property
     def parts(self) -> tuple[tuple[Exact, Term], ...]:
-        """The factor of each distinct term; 0 only for terms that may have no value, since then the sum has none."""
+        """The factor of each distinct term. Terms that may have no value stay with factor 0: then the sum has none."""
         merged: dict[Term, Exact] = {}
         for factor, term in self.pairs:
             merged[term] = merged.get(term, 0) + factor
         return tuple((factor, term) for term, factor in merged.items() if factor or term.is_partial)
 
     @property
-    def extent(self) -> Extent:  # type: ignore[override] # a sum grows; it is asked for once
-        """The extent of a sum of these terms."""
-        return extent_of(self.arguments)
+    def size(self) -> TermSize:  # type: ignore[override] # computed on demand, since sums grow
+        """The size of a sum of these terms."""
+        return size_of(self.arguments)
 
     @cached_property
-    def arguments(self) -> tuple[Term, ...]:  # type: ignore[override] # it is computed once
+    def arguments(self) -> tuple[Term, ...]:  # type: ignore[override] # computed once
         """The distinct terms."""
         return tuple(term for _, term in self.parts)
 
@@ -266,13 +279,13 @@ class Linear(Term):
         return f"({' + '.join([*words, *([shown(self.constant)] if self.constant else [])])})".replace("+ -", "- ")
 
 
-class Applied(Term):
+class Operation(Term):
     """An operator of `MEANINGS`, applied to terms."""
 
     def __init__(self, operator: str, *arguments: Term) -> None:
         self.operator, self.arguments = operator, arguments
-        self.kind = MEANINGS[operator].gives
-        self.extent = extent_of(arguments)
+        self.kind = OPERATORS[operator].gives
+        self.size = size_of(arguments)
 
     @cached_property
     def is_partial(self) -> bool:
@@ -281,13 +294,55 @@ class Applied(Term):
 
     def value(self, values: Values) -> object:
         """Return its value."""
-        meaning = MEANINGS[self.operator]
+        meaning = OPERATORS[self.operator]
         if meaning.lazy is not None:
             return meaning.lazy(*(lambda one=one: one.value(values) for one in self.arguments))
         return meaning.compute(*(one.value(values) for one in self.arguments))
 
     def __repr__(self) -> str:
-        return MEANINGS[self.operator].text([repr(one) for one in self.arguments])
+        return OPERATORS[self.operator].text([repr(one) for one in self.arguments])
+
+
+class FunctionCall(Term):
+    """A call of a Python function of terms: a condition or a number, depending on its results."""
+
+    kind = None
+    is_partial = True
+
+    def __init__(self, function: Callable[..., object], arguments: tuple[Term, ...], place: SourceLine) -> None:
+        self.function, self.arguments, self.place = function, arguments, place
+        self.size = size_of(arguments)
+
+    def value(self, values: Values) -> object:
+        """Return its value."""
+        given = [one.value(values) for one in self.arguments]
+        try:
+            return self.function(*given)
+        except ArithmeticError as error:
+            raise UndefinedTermError from error
+        except Exception as error:
+            name = getattr(self.function, "__name__", "the function")
+            shown = ", ".join(map(repr, given))
+            raise ModelError(f"{name}({shown}): {type(error).__name__}: {error}", place=self.place) from error
+
+    def __repr__(self) -> str:
+        return f"{getattr(self.function, '__name__', 'function')}({', '.join(map(repr, self.arguments))})"
+
+
+class TableTerm(Term):
+    """A table over terms: the values of the listed combinations, and a default value for all others."""
+
+    def __init__(self, arguments: tuple[Term, ...], rows: Mapping[tuple[object, ...], object], default: object) -> None:
+        self.arguments, self.rows, self.default = arguments, rows, default
+        self.kind = BOOLEAN if is_truth(default) else NUMBER
+        self.size = size_of(arguments)
+
+    def value(self, values: Values) -> object:
+        """Return its value."""
+        return self.rows.get(tuple(one.value(values) for one in self.arguments), self.default)
+
+    def __repr__(self) -> str:
+        return f"table({', '.join(map(repr, self.arguments))})"
 
 
 _FACTORS: dict[Exact, str] = {1: "", -1: "-"}
@@ -295,25 +350,25 @@ _OPPOSITES = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": 
 
 
 def any_of(conditions: Iterable[object]) -> Term:
-    """Return the condition that one of `conditions` holds, or more."""
-    return _flat("or", tuple(conditions)) if (conditions := list(conditions)) else Constant(given=False)
+    """Return the condition that at least one of `conditions` holds."""
+    return _flat("or", tuple(conditions)) if (conditions := list(conditions)) else ConstantTerm(given=False)
 
 
 def all_of(conditions: Iterable[object]) -> Term:
     """Return the condition that all of `conditions` hold."""
-    return _flat("and", tuple(conditions)) if (conditions := list(conditions)) else Constant(given=True)
+    return _flat("and", tuple(conditions)) if (conditions := list(conditions)) else ConstantTerm(given=True)
 
 
 def term_of(value: object) -> Term:
     """Return `value` as a term."""
-    return value if isinstance(value, Term) else Constant(value)
+    return value if isinstance(value, Term) else ConstantTerm(value)
 
 
 def number(value: object) -> Term:
     """Return `value` as a number. Raises `ModelTypeError`."""
     term = term_of(value)
     if term.kind not in {NUMBER, BOOLEAN, None}:
-        raise ModelTypeError(f"{term!r} is {term.kind}, no number", "it can be compared by == and != alone")
+        raise ModelTypeError(f"{term!r} is {term.kind}, not a number", "it supports only == and !=")
     return term
 
 
@@ -321,17 +376,17 @@ def condition(value: object) -> Term:
     """Return `value` as a condition. Raises `ModelTypeError`."""
     term = term_of(value)
     if term.kind not in {BOOLEAN, None}:
-        raise ModelTypeError(f"{term!r} is {term.kind}, no condition", "compare it with something")
+        raise ModelTypeError(f"{term!r} is {term.kind}, not a condition", "compare it with a value")
     return term
 
 
 def linear(parts: Iterable[tuple[Exact, Term]]) -> Term:
-    """Return a sum of terms times factors; sums in it are merged into one."""
+    """Return a sum of terms times factors; nested sums are merged."""
     pairs: tuple[tuple[Exact, Term], ...] = ()
     constant: Exact = 0
     for factor, term in parts:
         match number(term):
-            case Constant(given=given):
+            case ConstantTerm(given=given):
                 constant += factor * exact(given)
             case Linear(pairs=inner, constant=more):
                 constant += factor * more
@@ -341,26 +396,26 @@ def linear(parts: Iterable[tuple[Exact, Term]]) -> Term:
     return Linear(pairs, constant)
 
 
-def _leaves(term: Term) -> Iterator[Variable]:
+def _leaves(term: Term) -> Iterator[ModelVariable]:
     waiting = [term]
     while waiting:
         one = waiting.pop()
-        if isinstance(one, Variable):
+        if isinstance(one, ModelVariable):
             yield one
         waiting += reversed(one.arguments)
 
 
 def _operand(value: object) -> Term:
     if not isinstance(value, Term) and not is_number(value):
-        raise ModelTypeError(f"{value!r} is no number", "only numbers are added and multiplied")
+        raise ModelTypeError(f"{value!r} is not a number", "only numbers can be added and multiplied")
     return term_of(value)
 
 
 def _flat(operator: str, conditions: Iterable[object]) -> Term:
     found: list[Term] = []
     for one in map(condition, conditions):
-        found += one.arguments if isinstance(one, Applied) and one.operator == operator else [one]
-    return found[0] if len(found) == 1 else Applied(operator, *found)
+        found += one.arguments if isinstance(one, Operation) and one.operator == operator else [one]
+    return found[0] if len(found) == 1 else Operation(operator, *found)
 
 
 def _equation(operator: str, left: Term, given: object) -> Term:
@@ -370,15 +425,30 @@ def _equation(operator: str, left: Term, given: object) -> Term:
         one, other = left.kind, right.kind
         raise ModelTypeError(f"{left!r} is {one}, and {right!r} is {other}", "they are never equal: compare one kind")
     for variable, constant in ((left, right), (right, left)):
-        if isinstance(variable, Variable) and isinstance(constant, Constant):
+        if isinstance(variable, ModelVariable) and isinstance(constant, ConstantTerm):
             _check_known(variable, constant.given)
-    return Applied(operator, left, right)
+    return Operation(operator, left, right)
 
 
-def _check_known(variable: Variable, value: object) -> None:
-    """Raise `ModelError` where a text is compared that is no value of the variable: a slip of the pen."""
+def _check_known(variable: ModelVariable, value: object) -> None:
+    """Raise `ModelError` if the variable is compared with a text that is not one of its values: probably a typo."""
     if isinstance(value, str) and variable.codes.symbolic and variable.codes.code(value) is None:
         shown = " ".join(map(str, variable.domain[:20]))
         raise ModelError(
-            f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain, f"it has {shown}")
+            f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain, f"its values: {shown}")
         )
+
+
+def size_of(arguments: Iterable[Term]) -> TermSize:
+    """Return the size of a term with these arguments. Raises `ModelError` if it is too deep, or too large."""
+    depth, terms = 0, 1
+    for one in arguments:
+        depth = max(depth, one.size.depth)
+        terms += one.size.terms
+    if depth >= MAX_DEPTH:
+        hint = "replace a part of it by a variable, or the term by a Python function"
+        raise ModelError(f"a term has more than {MAX_DEPTH} levels", hint)
+    if terms > MAX_TERMS:
+        hint = "a subterm used twice doubles the size at each step: replace it by a variable"
+        raise ModelError(f"a term has more than {MAX_TERMS:,} subterms", hint)
+    return TermSize(depth + 1, terms)

@@ -1,7 +1,7 @@
-"""Terms in the language of files: expressions over integers (docs/reference/format.md, "Functional expressions").
+"""Translates terms into expressions of files over integers (docs/reference/format.md, "Functional expressions").
 
-A number that need not be an integer becomes an integer expression and what it is to be divided by, so nothing is
-rounded. `//` and `%` round down in Python and toward zero in files: the rest is made right by `mod`.
+A number that may be a fraction becomes an integer expression and a divisor, so nothing is rounded. `//` and `%` round
+down in Python and toward zero in files: `mod` corrects the remainder.
 """
 
 from __future__ import annotations
@@ -11,22 +11,21 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from robochoc.model.expression import Apply, Expression, Name
-from robochoc.model.expression import Constant as Integer
+from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.expression.bounds import Interval, bounds, excess
 from robochoc.modelling.codes import BOOLEAN, NUMBER
 from robochoc.modelling.numbers import exact
 from robochoc.modelling.tables import MAX_COMBINATIONS
-from robochoc.modelling.terms import Applied, Constant, Linear, Term, Variable
+from robochoc.modelling.terms import ConstantTerm, Linear, ModelVariable, Operation, Term
 
 MAX_SIZE = 5_000
-"""The maximum number of operators and terms of an expression: nested quotients double it each time."""
+"""The maximum number of operators and terms of an expression; each nested quotient doubles the number."""
 MAX_LEVELS = 60
 """The maximum depth of an expression."""
 
 
 class UntranslatableError(Exception):
-    """No expression says the same: the term has to become a table."""
+    """The term has no equivalent expression: it must become a table."""
 
 
 class Scaled(NamedTuple):
@@ -37,27 +36,27 @@ class Scaled(NamedTuple):
 
 
 class Translator:
-    """Translates terms over variables, whose values have `names` in the expression."""
+    """Translates terms over variables, which are called `names` in the expressions."""
 
-    def __init__(self, names: Mapping[Variable, str]) -> None:
+    def __init__(self, names: Mapping[ModelVariable, str]) -> None:
         self._names = names
         self._limits = {name: _interval(variable) for variable, name in names.items()}
         self._combinations = math.prod(len(variable.codes.ever) for variable in names)
 
     def whole_condition(self, term: Term) -> Expression:
-        """Return a Boolean expression of a size that files can hold. Raises `UntranslatableError`."""
+        """Return a Boolean expression that fits into files. Raises `UntranslatableError`."""
         return self._within_limits(self.condition(term))
 
     def whole_number(self, term: Term) -> Scaled:
-        """Return a number whose expression has such a size. Raises `UntranslatableError`."""
+        """Return a number whose expression fits into files. Raises `UntranslatableError`."""
         found = self.number(term)
         return found._replace(expression=self._within_limits(found.expression))
 
     def _within_limits(self, expression: Expression) -> Expression:
-        """Return `expression`, if files can hold it, and it stays within 64 bits or is too wide for a table.
+        """Return `expression` if it fits into files, and into 64 bits unless a table would be too large.
 
         Raises:
-            UntranslatableError: if the term has to become a table, whose entries are computed without such a limit.
+            UntranslatableError: if the term must become a table, whose entries are computed without such a limit.
         """
         _check_size(expression)
         if self._combinations <= MAX_COMBINATIONS and excess(expression, self._limits):
@@ -67,19 +66,19 @@ class Translator:
     def condition(self, term: Term) -> Expression:
         """Return a Boolean expression. Raises `UntranslatableError`."""
         match term:
-            case Constant(given=given):
-                return Apply("eq", (Integer(int(bool(given))), Integer(1)))
-            case Variable(kind=kind) if kind == BOOLEAN:
-                return Apply("eq", (Name(self._names[term]), Integer(1)))
-            case Applied(operator="and" | "or" | "not" | "xor" as operator, arguments=arguments):
+            case ConstantTerm(given=given):
+                return Apply("eq", (Constant(int(bool(given))), Constant(1)))
+            case ModelVariable(kind=kind) if kind == BOOLEAN:
+                return Apply("eq", (Name(self._names[term]), Constant(1)))
+            case Operation(operator="and" | "or" | "not" | "xor" as operator, arguments=arguments):
                 return Apply(operator, tuple(map(self.condition, arguments)))
-            case Applied(operator="implies", arguments=(one, other)):
+            case Operation(operator="implies", arguments=(one, other)):
                 return Apply("or", (Apply("not", (self.condition(one),)), self.condition(other)))
-            case Applied(operator="different", arguments=arguments):
+            case Operation(operator="different", arguments=arguments):
                 pairs = [("ne", one, other) for n, one in enumerate(arguments) for other in arguments[:n]]
                 found = tuple(self._comparison(*pair) for pair in pairs)
                 return found[0] if len(found) == 1 else Apply("and", found)
-            case Applied(operator=operator, arguments=arguments) if operator in _COMPARISONS:
+            case Operation(operator=operator, arguments=arguments) if operator in _COMPARISONS:
                 return self._comparison(operator, *arguments)
             case _:
                 raise UntranslatableError
@@ -87,16 +86,16 @@ class Translator:
     def number(self, term: Term) -> Scaled:
         """Return a number. Raises `UntranslatableError`."""
         match term:
-            case Constant(given=given):
+            case ConstantTerm(given=given):
                 value = Fraction(exact(given))
-                return Scaled(Integer(value.numerator), value.denominator)
-            case Variable(kind=kind) if kind in {NUMBER, BOOLEAN}:
+                return Scaled(Constant(value.numerator), value.denominator)
+            case ModelVariable(kind=kind) if kind in {NUMBER, BOOLEAN}:
                 return Scaled(Name(self._names[term]), term.codes.scale)
             case Linear(parts=parts, constant=constant):
                 return self._sum([(factor, self.number(one)) for factor, one in parts], Fraction(constant))
-            case Applied(kind=kind) if kind == BOOLEAN:
-                return Scaled(Apply("if", (self.condition(term), Integer(1), Integer(0))))
-            case Applied(operator=operator, arguments=arguments):
+            case Operation(kind=kind) if kind == BOOLEAN:
+                return Scaled(Apply("if", (self.condition(term), Constant(1), Constant(0))))
+            case Operation(operator=operator, arguments=arguments):
                 return self._applied(operator, arguments)
             case _:
                 raise UntranslatableError
@@ -129,16 +128,16 @@ class Translator:
         terms = [(factor, one) for factor, one in numbers if factor or may_be_undefined(one)]
         rest = int(constant * divisor)
         if not terms:
-            return Scaled(Integer(rest), divisor)
+            return Scaled(Constant(rest), divisor)
         match terms:
             case [(1, one), (-1, other)] | [(-1, other), (1, one)] if not rest:
                 return Scaled(Apply("sub", (one, other)), divisor)
             case [(1, one)] if rest:
-                return Scaled(Apply("add" if rest > 0 else "sub", (one, Integer(abs(rest)))), divisor)
+                return Scaled(Apply("add" if rest > 0 else "sub", (one, Constant(abs(rest)))), divisor)
             case [(-1, one)] if rest:
-                return Scaled(Apply("sub", (Integer(rest), one)), divisor)
+                return Scaled(Apply("sub", (Constant(rest), one)), divisor)
         found = [_times(factor, expression) for factor, expression in terms]
-        found += [Integer(rest)] if rest else []
+        found += [Constant(rest)] if rest else []
         return Scaled(found[0] if len(found) == 1 else Apply("add", tuple(found)), divisor)
 
     def _division(self, operator: str, numbers: Sequence[Scaled]) -> Scaled:
@@ -157,12 +156,12 @@ class Translator:
             raise UntranslatableError
         found, divisor = _together(array)
         place = index.expression
-        chosen = [Apply("if", (Apply("eq", (place, Integer(n))), one, Integer(0))) for n, one in enumerate(found)]
+        chosen = [Apply("if", (Apply("eq", (place, Constant(n))), one, Constant(0))) for n, one in enumerate(found)]
         low, high = self._bounds(place)
         if low < 0 or high >= len(found):
-            inside = Apply("and", (Apply("ge", (place, Integer(0))), Apply("lt", (place, Integer(len(found))))))
-            undefined = Apply("div", (Integer(1), Integer(0)))
-            chosen.append(Apply("if", (inside, Integer(0), undefined)))
+            inside = Apply("and", (Apply("ge", (place, Constant(0))), Apply("lt", (place, Constant(len(found))))))
+            undefined = Apply("div", (Constant(1), Constant(0)))
+            chosen.append(Apply("if", (inside, Constant(0), undefined)))
         return Scaled(chosen[0] if len(chosen) == 1 else Apply("add", tuple(chosen)), divisor)
 
     def _power(self, base: Scaled, exponent: Scaled) -> Scaled:
@@ -171,20 +170,20 @@ class Translator:
         return Scaled(Apply("pow", (base.expression, exponent.expression)))
 
     def _comparison(self, operator: str, *sides: Term) -> Expression:
-        symbolic = next((side for side in sides if isinstance(side, Variable) and side.codes.symbolic), None)
+        symbolic = next((side for side in sides if isinstance(side, ModelVariable) and side.codes.symbolic), None)
         if symbolic is not None:
             return Apply(operator, tuple([self._symbol(side, symbolic) for side in sides]))
         found, _ = _together([self.number(side) for side in sides])
         return Apply(operator, tuple(found))
 
-    def _symbol(self, term: Term, variable: Variable) -> Expression:
-        """Return a symbol that is compared with `variable`. Raises `UntranslatableError`."""
-        if isinstance(term, Variable):
+    def _symbol(self, term: Term, variable: ModelVariable) -> Expression:
+        """Return the expression of a symbol compared with `variable`. Raises `UntranslatableError`."""
+        if isinstance(term, ModelVariable):
             return Name(self._names[term])
-        code = variable.codes.code(term.given) if isinstance(term, Constant) else None
+        code = variable.codes.code(term.given) if isinstance(term, ConstantTerm) else None
         if code is None:
             raise UntranslatableError
-        return Integer(code)
+        return Constant(code)
 
     def _bounds(self, expression: Expression) -> Interval:
         return bounds(expression, self._limits)
@@ -193,12 +192,12 @@ class Translator:
 _COMPARISONS = {"eq", "ne", "in", "lt", "le", "gt", "ge"}
 
 
-def _interval(variable: Variable) -> Interval:
+def _interval(variable: ModelVariable) -> Interval:
     return Interval(*variable.codes.ends)
 
 
 def _together(numbers: Sequence[Scaled] | map[Scaled]) -> tuple[list[Expression], int]:
-    """Return expressions of one divisor, and that."""
+    """Return the numbers as expressions with a common divisor, and the divisor."""
     found = list(numbers)
     divisor = math.lcm(*(one.divisor for one in found))
     return [_times(divisor // one.divisor, one.expression) for one in found], divisor
@@ -208,16 +207,16 @@ def _times(factor: int, expression: Expression) -> Expression:
     match factor, expression:
         case 1, _:
             return expression
-        case _, Integer(value):
-            return Integer(factor * value)
+        case _, Constant(value):
+            return Constant(factor * value)
         case -1, _:
             return Apply("neg", (expression,))
         case _:
-            return Apply("mul", (Integer(factor), expression))
+            return Apply("mul", (Constant(factor), expression))
 
 
 def _check_size(expression: Expression) -> None:
-    """Raise `UntranslatableError` if `expression` is too large for a file. Shared parts are visited once."""
+    """Raise `UntranslatableError` if `expression` is too large for a file. Shared subexpressions are visited once."""
     known: dict[int, tuple[int, int]] = {}
 
     def size(one: Expression) -> tuple[int, int]:
@@ -234,7 +233,7 @@ def _check_size(expression: Expression) -> None:
 
 
 def may_be_undefined(expression: Expression) -> bool:
-    """Return whether an expression divides, or has a power: it may have no value."""
+    """Return whether an expression may be undefined: it contains a quotient, a remainder or a power."""
     waiting = [expression]
     while waiting:
         one = waiting.pop()

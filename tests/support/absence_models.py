@@ -13,7 +13,7 @@ from random import Random
 from typing import Any
 
 import robochoc
-from robochoc.modelling.events import Event
+from robochoc.modelling.events import ModelEvent
 
 Values = Mapping[str, int]
 Price = Callable[[Values], float]
@@ -76,7 +76,7 @@ class AbsenceModel:
     def without(self, gone: Sequence[str]) -> robochoc.Model:
         """Return the model, in which the robots `gone` leave by one event or by several."""
         model = self.model.__copy__()
-        event: Event | None = None
+        event: ModelEvent | None = None
         for name in gone:
             if event is None or self._chance.random() < 0.5:
                 event = model.after_solution()

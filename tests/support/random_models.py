@@ -18,7 +18,7 @@ from random import Random
 from typing import Any
 
 import robochoc
-from robochoc.modelling.terms import Term, Variable
+from robochoc.modelling.terms import ModelVariable, Term
 
 Values = Mapping[str, Any]
 
@@ -103,14 +103,14 @@ def _drawn(chance: Random, integers: Callable[[Random], list[int]]) -> RandomPro
     """Return a problem of 2 to 4 robots with 2 to 6 variables, private and shared constraints, and costs or none."""
     model = robochoc.Model("random")
     problem = RandomProblem(model, {})
-    numbers: list[Variable] = []
-    colors: list[Variable] = []
-    switches: list[Variable] = []
+    numbers: list[ModelVariable] = []
+    colors: list[ModelVariable] = []
+    switches: list[ModelVariable] = []
     for number in range(chance.randint(2, 4)):
         robot = model.robot(f"r{number}", priority=chance.choice((0, 0, 1)))
         for own in range(chance.choice((1, 1, 2))):
             name = f"v{own}"
-            kinds: list[tuple[list[Any], list[Variable]]] = [(integers(chance), numbers)] * 4
+            kinds: list[tuple[list[Any], list[ModelVariable]]] = [(integers(chance), numbers)] * 4
             kinds += [(_decimals(chance), numbers), (list(Color)[: chance.randint(2, 3)], colors)]
             domain, group = chance.choice([*kinds, ([False, True], switches)])
             group.append(robot.variable(name, domain))
@@ -156,7 +156,7 @@ def _product(factor: Number, said: Said) -> Callable[[Values], Fraction]:
     return lambda values: exactly(factor) * exactly(said.means(values))
 
 
-def _add_table(problem: RandomProblem, numbers: list[Variable], chance: Random) -> None:
+def _add_table(problem: RandomProblem, numbers: list[ModelVariable], chance: Random) -> None:
     """Add a table of costs, some of which forbid."""
     one, other = chance.choice(numbers), chance.choice(numbers)
     if one is other:
@@ -188,7 +188,7 @@ class _Sayer:
     """Says random things of variables."""
 
     def __init__(
-        self, chance: Random, numbers: list[Variable], colors: list[Variable], switches: list[Variable]
+        self, chance: Random, numbers: list[ModelVariable], colors: list[ModelVariable], switches: list[ModelVariable]
     ) -> None:
         self._chance = chance
         self.numbers, self._colors, self._switches = numbers, colors, switches

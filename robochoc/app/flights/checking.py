@@ -24,7 +24,7 @@ from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError, read_team
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import INFINITE, Team
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 from robochoc.verification.checker import RefutedError, check_told_cost, constraint_cost
 
 CHECK_S = 5.0

@@ -33,7 +33,7 @@ from robochoc.app.runs.run import Run
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Kind
 from robochoc.formats import InvalidInputError
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 from robochoc.system.files import write_atomically
 
 FLIGHT = "flight.html"

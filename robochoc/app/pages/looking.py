@@ -10,7 +10,7 @@ from nicegui import run
 from robochoc.app.log import noted
 from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import InvalidInputError
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 from robochoc.solver.encoding import UnsupportedError
 
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from robochoc.app.runs.run import Run
 from robochoc.app.runs.tape import Tape, recorded
 from robochoc.formats import InvalidInputError
 from robochoc.journal.entries import JournalError
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 
 
 def conversation_of(run: Run, wanted: Callable[[], bool] = lambda: True) -> Tape | None:

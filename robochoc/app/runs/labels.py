@@ -11,7 +11,7 @@ from robochoc.modelling.model import Model
 
 def value_of(model: Model, variable: str, code: int) -> Value:
     """Return the user's value that a code of a variable stands for."""
-    told = model.variables[variable].codes.told or {}
+    told = model.variables[variable].codes.user_values or {}
     value = told.get(code, code)
     return value if isinstance(value, (int, str)) else str(value)
 

@@ -14,7 +14,7 @@ from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.prepared import Prepared
 from robochoc.app.runs.run import ERRORS, Run, State
 from robochoc.formats import InvalidInputError
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 from robochoc.run.options import Options
 from robochoc.run.recording import objective_to_record
 from robochoc.system.stopping import STOP

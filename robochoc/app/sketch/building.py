@@ -8,10 +8,10 @@ from robochoc.app.sketch.palette import Applied
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch, SketchRule
 from robochoc.model.problem import Team
-from robochoc.modelling.building import built, saved_order
 from robochoc.modelling.model import Model
 from robochoc.modelling.robots import ModelRobot
-from robochoc.modelling.terms import Term, Variable
+from robochoc.modelling.team_builder import build_team, saved_order
+from robochoc.modelling.terms import ModelVariable, Term
 
 WAYPOINT = "waypoint"
 """The topic that says where a robot is to go, after the robot's name: ROS wants one for each."""
@@ -69,7 +69,7 @@ def saved_team(sketch: Sketch) -> Team:
     """Return the team of a sketch as its files say it. Raises `ModelError` if the sketch has a mistake."""
     model = model_of(sketch)
     order = saved_order(model.team)
-    return model.team if order == model.team.order else built(model, order)
+    return model.team if order == model.team.order else build_team(model, order)
 
 
 def applied(sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -108,7 +108,7 @@ def state(model: Model, rule: SketchRule, name: str, term: Term, robots: Sequenc
 
 def tell_where(sketch: Sketch, robot: ModelRobot) -> None:
     """Let a robot say where its decisions send it: to a cell, and to a height."""
-    variables: dict[Kind, Variable] = {}
+    variables: dict[Kind, ModelVariable] = {}
     for decision in _decided_by(sketch, robot.name):
         variables.setdefault(decision.kind, robot.variables[decision.name])
     place, level = variables.get(Kind.PLACE), variables.get(Kind.LEVEL)

@@ -20,9 +20,9 @@ from robochoc.app.sketch.palette import Applied, Links
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch, SketchRule, Value
 from robochoc.formats import InvalidInputError
-from robochoc.modelling.events import Event
+from robochoc.modelling.errors import ModelError
+from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.model import Model
-from robochoc.modelling.places import ModelError
 from robochoc.system.errors import TransferableError
 
 Domains = dict[tuple[str, str], list[Value]]
@@ -170,7 +170,7 @@ class _Difference:
             tell_where(before, robot)
         return model
 
-    def _say_values(self, model: Model, event: Event, was: Domains, now: Domains) -> None:
+    def _say_values(self, model: Model, event: ModelEvent, was: Domains, now: Domains) -> None:
         """Say which values go and come, of robots that stay."""
         for (name, decision), values in now.items():
             if name in self._stay:
@@ -180,7 +180,7 @@ class _Difference:
                 for value in (value for value in old if value not in values):
                     event.remove_value(variable, value)
 
-    def _say(self, model: Model, event: Event) -> None:
+    def _say(self, model: Model, event: ModelEvent) -> None:
         """Say which robots and constraints go and come."""
         for link in self._dropped:
             if not self._stay.issuperset(link.robots):  # before it is restated for the robots that stay
@@ -253,7 +253,7 @@ def _check_link(link: Link) -> None:
         raise AnewError("whatif.anew-private", rule=link.rule.id)
 
 
-def _add(event: Event, model: Model, link: Link) -> None:
+def _add(event: ModelEvent, model: Model, link: Link) -> None:
     term = term_of(model, link.sketch, link.rule, link.robots)
     if not PALETTE[link.rule.kind].graded:
         event.add(term, cost=link.rule.cost, name=link.name)

@@ -25,7 +25,7 @@ from robochoc.formats.diagnostics import invalid_input
 from robochoc.formats.folder import SKETCH_FILE
 from robochoc.formats.scenario_writer import team_files
 from robochoc.model.problem import Team
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 
 VERSION = 1
 """Of what is in `sketch.json`."""

@@ -24,7 +24,7 @@ from robochoc.app.studies.families import family_of
 from robochoc.app.studies.question import Question, folder_of, number_of_runs, study_of
 from robochoc.experiments.task import Status
 from robochoc.formats import InvalidInputError, read_team, write_team
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 
 STUDY = "study.toml"
 ROWS = "study.sqlite"

@@ -13,7 +13,7 @@ from typing import Any
 import robochoc
 from robochoc.model.constraint import Function, Predicate, Relation
 from robochoc.model.outcome import Verdict
-from robochoc.modelling.terms import Variable
+from robochoc.modelling.terms import ModelVariable
 from tests.support.cases import looped
 
 
@@ -27,7 +27,7 @@ class Level(IntEnum):
     HIGH = 5
 
 
-def two(domain: object, other: object = None) -> tuple[robochoc.Model, Variable, Variable]:
+def two(domain: object, other: object = None) -> tuple[robochoc.Model, ModelVariable, ModelVariable]:
     """Return a model of two robots with a variable each."""
     model = robochoc.Model("two")
     first = model.robot("a").variable("x", domain)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import robochoc
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 
 
 def three() -> tuple[robochoc.Model, list[Any]]:

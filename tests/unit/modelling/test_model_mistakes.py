@@ -13,8 +13,8 @@ import pytest
 import robochoc
 from robochoc.formats import InvalidInputError
 from robochoc.model.problem import Team
-from robochoc.modelling.places import ModelTypeError, UnknownNameError
-from robochoc.modelling.terms import Variable
+from robochoc.modelling.errors import ModelTypeError, UnknownNameError
+from robochoc.modelling.terms import ModelVariable
 from robochoc.run.options import Options
 from tests.support.cases import looped
 
@@ -41,7 +41,7 @@ class Made:
         self.large = [self.b.variable(f"l{n}", range(100)) for n in range(3)]
 
 
-def stranger() -> Variable:
+def stranger() -> ModelVariable:
     return robochoc.Model().robot("a").variable("x", range(3))
 
 
@@ -57,59 +57,59 @@ def _built(made: Made, mistake: Callable[[Made], object]) -> Team:
 
 
 MISTAKES: list[tuple[Callable[[Made], object], str]] = [
-    (lambda m: bool(m.x == m.y), "has no truth value yet"),
+    (lambda m: bool(m.x == m.y), "has no truth value before"),
     (lambda m: 1 < m.x < 3, "1 < x < 3"),
     (lambda m: m.x in [m.y, 3], ".is_in"),
     (lambda m: min(m.x, m.y), "minimum"),
-    (lambda m: list(m.x), "no list"),
+    (lambda m: list(m.x), "not a list"),
     (lambda m: m.color != m.shape, "they are never equal"),
     (lambda m: m.color == m.mode, "a Color, and a.mode is a text"),
     (lambda m: m.color == "RED", "never equal"),
     (lambda m: m.mode == "fats", "did you mean 'fast'"),
-    (lambda m: m.color + 1, "no number"),
-    (lambda m: m.color < m.color, "== and != alone"),
-    (lambda m: m.x & m.y, "no condition"),
-    (lambda m: m.x + "1", "no number"),
+    (lambda m: m.color + 1, "not a number"),
+    (lambda m: m.color < m.color, "supports only == and !="),
+    (lambda m: m.x & m.y, "not a condition"),
+    (lambda m: m.x + "1", "not a number"),
     (lambda m: m.x / m.y, "//"),
     (lambda m: m.x / 0, "division by zero"),
-    (lambda m: m.model.add(m.x), "no condition"),
-    (lambda m: m.model.add(m.x is m.y), "False whatever"),
-    (lambda m: m.model.add("x != y"), "no condition"),
-    (lambda m: m.model.add(stranger() == 1), "no variable of this model"),
-    (lambda m: m.model.minimize(m.color), "no number"),
+    (lambda m: m.model.add(m.x), "not a condition"),
+    (lambda m: m.model.add(m.x is m.y), "always False"),
+    (lambda m: m.model.add("x != y"), "not a condition"),
+    (lambda m: m.model.add(stranger() == 1), "not a variable of this model"),
+    (lambda m: m.model.minimize(m.color), "not a number"),
     (_both_ways, "minimised"),
     (lambda m: m.model.minimize(m.x / 3), "9 decimal places"),
     (lambda m: m.model.robot("a"), "already"),
-    (lambda m: m.model.robot("a b"), "cannot be a robot's name"),
-    (lambda m: m.model.robot("scenario"), "cannot be a robot's name"),
-    (lambda m: m.model.robot("c", weight=0), "no weight"),
+    (lambda m: m.model.robot("a b"), "invalid robot name"),
+    (lambda m: m.model.robot("scenario"), "invalid robot name"),
+    (lambda m: m.model.robot("c", weight=0), "invalid weight"),
     (lambda m: m.model.robot("c"), "c has no variable"),
     (lambda m: m.a.variable("x", range(2)), "already"),
-    (lambda m: m.a.variable("2 x", range(2)), "cannot be a variable's name"),
-    (lambda m: m.a.variable("v", []), "without values"),
+    (lambda m: m.a.variable("2 x", range(2)), "invalid variable name"),
+    (lambda m: m.a.variable("v", []), "domain is empty"),
     (lambda m: m.a.variable("v", [1, "a"]), "of one kind"),
-    (lambda m: m.a.variable("v", [[1], [2]]), "can change"),
-    (lambda m: m.a.variable("v", [1, 1]), "stands twice"),
+    (lambda m: m.a.variable("v", [[1], [2]]), "not hashable"),
+    (lambda m: m.a.variable("v", [1, 1]), "occurs twice"),
     (lambda m: m.a.variable("v", "red green"), "['red', 'green']"),
-    (lambda m: m.a.variable("v", 3), "no domain"),
+    (lambda m: m.a.variable("v", 3), "invalid domain"),
     (lambda m: m.a.variable("v", range(10**9)), "more than 100,000"),
     (lambda m: m.a.variable("v", [10**18]), "18 digits"),
     (lambda m: m.model["a.xx"], "did you mean 'a.x'"),
     (lambda m: m.model["x"], "did you mean 'a.x'"),
     (lambda m: m.a["xx"], "a has no variable 'xx'"),
-    (lambda m: m.a.knows(m.x == 1), "add it by Model.add: what is over variables of one robot, no other robot learns"),
+    (lambda m: m.a.knows(m.x == 1), "add it by Model.add: constraints over variables of one robot are private"),
     (lambda m: m.b.knows(m.x + m.y == 1, m.x == 1), "of a alone"),
-    (lambda m: m.a.topic("t", x=m.y), "no variable of a"),
-    (lambda m: m.a.topic("t", x=m.x / 2), "no file can say"),
+    (lambda m: m.a.topic("t", x=m.y), "not a variable of a"),
+    (lambda m: m.a.topic("t", x=m.x / 2), "files cannot express"),
     (lambda m: robochoc.all_different(m.x, m.color), "a number"),
-    (lambda m: robochoc.allowed([m.x, m.y], [(1, 2, 3)]), "3 values, and there are 2 terms"),
+    (lambda m: robochoc.allowed([m.x, m.y], [(1, 2, 3)]), "3 values for 2 terms"),
     (lambda m: robochoc.allowed([m.x, m.mode], [(1, "fats")]), "did you mean 'fast'"),
-    (lambda m: robochoc.costs(m.x, {1: "much"}), "no cost"),
-    (lambda m: robochoc.element([], m.x), "without elements"),
+    (lambda m: robochoc.costs(m.x, {1: "much"}), "invalid cost"),
+    (lambda m: robochoc.element([], m.x), "is empty"),
     (lambda m: robochoc.cumulative([m.x], [1, 2], [1], 1), "2 durations"),
-    (lambda m: m.model.add(robochoc.function(lambda x: x, m.x)), "no truth value"),
+    (lambda m: m.model.add(robochoc.function(lambda x: x, m.x)), "not a truth value"),
     (lambda m: m.model.add(robochoc.function(lambda x: {}[x], m.x)), "KeyError"),
-    (lambda m: m.model.minimize(robochoc.function(str, m.x)), "no number"),
+    (lambda m: m.model.minimize(robochoc.function(str, m.x)), "not a number"),
     (lambda m: m.model.add(robochoc.function(max, *m.large) == 3), "1,000,000 combinations"),
     (lambda m: m.model.after_solution().remove_robot("c"), "no robot 'c'"),
     (lambda m: m.model.after_solution().remove_value(m.x, 7), "no value 7"),
@@ -158,7 +158,7 @@ def test_variables_are_keys() -> None:
 def test_a_folder_that_is_there_is_replaced_on_demand(tmp_path: Path) -> None:
     made = Made()
     made.model.save(tmp_path / "team")
-    with pytest.raises(InvalidInputError, match=r"it exists already .*save\(folder, replace=True\)"):
+    with pytest.raises(InvalidInputError, match=r"the folder exists already .*save\(folder, replace=True\)"):
         made.model.save(tmp_path / "team")
     made.model.save(tmp_path / "team", replace=True)
 

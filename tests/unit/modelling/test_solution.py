@@ -17,7 +17,7 @@ import pytest
 
 import robochoc
 from robochoc.formats.result import read_result, result_json
-from robochoc.modelling.places import ModelTypeError, UnknownNameError
+from robochoc.modelling.errors import ModelTypeError, UnknownNameError
 from robochoc.modelling.solution import Solution
 
 

@@ -20,7 +20,7 @@ import robochoc
 from robochoc.app.sketch.troubles import About, Trouble
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
-from robochoc.modelling.places import ModelError, Place, UnknownNameError
+from robochoc.modelling.errors import ModelError, SourceLine, UnknownNameError
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.services.descriptions import Reason
 
@@ -35,7 +35,7 @@ ARGUMENTS: dict[str, object] = {
     "Sequence[int]": [4, 5],
     "Mapping[str, str]": {"a": "process ended", "b": "no answer"},
     "Iterable[Diagnostic]": [Diagnostic("a.xml", 3, "wrong", "do this"), Diagnostic("a.xml", 1, "odd", "")],
-    "Place | None": Place("a.py", 7),
+    "SourceLine | None": SourceLine("a.py", 7),
     "Codes | None": (1, 0),
     "etree._Element": etree.fromstring("<a><b c='1'>text</b></a>"),
     "Reason": next(iter(Reason)),

@@ -12,7 +12,7 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 from robochoc.model.problem import Team
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 from robochoc.run.choice import decided
 from robochoc.run.options import Options, Runtime
 from robochoc.solver.encoding import UnsupportedError

@@ -27,8 +27,8 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 from robochoc.model.problem import Team
+from robochoc.modelling.errors import ModelError
 from robochoc.modelling.model import Model
-from robochoc.modelling.places import ModelError
 from robochoc.run.registry import UnknownProtocolError, protocol_named
 
 PURPOSE = "whatif"

@@ -19,7 +19,7 @@ from robochoc.app.projects import Projects
 from robochoc.app.runs.run import State
 from robochoc.app.sketch.changes import Fails
 from robochoc.app.store import Store
-from robochoc.modelling.places import ModelError
+from robochoc.modelling.errors import ModelError
 from tests.support.limits import HANG_S
 from tests.support.slot_sketches import slots
 

@@ -1,27 +1,26 @@
-"""Teams that are there already, as what a model begins with."""
+"""The contents of an existing team, with which a model can begin."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation
-from robochoc.model.constraint import Variable as TeamVariable
+from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation, Variable
 from robochoc.model.cost_units import CostUnits, common_units
 from robochoc.model.problem import AddConstraint, Change, ConstraintModel, ProblemKind, ScenarioEvent, Team
-from robochoc.modelling.codes import NUMBER, Codes, Symbols, kind_of
-from robochoc.modelling.places import Place
-from robochoc.modelling.terms import Variable
+from robochoc.modelling.codes import NUMBER, DomainCodes, Symbols, kind_of
+from robochoc.modelling.errors import SourceLine
+from robochoc.modelling.terms import ModelVariable
 
 
 @dataclass(frozen=True)
-class Given:
-    """What a team says beside its robots' names and variables.
+class TeamContents:
+    """The contents of a team except its robots' names and variables.
 
     Attributes:
         kind: The kind of problem.
         units: The units of its costs.
-        constraints: Its constraints but the partially known ones.
+        constraints: Its constraints, without the partially known ones.
         parts: The parts of partially known constraints, by the robot that knows them.
         links: Pairs of neighbours, the parent first.
         events: Its scenario.
@@ -50,8 +49,8 @@ class Given:
         return [*self.constraints, *(one for parts in self.parts.values() for one in parts), *added]
 
 
-def given_by(team: Team) -> Given:
-    """Return what `team` says."""
+def contents_of(team: Team) -> TeamContents:
+    """Return the contents of `team`."""
     units = common_units(robot.costs for robot in team.robots)
     constraints: list[Constraint] = []
     parts: dict[str, list[Constraint]] = {}
@@ -64,24 +63,24 @@ def given_by(team: Team) -> Given:
             else:
                 constraints.append(one)
     links = [(parent.name, robot.name) for robot in team.robots for parent in robot.parents]
-    return Given(team.kind, units, constraints, parts, links, team.scenario)
+    return TeamContents(team.kind, units, constraints, parts, links, team.scenario)
 
 
-def given_variable(variable: TeamVariable, owner: str, symbols: Symbols, place: Place) -> Variable:
-    """Return a variable of a team as one of a model."""
+def model_variable(variable: Variable, owner: str, symbols: Symbols, place: SourceLine) -> ModelVariable:
+    """Return a variable of a team as a variable of a model."""
     domain = variable.domain
     for symbol in domain.symbols:
         symbols.code(symbol)
-    codes = Codes(NUMBER, domain.ranges)
+    codes = DomainCodes(NUMBER, domain.ranges)
     if domain.symbols:
-        codes = Codes(kind_of(""), domain.ranges, told={value: domain.symbols[value] for value in domain})
-    made = Variable(variable.name, codes, owner, place)
+        codes = DomainCodes(kind_of(""), domain.ranges, user_values={value: domain.symbols[value] for value in domain})
+    made = ModelVariable(variable.name, codes, owner, place)
     made.domain_name = domain.name
     return made
 
 
 def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
-    """Return `constraint`, whose costs are counted in a unit that is so many times finer."""
+    """Return `constraint` with its costs in a unit that is `factor` times finer."""
     if factor == 1:
         return constraint
     match constraint.definition:
@@ -96,7 +95,7 @@ def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
 
 
 def changes_in_finer_units(changes: Iterable[Change], factor: int) -> tuple[Change, ...]:
-    """Return `changes`; constraints that they add have costs in a finer unit. Robots that they add name their own."""
+    """Return `changes` with the costs of added constraints in a finer unit. Added robots declare their own unit."""
     return tuple(
         replace(change, constraint=in_finer_units(change.constraint, factor))
         if isinstance(change, AddConstraint)

@@ -1,4 +1,4 @@
-"""The scene of an outcome, as a page of its own or inside of a notebook's."""
+"""The scene of a solution, as a page of its own or in a notebook."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from robochoc.flight.mission import mission_of
 from robochoc.flight.preview import preview_of
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.modelling.notebook.pages import framed
+from robochoc.modelling.solution_html import framed
 from robochoc.view.page import scene_page
 from robochoc.view.scene import scene_of
 
 
 class ScenePage:
-    """A scene: the drones, and how they fly to where the team has decided. In a notebook it shows itself.
+    """A scene: the drones fly to the positions that the team decided. Notebooks display it.
 
     Attributes:
-        html: The page, which needs nothing else.
+        html: The self-contained page.
         height: Its height in a notebook, in pixels.
     """
 
     def __init__(self, outcome: Outcome, team: Team | None, *, height: int = 520) -> None:
-        """Fly an outcome in calm air, and draw it.
+        """Simulate the flight of an outcome in calm air, and draw it.
 
         Args:
-            outcome: What was decided.
-            team: The team as its files have it, before its scenario.
+            outcome: The outcome.
+            team: The team before its scenario.
             height: The height in a notebook, in pixels.
         """
         preview = preview_of(mission_of(outcome, team))

@@ -1,4 +1,4 @@
-"""Outcomes as pieces of a notebook's page."""
+"""Solutions as HTML for notebooks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def solution_html(solution: Solution) -> str:
-    """Return an outcome: what happened, the values, the epochs, and what the run took."""
+    """Return the HTML of a solution: a headline, the values, the epochs, and the metrics."""
     team = solution.problem
     owner = _owners(team) if team else {}
     plain = team is None or team.kind == ProblemKind.DISCSP
@@ -54,14 +54,14 @@ def _cost(cost: Cost | None, *, plain: bool) -> str:
 
 
 def _owners(team: Team) -> dict[str, str]:
-    """Return the robot of each variable, those included that join later."""
+    """Return the robot of each variable, including robots that join later."""
     changes = [change for event in team.scenario for change in event.changes]
     joining = [change.robot for change in changes if isinstance(change, AddAgent)]
     return {**team.owner, **{one.name: robot.name for robot in joining for one in robot.variables}}
 
 
 def framed(page: str, height: int) -> str:
-    """Return a whole page as a frame of another one, from which it can reach nothing."""
+    """Return a page as a sandboxed frame of another page."""
     return (
         f'<iframe srcdoc="{escape(page)}" sandbox="allow-scripts" style="width:100%;height:{height}px;border:0"'
         ' title="the scene"></iframe>'

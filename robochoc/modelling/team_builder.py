@@ -1,4 +1,4 @@
-"""From a model to the team of its robots: units of costs, names, who holds what, and what changes over time."""
+"""Builds the team of a model: units of costs, names, constraints of each robot, and changes over time."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.model.assembly import Extras, assemble
-from robochoc.model.constraint import Constraint, Domain
-from robochoc.model.constraint import Variable as TeamVariable
+from robochoc.model.constraint import Constraint, Domain, Variable
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import (
@@ -25,35 +24,35 @@ from robochoc.model.problem import (
     Team,
 )
 from robochoc.model.symbols import symbol_table, with_marked_symbols, with_table_everywhere
+from robochoc.modelling.constraints import ModelConstraint
 from robochoc.modelling.drafts import Definitions, Draft, costs_of
-from robochoc.modelling.events import Event, Removal
-from robochoc.modelling.given import changes_in_finer_units, in_finer_units
+from robochoc.modelling.errors import ModelError, SourceLine
+from robochoc.modelling.events import ModelEvent, Removal
 from robochoc.modelling.numbers import places_of
-from robochoc.modelling.places import ModelError, Place
 from robochoc.modelling.robots import ModelRobot
-from robochoc.modelling.rules import Rule
+from robochoc.modelling.team_contents import changes_in_finer_units, in_finer_units
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.modelling.model import Model
 
 
-def built(model: Model, order: Sequence[str] | None = None) -> Team:
+def build_team(model: Model, order: Sequence[str] | None = None) -> Team:
     """Return the team of a model.
 
     Args:
         model: The model.
-        order: The robots in priority order. None: as their priorities say.
+        order: The robots in priority order. None: the order of their priorities.
 
     Raises:
-        ModelError: if no team can be so.
-        InvalidInputError: if that is nothing that one line of the program has made.
+        ModelError: if the model is invalid.
+        InvalidInputError: if it is invalid, and no single line of the program is the cause.
     """
     try:
         builder = _Builder(model, order)
         team = builder.team()
     except RecursionError:
-        raise ModelError("a term of the model is nested too deeply", "let variables stand for parts of it") from None
+        raise ModelError("a term of the model is nested too deeply", "replace parts of it by variables") from None
     try:
         check_team(team)
     except InvalidInputError as invalid:
@@ -62,12 +61,12 @@ def built(model: Model, order: Sequence[str] | None = None) -> Team:
 
 
 def saved_order(team: Team) -> tuple[str, ...]:
-    """Return the order of the robots of `team` that its files say: that of the links, then that of the names."""
+    """Return the order of the robots in the files of `team`: by links, then by names."""
     return priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
 
 
 class _Builder:
-    """What is needed to build one team."""
+    """Builds one team."""
 
     def __init__(self, model: Model, order: Sequence[str] | None) -> None:
         self._model = model
@@ -82,7 +81,10 @@ class _Builder:
         constant = model.constant
         self._parts = {robot.name: self._parts_of(robot) for robot in self._robots}
         self._added = {
-            rule: list(rule.drafts()) for event in model.events for rule in event.steps if isinstance(rule, Rule)
+            rule: list(rule.drafts())
+            for event in model.events
+            for rule in event.steps
+            if isinstance(rule, ModelConstraint)
         }
         every = [*self._drafts, *(draft for found in (*self._parts.values(), *self._added.values()) for draft in found)]
         soft = model.maximized is not None or any(draft.soft for draft in every)
@@ -97,10 +99,10 @@ class _Builder:
         self._definitions = Definitions(given.definitions if given else ())
         self._domains: dict[tuple[tuple[range, ...], tuple[str, ...]], str] = {}
         self._symbols = model.symbols.all
-        self._places: dict[str, Place] = {}
+        self._places: dict[str, SourceLine] = {}
 
     def _parts_of(self, robot: ModelRobot) -> list[Draft]:
-        """Return a robot's parts of what it shares. What they say of its own variables alone becomes private."""
+        """Return a robot's parts of shared constraints. Parts over its own variables become private."""
         found = []
         for draft in (one for rule in robot.parts for one in rule.drafts()):
             owners = {variable.owner for variable in draft.scope}
@@ -109,8 +111,8 @@ class _Builder:
             elif robot.name in owners:
                 found.append(draft)
             else:
-                message = f"the part that {robot.name} knows says something of {' and '.join(owners)} alone"
-                raise ModelError(message, "that is its own constraint: Model.add", draft.place)
+                message = f"the part known to {robot.name} is over variables of {' and '.join(owners)} alone"
+                raise ModelError(message, "add it as a constraint of that robot: Model.add", draft.place)
         return found
 
     def team(self) -> Team:
@@ -145,22 +147,22 @@ class _Builder:
         return made
 
     def located(self, invalid: InvalidInputError) -> Exception:
-        """Return the first mistake of a team with the line that made it; `invalid` itself where none is known."""
+        """Return the first error of a team with its line in the program; `invalid` itself if no line is known."""
         for mistake in invalid.diagnostics:
             named = re.search(r"\b(?:constraint|predicate|relation|function) (\S+?)(?: |$)", mistake.file)
             if named and named[1] in self._places:
                 return ModelError(f"{mistake.file}: {mistake.message}", mistake.hint, self._places[named[1]])
         return invalid
 
-    def _variables(self, robot: ModelRobot) -> list[TeamVariable]:
+    def _variables(self, robot: ModelRobot) -> list[Variable]:
         if not robot.variables:
-            raise ModelError(f"{robot.name} has no variable", "a robot decides about one at least", robot.place)
+            raise ModelError(f"{robot.name} has no variable", "a robot needs at least one", robot.place)
         found = []
         for variable in robot.variables.values():
             symbols = self._symbols if variable.codes.symbolic else ()
             key = variable.codes.ranges, symbols
             name = variable.domain_name or self._domains.setdefault(key, f"D{len(self._domains) + 1}")
-            found.append(TeamVariable(variable.name, Domain(name, variable.codes.ranges, symbols)))
+            found.append(Variable(variable.name, Domain(name, variable.codes.ranges, symbols)))
         return found
 
     def _scenario(self, team: Team) -> tuple[ScenarioEvent, ...]:
@@ -181,16 +183,16 @@ class _Builder:
         changing = _Changing(self, order, held)
         return (*events, *(ScenarioEvent(tuple(changing.changes(event)), event.after) for event in self._model.events))
 
-    def finished_rule(self, rule: Rule) -> list[Constraint]:
-        """Return what a constraint becomes that an event adds."""
+    def finished_rule(self, rule: ModelConstraint) -> list[Constraint]:
+        """Return the constraints of the team for a constraint that an event adds."""
         symbolic = [variable.name for variable in self._model.variables.values() if variable.codes.symbolic]
         return with_marked_symbols([self._finished(draft) for draft in self._added[rule]], symbolic)
 
     def joining(self, robot: ModelRobot, order: Sequence[str], constraints: Iterable[Constraint]) -> Robot:
-        """Return a robot that joins after those in `order`, with its constraints."""
+        """Return a robot that joins after the robots in `order`, with its constraints."""
         everybody = {name: self._variables(self._model.robots[name]) for name in order if name in self._model.robots}
         extras = Extras(
-            links=[*itertools.pairwise(everybody)],  # the order is that of the team, also where no constraint says it
+            links=[*itertools.pairwise(everybody)],  # keeps the order of robots without common constraints
             topics={robot.name: robot.topics},
             weights={robot.name: robot.weight},
         )
@@ -200,26 +202,26 @@ class _Builder:
         return replace(team[robot.name], children=())
 
     def owners(self, constraint: Constraint, order: Sequence[str]) -> list[str]:
-        """Return the robots of a constraint's scope, the highest first."""
+        """Return the robots of a constraint's scope, the highest priority first."""
         owners = {self._model.variables[name].owner for name in constraint.variables}
         return [name for name in order if name in owners]
 
     @property
-    def rules(self) -> list[Rule]:
+    def rules(self) -> list[ModelConstraint]:
         """The constraints before the first event."""
         return [*self._model.constraints, *(part for robot in self._robots for part in robot.parts)]
 
-    def shared_by(self, rule: Rule, order: Sequence[str]) -> set[tuple[str, str, str]]:
-        """Return the name of `rule` with the two robots that hold it, for each constraint that it becomes."""
+    def shared_by(self, rule: ModelConstraint, order: Sequence[str]) -> set[tuple[str, str, str]]:
+        """Return the name of `rule` and the two robots that have it, for each of its constraints."""
         scopes = [{variable.owner for variable in draft.scope} for draft in rule.drafts()]
         robots = [[name for name in order if name in scope] for scope in scopes]
         return {(rule.name, names[-1], names[-2]) for names in robots if len(names) > 1}
 
 
 class _Changing:
-    """The robots and the constraints between them, while events happen.
+    """The robots and the constraints between them, as events change them.
 
-    `held`: the name of each constraint with the two robots that hold it.
+    `held`: the name of each constraint and the two robots that have it.
     """
 
     def __init__(self, builder: _Builder, order: list[str], held: set[tuple[str, str, str]]) -> None:
@@ -228,18 +230,18 @@ class _Changing:
         self._held = held
         self._rules = builder.rules
 
-    def changes(self, event: Event) -> Iterable[Change]:
+    def changes(self, event: ModelEvent) -> Iterable[Change]:
         """Yield the changes of an event."""
         new = {robot.name: list[Constraint]() for robot in event.steps if isinstance(robot, ModelRobot)}
         self._order += new
-        added: dict[Rule, list[AddConstraint]] = {}
-        for rule in (step for step in event.steps if isinstance(step, Rule)):
+        added: dict[ModelConstraint, list[AddConstraint]] = {}
+        for rule in (step for step in event.steps if isinstance(step, ModelConstraint)):
             added[rule] = self._added(rule, new)
         for step in event.steps:
             if isinstance(step, ModelRobot):
                 before = self._order[: self._order.index(step.name)]
                 yield AddAgent(self._builder.joining(step, before, new[step.name]))
-            elif isinstance(step, Rule):
+            elif isinstance(step, ModelConstraint):
                 self._held |= self._builder.shared_by(step, self._order)
                 self._rules.append(step)
                 yield from added[step]
@@ -248,20 +250,20 @@ class _Changing:
             else:
                 yield step
 
-    def _added(self, rule: Rule, new: dict[str, list[Constraint]]) -> list[AddConstraint]:
-        """Return the constraints that two robots get; those of robots that join go with them."""
+    def _added(self, rule: ModelConstraint, new: dict[str, list[Constraint]]) -> list[AddConstraint]:
+        """Return the constraints added between robots of the team; constraints of joining robots are added to `new`."""
         found = []
         for constraint in self._builder.finished_rule(rule):
             if not constraint.variables and not constraint.price({}):
                 continue
             if not constraint.variables:
                 hint = "an event adds constraints between robots: add it to the model"
-                raise ModelError(f"the constraint {rule.name} is violated whatever the values are", hint, rule.place)
+                raise ModelError(f"the constraint {rule.name} is always violated", hint, rule.place)
             *others, lowest = self._builder.owners(constraint, self._order)
             if lowest in new:
                 new[lowest].append(constraint)
             elif not others:
-                hint = "an event adds constraints between robots, and values of one"
+                hint = "an event can add constraints between robots, but only values to one robot"
                 raise ModelError(f"the constraint {rule.name} is over variables of {lowest} alone", hint, rule.place)
             else:
                 found.append(AddConstraint(lowest, others[-1], constraint))
@@ -270,7 +272,7 @@ class _Changing:
     def _removed(self, removal: Removal) -> Iterable[RemoveConstraint]:
         found = {one for one in self._held if one[0] == removal.name}
         there = [one for one in self._rules if one.name == removal.name]
-        if isinstance(removal.removed, Rule):
+        if isinstance(removal.removed, ModelConstraint):
             found &= self._builder.shared_by(removal.removed, self._order)
             for other in (one for one in there if one is not removal.removed):
                 if self._builder.shared_by(other, self._order) & found:
@@ -278,7 +280,9 @@ class _Changing:
                     raise ModelError(f"{removal.removed!r} has the name and robots of {other!r}", hint, removal.place)
             there = [removal.removed]
         if not found:
-            hint = did_you_mean(removal.name, {one[0] for one in self._held}, "an event removes those between robots")
+            hint = did_you_mean(
+                removal.name, {one[0] for one in self._held}, "events remove constraints between robots"
+            )
             raise ModelError(f"robots share no constraint {removal.name!r} at that time", hint, removal.place)
         self._held -= found
         self._rules = [one for one in self._rules if not any(one is removed for removed in there)]

@@ -1,4 +1,4 @@
-"""What operators on terms mean, in exact numbers, and how they are shown."""
+"""The operators of terms: their values, in exact numbers, and their text."""
 
 from __future__ import annotations
 
@@ -6,28 +6,35 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from robochoc.modelling.codes import BOOLEAN, NUMBER, Kind
+from robochoc.modelling.codes import BOOLEAN, NUMBER, ValueKind
+from robochoc.modelling.errors import ModelError
 from robochoc.modelling.numbers import exact, is_number, shown
-from robochoc.modelling.places import ModelError
 
 MAX_BITS = 4096
 """The maximum number of bits of a power."""
 
 
 class UndefinedTermError(ArithmeticError):
-    """A term has no value here: a division by zero."""
+    """A term has no value for this assignment, such as a division by zero."""
 
 
-class Meaning(NamedTuple):
-    """An operator: what it gives and computes. A `lazy` one gets functions that return its arguments' values."""
+class Operator(NamedTuple):
+    """An operator of terms.
 
-    gives: Kind
+    Attributes:
+        gives: The kind of its values.
+        compute: Computes a value from the arguments' values.
+        shown: Its name or symbol.
+        lazy: The same from functions that return the arguments' values, for operators that do not need all of them.
+    """
+
+    gives: ValueKind
     compute: Callable[..., object]
     shown: str
     lazy: Callable[..., object] | None = None
 
     def text(self, arguments: Sequence[str]) -> str:
-        """Return it with `arguments`, as a user would write it."""
+        """Return the operation on `arguments` as a user would write it."""
         if self.shown.isidentifier():
             return f"{self.shown}({', '.join(arguments)})"
         if len(arguments) == 1:
@@ -70,7 +77,7 @@ def _product(left: object, right: object) -> object:
 
 
 def _element(index: object, *array: object) -> object:
-    """Return the element of an array at an index from 0 on. Negative ones are outside: nothing counts from the end."""
+    """Return the element at an index from 0. Negative indices are undefined."""
     place = exact(index)
     if not isinstance(place, int) or not 0 <= place < len(array):
         raise UndefinedTermError
@@ -81,35 +88,35 @@ def _key(value: object) -> object:
     return exact(value) if is_number(value) else value
 
 
-MEANINGS: dict[str, Meaning] = {
-    "abs": Meaning(NUMBER, lambda x: abs(exact(x)), "abs"),
-    "mul": Meaning(NUMBER, _product, "*"),
-    "floordiv": Meaning(NUMBER, _quotient, "//"),
-    "mod": Meaning(NUMBER, _remainder, "%"),
-    "pow": Meaning(NUMBER, _power, "**"),
-    "min": Meaning(NUMBER, lambda *terms: min(map(exact, terms)), "minimum"),
-    "max": Meaning(NUMBER, lambda *terms: max(map(exact, terms)), "maximum"),
-    "if": Meaning(
+OPERATORS: dict[str, Operator] = {
+    "abs": Operator(NUMBER, lambda x: abs(exact(x)), "abs"),
+    "mul": Operator(NUMBER, _product, "*"),
+    "floordiv": Operator(NUMBER, _quotient, "//"),
+    "mod": Operator(NUMBER, _remainder, "%"),
+    "pow": Operator(NUMBER, _power, "**"),
+    "min": Operator(NUMBER, lambda *terms: min(map(exact, terms)), "minimum"),
+    "max": Operator(NUMBER, lambda *terms: max(map(exact, terms)), "maximum"),
+    "if": Operator(
         NUMBER,
         lambda test, then, otherwise: then if test else otherwise,
         "if_then_else",
         lambda test, then, otherwise: then() if test() else otherwise(),
     ),
-    "eq": Meaning(BOOLEAN, _equal, "=="),
-    "ne": Meaning(BOOLEAN, lambda x, y: not _equal(x, y), "!="),
-    "in": Meaning(BOOLEAN, lambda x, *members: any(_equal(x, one) for one in members), "is_in"),
-    "lt": Meaning(BOOLEAN, lambda x, y: exact(x) < exact(y), "<"),
-    "le": Meaning(BOOLEAN, lambda x, y: exact(x) <= exact(y), "<="),
-    "gt": Meaning(BOOLEAN, lambda x, y: exact(x) > exact(y), ">"),
-    "ge": Meaning(BOOLEAN, lambda x, y: exact(x) >= exact(y), ">="),
-    "not": Meaning(BOOLEAN, lambda x: not x, "~"),
-    "and": Meaning(BOOLEAN, lambda *terms: all(terms), "&"),
-    "or": Meaning(BOOLEAN, lambda *terms: any(terms), "|"),
-    "xor": Meaning(BOOLEAN, lambda x, y: bool(x) != bool(y), "^"),
-    "implies": Meaning(BOOLEAN, lambda x, y: bool(y) or not x, "implies"),
-    "different": Meaning(BOOLEAN, lambda *terms: len(set(map(_key, terms))) == len(terms), "all_different"),
-    "element": Meaning(NUMBER, _element, "element"),
+    "eq": Operator(BOOLEAN, _equal, "=="),
+    "ne": Operator(BOOLEAN, lambda x, y: not _equal(x, y), "!="),
+    "in": Operator(BOOLEAN, lambda x, *members: any(_equal(x, one) for one in members), "is_in"),
+    "lt": Operator(BOOLEAN, lambda x, y: exact(x) < exact(y), "<"),
+    "le": Operator(BOOLEAN, lambda x, y: exact(x) <= exact(y), "<="),
+    "gt": Operator(BOOLEAN, lambda x, y: exact(x) > exact(y), ">"),
+    "ge": Operator(BOOLEAN, lambda x, y: exact(x) >= exact(y), ">="),
+    "not": Operator(BOOLEAN, lambda x: not x, "~"),
+    "and": Operator(BOOLEAN, lambda *terms: all(terms), "&"),
+    "or": Operator(BOOLEAN, lambda *terms: any(terms), "|"),
+    "xor": Operator(BOOLEAN, lambda x, y: bool(x) != bool(y), "^"),
+    "implies": Operator(BOOLEAN, lambda x, y: bool(y) or not x, "implies"),
+    "different": Operator(BOOLEAN, lambda *terms: len(set(map(_key, terms))) == len(terms), "all_different"),
+    "element": Operator(NUMBER, _element, "element"),
 }
 
 PARTIAL = frozenset(("floordiv", "mod", "pow", "element"))
-"""The operators that may have no value, however their arguments are."""
+"""The operators that may be undefined."""

@@ -1,4 +1,4 @@
-"""What a model keeps of what users add to it: constraints, terms of the objective, parts, and their lines."""
+"""Constraints of a model, as `Model.add` and `ModelRobot.knows` return them."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robochoc.model.constraint import WhenAbsent
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import Exact, exact, is_truth, shown
-from robochoc.modelling.places import ModelError, ModelTypeError, Place
-from robochoc.modelling.terms import Term, Variable, condition
+from robochoc.modelling.terms import ModelVariable, Term, condition
 
 if TYPE_CHECKING:
     from robochoc.modelling.drafts import Draft
 
 
 @dataclass(frozen=True, eq=False)
-class Rule:
-    """A constraint of a model: what `Model.add` returns.
+class ModelConstraint:
+    """A constraint of a model, the result of `Model.add`.
 
     Attributes:
         name: Its name.
         term: The condition.
-        cost: What it costs to break it. None: it must hold.
+        cost: The cost of violating it. None: it is hard.
         place: The line that added it.
         when_absent: Its meaning when a robot of its scope is absent. None: as its form implies.
     """
@@ -30,7 +30,7 @@ class Rule:
     name: str
     term: Term
     cost: Exact | None
-    place: Place
+    place: SourceLine
     when_absent: WhenAbsent | None = None
 
     def __repr__(self) -> str:
@@ -41,7 +41,7 @@ class Rule:
         from robochoc.modelling.drafts import conditions, soft_condition  # noqa: PLC0415 - they need the formats
 
         if self.cost is None:
-            in_pairs = self.when_absent != WhenAbsent.DROP  # otherwise pairs of robots that stay would remain
+            in_pairs = self.when_absent != WhenAbsent.DROP  # pairs of the remaining robots would stay
             drafts = conditions(self.term, self.name, self.place, in_pairs=in_pairs)
         else:
             drafts = iter([soft_condition(self.term, self.cost, self.name, self.place)])
@@ -49,44 +49,43 @@ class Rule:
             yield draft.with_when_absent(self.when_absent)
 
 
-def conditions_in(given: object, place: Place) -> list[Term]:
-    """Return the conditions that a user adds at once: one, or a list of them, which may hold lists.
+def conditions_in(given: object, place: SourceLine) -> list[Term]:
+    """Return the conditions in `given`: a condition, or a nested list of conditions.
 
     Raises:
-        ModelError: if one is not a condition, or is Python's `False`, as `x is y` is.
+        ModelError: if an element is not a condition, or is Python's `False`, such as `x is y`.
     """
     if isinstance(given, Iterable) and not isinstance(given, (Term, str)):
         return [term for one in given for term in conditions_in(one, place)]
     if isinstance(given, Term):
         return [condition(given)]
     if not is_truth(given):
-        raise ModelTypeError(f"{given!r} is no condition", "compare terms: x != y", place)
+        raise ModelTypeError(f"{given!r} is not a condition", "compare terms: x != y", place)
     if not given:
-        raise ModelError("this constraint is False whatever the values are", "compare variables of the model", place)
+        raise ModelError("this constraint is always False", "compare variables of the model", place)
     return []
 
 
-def check_owned(term: Term, known: Mapping[str, Variable], place: Place, event: object = None) -> None:
-    """Raise `ModelError` unless the variables of `term` are in this model, and there at that time."""
+def check_owned(term: Term, known: Mapping[str, ModelVariable], place: SourceLine, event: object = None) -> None:
+    """Raise `ModelError` unless the model has the variables of `term`, already at the time of `event`."""
     for variable in term.variables:
         if known.get(variable.name) is not variable:
-            raise ModelError(
-                f"{variable!r}, made at {variable.place}, is no variable of this model", "use variables of one", place
-            )
+            message = f"{variable!r}, created at {variable.place}, is not a variable of this model"
+            raise ModelError(message, "use variables of one model", place)
         if variable.joins is not None and event is None:
-            hint = "add constraints with it to the event: event.add(...)"
-            raise ModelError(f"{variable.owner}, made at {variable.place}, joins later", hint, place)
+            hint = "add its constraints to the event: event.add(...)"
+            raise ModelError(f"{variable.owner}, created at {variable.place}, joins later", hint, place)
 
 
 def exact_or_none(cost: object) -> Exact | None:
-    """Return the cost of breaking a constraint; None: it must hold."""
+    """Return the exact cost of a constraint; None: it is hard."""
     return None if cost is None else exact(cost)
 
 
-def absence_or_none(when_absent: WhenAbsent | str | None, place: Place) -> WhenAbsent | None:
+def absence_or_none(when_absent: WhenAbsent | str | None, place: SourceLine) -> WhenAbsent | None:
     """Return the meaning of a constraint when a robot is absent; None: as its form implies. Raises `ModelError`."""
     try:
         return None if when_absent is None else WhenAbsent(when_absent)
     except ValueError:
         known = ", ".join(WhenAbsent)
-        raise ModelError(f"when_absent is {when_absent!r}", f"expected one of {known}", place) from None
+        raise ModelError(f"invalid when_absent {when_absent!r}", f"expected one of {known}", place) from None
