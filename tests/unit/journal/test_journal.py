@@ -8,6 +8,7 @@ import os
 import resource
 import sys
 import threading
+from decimal import Decimal
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -81,6 +82,13 @@ def test_what_goes_in_comes_out_in_both_forms(header: Header, events: list[AnyEv
     again = read_journal(text)
     assert [*lines_of(again)] == text.splitlines(keepends=True)
     assert len(again.events) == len(events)
+
+
+def test_decimal_costs_are_numbers_in_the_text_form() -> None:
+    event = Improved(t=0, cost=Decimal("1.50"), assignment={})
+    header = Header(team="t", protocol="p", runtime="processes", seed=0)
+    (line,) = list(lines_of(read_journal(told([event], header=header))))[1:]
+    assert b'"cost":1.5' in line
 
 
 @given(st.lists(st.floats(0, 1e6), min_size=1, max_size=10))
