@@ -7,6 +7,7 @@ import re
 import tomllib
 from pathlib import Path
 
+from tests.support.architecture_picture import PICTURE, picture
 from tests.support.cases import cases
 from tests.support.program import ROOT
 
@@ -92,6 +93,11 @@ def test_the_packages_of_the_page_are_in_the_order_of_the_layers() -> None:
     assert {*packages} == {*layers}
     layer_of = {package: number for number, layer in enumerate(contract["layers"]) for package in layer.split(" | ")}
     assert [layer_of[package] for package in packages] == sorted(layer_of[package] for package in packages)
+
+
+def test_the_picture_of_the_architecture_shows_the_layers() -> None:
+    """`python -m tests.support.architecture_picture` draws it."""
+    assert PICTURE.read_text(encoding="utf-8") == picture()
 
 
 def test_the_readme_is_short_and_shows_where_to_read_on() -> None:
