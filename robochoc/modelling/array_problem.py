@@ -25,8 +25,7 @@ from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import counted
 from robochoc.protocols.settings import settings_of
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.cycles import Domain, Value
+from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
 from robochoc.run.option_values import texts_by_name
 from robochoc.run.options import Options
 from robochoc.run.protocol_settings import refuse_settings

@@ -7,8 +7,8 @@ from typing import get_args
 
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleSettings
 from robochoc.solver.encoding import UnsupportedError
 
 

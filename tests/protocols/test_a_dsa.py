@@ -7,9 +7,7 @@ from random import Random
 import pytest
 
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search.a_dsa import ADSA
-from robochoc.protocols.local_search.messages.a_dsa import Tick
-from robochoc.protocols.local_search.settings.a_dsa import ADSASettings
+from robochoc.protocols.local_search.a_dsa import ADSA, ADSASettings, Tick
 from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.agents import replies, robot_of, started, value

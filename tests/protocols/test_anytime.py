@@ -19,10 +19,8 @@ from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.protocols.shared.anytime import Anytime, BreadthFirstTree
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import Anytime, Best, BreadthFirstTree, Paid, Place, Step
+from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.incumbent import costs_by_cycle
 from robochoc.run.protocol_settings import refuse_settings

@@ -17,9 +17,8 @@ from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM
 from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
 from robochoc.protocols.asymmetric.messages.transfers import Transfer
 from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
-from robochoc.protocols.local_search.messages.mgm import Gain
-from robochoc.protocols.shared.cycles import NO_GAIN
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.local_search.mgm import Gain
+from robochoc.protocols.shared.cycles import NO_GAIN, Value
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled import LexicographicCost
 from tests.support.agents import after, assert_refused, replies, started_robot, value

@@ -11,11 +11,9 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.inference.async_maxsum import AsyncMaxSum
-from robochoc.protocols.inference.messages.async_maxsum import Q, R
-from robochoc.protocols.inference.settings.async_maxsum import AsyncMaxSumSettings
+from robochoc.protocols.inference.async_maxsum import AsyncMaxSum, AsyncMaxSumSettings, Q, R
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.shared.cycles import Domain
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import after, assert_refused, replies, robot_of, started, value
 from tests.support.brute_force import least_cost

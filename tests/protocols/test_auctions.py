@@ -20,9 +20,9 @@ from robochoc.model.message import Message
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.protocols.auctions.messages.cbaa import WinningBids
-from robochoc.protocols.auctions.messages.cbba import Bundles
-from robochoc.protocols.auctions.messages.ssi import Bid, Won
+from robochoc.protocols.auctions.cbaa import WinningBids
+from robochoc.protocols.auctions.cbba import Bundles
+from robochoc.protocols.auctions.ssi import Bid, Won
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess

@@ -14,11 +14,11 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.inference.bounded_maxsum import BoundedMaxSum
-from robochoc.protocols.inference.messages.bounded_maxsum import Assign, Branch, Dependency, Fragment
+from robochoc.protocols.inference.bounded_maxsum import Assign, BoundedMaxSum, Branch, Dependency
+from robochoc.protocols.inference.spanning import Fragment
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.messages.cycles import Domain
-from robochoc.protocols.shared.messages.cycles import Value as ValueMessage
+from robochoc.protocols.shared.cycles import Domain
+from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import exact_costs
 from robochoc.solver.compiled import LocalProblem

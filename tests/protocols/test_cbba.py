@@ -9,8 +9,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.protocols.auctions.cbba import CBBA, NOBODY, Standing
-from robochoc.protocols.auctions.messages.cbba import Bundles
+from robochoc.protocols.auctions.cbba import CBBA, NOBODY, Bundles, Standing
 from tests.support.agents import assert_refused, replies, robot_of, started
 from tests.support.cases import cases
 

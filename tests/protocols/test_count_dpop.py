@@ -15,9 +15,8 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.count_dpop import CountDPOP
-from robochoc.protocols.inference.messages.count_dpop import MOST_BITS, CountDimensions, Counts
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Domain, Need, Proceed
+from robochoc.protocols.inference.count_dpop import MOST_BITS, CountDimensions, CountDPOP, Counts
+from robochoc.protocols.inference.dpop import UTIL, VALUE, Domain, Need, Proceed
 from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Withdrawal

@@ -21,8 +21,7 @@ from robochoc.protocols.local_search.d_gibbs import DGibbs
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_known
 from robochoc.run.registry import protocol_named, protocol_names

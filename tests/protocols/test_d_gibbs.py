@@ -10,9 +10,7 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.local_search.d_gibbs import DGibbs
-from robochoc.protocols.local_search.messages.d_gibbs import Difference, Finish, Value
-from robochoc.protocols.local_search.settings.d_gibbs import DGibbsSettings
+from robochoc.protocols.local_search.d_gibbs import DGibbs, DGibbsSettings, Difference, Finish, Value
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.run.incumbent import costs_by_cycle
 from robochoc.solver.agent_problem import RunParameters

@@ -11,7 +11,7 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.satisfaction.dba import DBA
 from robochoc.protocols.satisfaction.messages.dba import Improve
 from robochoc.protocols.satisfaction.settings.dba import DBASettings
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.verification.checker import violations

@@ -11,8 +11,7 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
-from robochoc.protocols.inference.dpop import DPOP
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cost_problems import with_costs

@@ -13,9 +13,8 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.protocols.inference.dpop import DPOP
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.protocols.inference.dpop_tables import Extent, bytes_of
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError

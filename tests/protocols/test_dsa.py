@@ -7,9 +7,8 @@ from random import Random
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search.dsa import DSA
-from robochoc.protocols.local_search.settings.dsa import DSASettings
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.local_search.dsa import DSA, DSASettings
+from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team

@@ -5,7 +5,7 @@ from __future__ import annotations
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa_sdp import DSASDP
 from robochoc.protocols.settings import settings_of
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 from tests.support.problems import team_of

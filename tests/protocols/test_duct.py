@@ -14,10 +14,15 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import DPOP
-from robochoc.protocols.local_search.duct import DUCT
-from robochoc.protocols.local_search.duct_samples import Samples
-from robochoc.protocols.local_search.messages.duct import Fixed, SampleContext, SampleCost, Separator
-from robochoc.protocols.local_search.settings.duct import DUCTSettings
+from robochoc.protocols.local_search.duct import (
+    DUCT,
+    DUCTSettings,
+    Fixed,
+    SampleContext,
+    SampleCost,
+    Samples,
+    Separator,
+)
 from robochoc.protocols.settings import settings_of
 from robochoc.solver.compiled import LexicographicCost
 from tests.support.agents import replies, value

@@ -11,23 +11,12 @@ import pytest
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.key_stream import KeyStream
-from robochoc.protocols.private.bisection import Bisection
 from robochoc.protocols.private.ed25519 import Ed25519, Group
 from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.protocols.private.encrypted_costs import CostCipher, Pair
-from robochoc.protocols.private.linear_order import OwnAxis, own_places
-from robochoc.protocols.private.messages.p2_dpop import (
-    AskAxis,
-    Axis,
-    CostRange,
-    CostSum,
-    EncryptedTable,
-    Gone,
-    Opening,
-    Plan,
-)
-from robochoc.protocols.private.messages.p32_dpop import Next
-from robochoc.protocols.private.p2_dpop import P2DPOP
+from robochoc.protocols.private.linear_order import AskAxis, Axis, CostRange, CostSum, Gone, OwnAxis, Plan, own_places
+from robochoc.protocols.private.p2_dpop import P2DPOP, Bisection, EncryptedTable, Opening
+from robochoc.protocols.private.rerooting import Next
 from robochoc.protocols.private.ring import Ring
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem

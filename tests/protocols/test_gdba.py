@@ -8,12 +8,10 @@ from random import Random
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search.gdba import GDBA, MOST
-from robochoc.protocols.local_search.messages.gdba import Improve
+from robochoc.protocols.local_search.gdba import GDBA, MOST, Improve
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.settings import settings_of
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.agents import replies, robot_of, started, value

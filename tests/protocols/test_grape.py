@@ -17,8 +17,7 @@ from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.costs import normalized
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.protocols.auctions.grape import GRAPE
-from robochoc.protocols.auctions.messages.grape import Partition
+from robochoc.protocols.auctions.grape import GRAPE, Partition
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, robot_of, started

@@ -11,12 +11,20 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search import kopt_groups
-from robochoc.protocols.local_search.kopt import KOpt
-from robochoc.protocols.local_search.kopt_groups import Neighbourhood
-from robochoc.protocols.local_search.messages.kopt import MoveTogether, Offer, Offers, Part, Region, Table, Values
-from robochoc.protocols.local_search.settings.kopt import KOptSettings
-from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.local_search import kopt
+from robochoc.protocols.local_search.kopt import (
+    KOpt,
+    KOptSettings,
+    MoveTogether,
+    Neighbourhood,
+    Offer,
+    Offers,
+    Part,
+    Region,
+    Table,
+    Values,
+)
+from robochoc.protocols.shared.cycles import Domain
 from robochoc.solver.encoding import TooLargeError
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
@@ -148,10 +156,10 @@ def test_a_message_of_another_phase_is_refused() -> None:
 
 
 def test_groups_that_are_too_large_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kopt_groups, "MOST_COMBINATIONS", 7)
+    monkeypatch.setattr(kopt, "MOST_COMBINATIONS", 7)
     with pytest.raises(TooLargeError, match="3 robots around RC have more than 7 combinations"):
         Neighbourhood("RC", parts(), RANK, 3, 1)
-    monkeypatch.setattr(kopt_groups, "MOST_GROUPS", 1)
+    monkeypatch.setattr(kopt, "MOST_GROUPS", 1)
     with pytest.raises(TooLargeError, match="RC is in more than 1 groups of 4 robots"):
         Neighbourhood("RC", parts(), RANK, 4, 2)
 

@@ -10,9 +10,8 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search.lamdls import LAMDLS
-from robochoc.protocols.local_search.messages.lamdls import Colour
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.local_search.lamdls import LAMDLS, Colour
+from robochoc.protocols.shared.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped

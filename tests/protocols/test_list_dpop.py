@@ -16,10 +16,9 @@ from robochoc.model.outcome import Metrics, Optima, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.findings import Findings, Listing
-from robochoc.protocols.inference.list_dpop import ListDPOP
-from robochoc.protocols.inference.messages.count_dpop import CountDimensions, Counts
-from robochoc.protocols.inference.messages.dpop import UTIL, Domain, Proceed
-from robochoc.protocols.inference.messages.list_dpop import ListedValues
+from robochoc.protocols.inference.count_dpop import CountDimensions, Counts
+from robochoc.protocols.inference.dpop import UTIL, Domain, Proceed
+from robochoc.protocols.inference.list_dpop import ListDPOP, ListedValues
 from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.listed_optima import put_together

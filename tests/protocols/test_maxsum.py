@@ -14,11 +14,9 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.inference import maxsum_factor
-from robochoc.protocols.inference.maxsum import MaxSum
+from robochoc.protocols.inference.maxsum import MaxSum, MaxSumSettings, Q, R
 from robochoc.protocols.inference.maxsum_factor import MOST, Factor, from_zero
-from robochoc.protocols.inference.messages.maxsum import Q, R
-from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
-from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.shared.cycles import Domain
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import shared_constraint
 from robochoc.solver.cost_table import CostTable

@@ -15,9 +15,8 @@ from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.model.wording import Wording
-from robochoc.protocols.inference.mb_dpop import MBDPOP
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Proceed
-from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth, Label
+from robochoc.protocols.inference.dpop import UTIL, VALUE, Proceed
+from robochoc.protocols.inference.mb_dpop import MBDPOP, Axis, Context, DomainAtDepth, Label
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value

@@ -5,9 +5,8 @@ from __future__ import annotations
 from random import Random
 
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search.messages.mgm import Gain
-from robochoc.protocols.local_search.mgm import MGM
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.local_search.mgm import MGM, Gain
+from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team

@@ -7,11 +7,9 @@ from random import Random
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.local_search.messages.mgm import Gain
-from robochoc.protocols.local_search.messages.mgm2 import Accept, Go, Offer, Reject
-from robochoc.protocols.local_search.mgm import MGM
-from robochoc.protocols.local_search.mgm2 import MGM2
-from robochoc.protocols.shared.messages.cycles import Domain, Value
+from robochoc.protocols.local_search.mgm import MGM, Gain
+from robochoc.protocols.local_search.mgm2 import MGM2, Accept, Go, Offer, Reject
+from robochoc.protocols.shared.cycles import Domain, Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team

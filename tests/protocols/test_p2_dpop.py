@@ -22,7 +22,7 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.privacy import Kind, Measure, privacy_of
 from robochoc.protocols import traits
 from robochoc.protocols.private.elgamal import TeamKey
-from robochoc.protocols.private.messages.p2_dpop import CostSum
+from robochoc.protocols.private.linear_order import CostSum
 from robochoc.protocols.private.p2_dpop import P2DPOP
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters

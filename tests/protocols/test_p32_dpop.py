@@ -19,8 +19,8 @@ from robochoc.model.problem import Team
 from robochoc.privacy import Kind, Measure, privacy_of
 from robochoc.protocols.key_stream import KeyStream
 from robochoc.protocols.private.ed25519 import Ed25519
-from robochoc.protocols.private.messages.p32_dpop import Join, Next, Setup, Stage, Vector
 from robochoc.protocols.private.p32_dpop import P32DPOP
+from robochoc.protocols.private.rerooting import Join, Next, Setup, Stage, Vector
 from robochoc.protocols.private.ring import Ring
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters

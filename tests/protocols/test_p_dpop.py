@@ -16,9 +16,8 @@ from robochoc.journal.journal import Header, JournalRecorder, read_journal
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.privacy import Kind, Measure, privacy_of
 from robochoc.protocols.key_stream import KeyStream, shuffled
-from robochoc.protocols.private.messages.anonymous_dfs import Back, Bounce, Token, Wave
-from robochoc.protocols.private.messages.p_dpop import BROKEN, WIDTH, numbers, packed
-from robochoc.protocols.private.p_dpop import KEY_BITS, PDPOP
+from robochoc.protocols.private.anonymous_dfs import Back, Bounce, Token, Wave
+from robochoc.protocols.private.p_dpop import BROKEN, KEY_BITS, PDPOP, WIDTH, numbers, packed
 from robochoc.replay import CannotReplayError, replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters

@@ -11,7 +11,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.regret_matching import UNIT, RegretMatching
 from robochoc.protocols.settings import settings_of
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team

@@ -11,18 +11,18 @@ import pytest
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Proceed
-from robochoc.protocols.inference.messages.mb_dpop import Axis, Context
-from robochoc.protocols.inference.messages.rmb_dpop import (
+from robochoc.protocols.inference.dpop import UTIL, VALUE, Proceed
+from robochoc.protocols.inference.mb_dpop import Axis, Context
+from robochoc.protocols.inference.rmb_dpop import (
+    RMBDPOP,
     Allocation,
     Candidate,
     ClusterLabel,
     CutUTIL,
     CutValue,
     SepDegree,
+    best,
 )
-from robochoc.protocols.inference.rmb_cuts import best
-from robochoc.protocols.inference.rmb_dpop import RMBDPOP
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cases import looped

@@ -30,9 +30,8 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.model.wording import Wording
-from robochoc.protocols.inference.messages.dpop import UTIL, Dimensions, Need
-from robochoc.protocols.inference.messages.s_dpop import Check, Reuse
-from robochoc.protocols.inference.s_dpop import SDPOP
+from robochoc.protocols.inference.dpop import UTIL, Dimensions, Need
+from robochoc.protocols.inference.s_dpop import SDPOP, Check, Reuse
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.agents import replies

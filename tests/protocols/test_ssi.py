@@ -7,10 +7,8 @@ from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.protocols.auctions.cbaa import CBAA
-from robochoc.protocols.auctions.messages.cbaa import WinningBids
-from robochoc.protocols.auctions.messages.ssi import Bid, Won
-from robochoc.protocols.auctions.ssi import SSI
+from robochoc.protocols.auctions.cbaa import CBAA, WinningBids
+from robochoc.protocols.auctions.ssi import SSI, Bid, Won
 from tests.support.agents import replies, robot_of, started
 from tests.support.cases import looped
 

@@ -8,10 +8,8 @@ from typing import TypeVar
 
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.inference.dpop import DPOP
-from robochoc.protocols.inference.mb_dpop import MBDPOP
-from robochoc.protocols.inference.messages.dpop import Dimensions, Domain, Need
-from robochoc.protocols.inference.messages.mb_dpop import DomainAtDepth
+from robochoc.protocols.inference.dpop import DPOP, Dimensions, Domain, Need
+from robochoc.protocols.inference.mb_dpop import MBDPOP, DomainAtDepth
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import equip
 from tests.support.agents import replies

@@ -18,8 +18,7 @@ from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import Tally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.shared.messages.cycles import Value
-from robochoc.protocols.shared.settings.cycles import CycleCount, CycleSettings
+from robochoc.protocols.shared.cycles import CycleCount, CycleSettings, Value
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from robochoc.communication.arrays.kinds import Floats, Integers
 from robochoc.model.message import Value, encode
-from robochoc.protocols.shared.messages.cycles import Domain
-from robochoc.protocols.shared.messages.cycles import Value as ValueMessage
+from robochoc.protocols.shared.cycles import Domain
+from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
 

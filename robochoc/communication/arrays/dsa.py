@@ -9,7 +9,7 @@ import numpy as np
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
 from robochoc.communication.arrays.kinds import Flags, Floats, Integers
 from robochoc.communication.arrays.layout import Group
-from robochoc.protocols.local_search.settings.dsa import DSASettings
+from robochoc.protocols.local_search.dsa import DSASettings
 
 
 class ArrayDSA(CycleRun):

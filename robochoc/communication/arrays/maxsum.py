@@ -17,11 +17,9 @@ from robochoc.communication.arrays.tally import list_bytes
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.inference.maxsum import MaxSumSettings, Q, R
 from robochoc.protocols.inference.maxsum_factor import MOST
-from robochoc.protocols.inference.messages.maxsum import Q, R
-from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
-from robochoc.protocols.shared.messages.cycles import Domain
-from robochoc.protocols.shared.settings.cycles import CycleCount
+from robochoc.protocols.shared.cycles import CycleCount, Domain
 from robochoc.solver.encoding import UnsupportedError
 
 _REST = len(encode(R([]))) - 1

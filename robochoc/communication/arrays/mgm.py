@@ -8,7 +8,7 @@ from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
 from robochoc.communication.arrays.kinds import Flags, Integers
 from robochoc.communication.arrays.tally import integer_bytes
 from robochoc.model.message import encode
-from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.local_search.mgm import Gain
 
 _REST = len(encode(Gain(0, 0))) - 2
 """Bytes of a gain but for its two numbers."""

@@ -14,9 +14,8 @@ from robochoc.communication.arrays.mgm import ArrayGainers
 from robochoc.communication.arrays.shared import Shared
 from robochoc.communication.arrays.tally import integer_bytes, list_bytes
 from robochoc.model.message import encode
-from robochoc.protocols.local_search.messages.mgm2 import Accept, Go, Offer, Reject
-from robochoc.protocols.local_search.settings.mgm2 import MGM2Settings
-from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.local_search.mgm2 import Accept, Go, MGM2Settings, Offer, Reject
+from robochoc.protocols.shared.cycles import Domain
 
 _NO_OFFER = len(encode(Offer(None)))
 _ACCEPT = len(encode(Accept(0, 0, 0))) - 3

@@ -39,8 +39,7 @@ from robochoc.model import message as wire
 from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
 from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 

@@ -41,12 +41,9 @@ from typing import ClassVar
 
 from robochoc.model import message as wire
 from robochoc.protocols.asymmetric.messages.transfers import Transfer
-from robochoc.protocols.local_search.messages.mgm import Gain
-from robochoc.protocols.local_search.mgm import Gainers
+from robochoc.protocols.local_search.mgm import Gain, Gainers
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, gain
-from robochoc.protocols.shared.messages.cycles import Value
-from robochoc.protocols.shared.settings.cycles import CycleCount
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 

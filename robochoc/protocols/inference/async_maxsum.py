@@ -42,15 +42,65 @@ from typing import ClassVar, assert_never, cast
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.inference.maxsum_factor import Row, cheapest, from_zero, total, without_each
-from robochoc.protocols.inference.maxsum_functions import Functions, checked
-from robochoc.protocols.inference.messages.async_maxsum import Q, R
-from robochoc.protocols.inference.settings.async_maxsum import AsyncMaxSumSettings
+from robochoc.model.wording import Wording
+from robochoc.protocols.inference import maxsum
+from robochoc.protocols.inference.maxsum_factor import Functions, Row, cheapest, checked, from_zero, total, without_each
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class AsyncMaxSumSettings(Settings, frozen=True):
+    """`damping`: the weight of the last message. `preference`: the maximum for a value.
+
+    `tolerance`: smaller changes are not told. `limit`: the number of messages to each neighbour.
+    """
+
+    damping: float = 0.5
+    preference: float = 0.01
+    tolerance: float = 0.0001
+    limit: int = 200
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.damping < 1:
+            raise ValueError(f"damping is {self.damping:g}; it must be from 0 to below 1")
+        for name in ("preference", "tolerance"):
+            given = getattr(self, name)
+            if not 0 <= given < INFINITE:
+                raise ValueError(f"{name} is {given:g}; it must be a number, 0 or more")
+        if self.limit < 1:
+            raise ValueError(f"limit is {self.limit}; it must be 1 or more")
+
+
+class R(maxsum.R, frozen=True):
+    """The costs of `maxsum.R`; `settled`: they are not damped. Otherwise the receiver answers, and more follows."""
+
+    settled: bool
+
+    act = maxsum.R.act
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{super().in_words(words)}{'' if self.settled else MORE}"
+
+
+class Q(maxsum.Q, frozen=True):
+    """The costs of `maxsum.Q`; `settled`: they are not damped. Otherwise the receiver answers, and more follows."""
+
+    settled: bool
+
+    act = maxsum.Q.act
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{super().in_words(words)}{'' if self.settled else MORE}"
+
+
+MORE = " for the moment"
+
 
 REPEATS = 10
 """The number of times that a robot tells everything again where messages are lost."""

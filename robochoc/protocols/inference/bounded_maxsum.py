@@ -41,32 +41,85 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from robochoc.model.message import Value
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
+from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording, cost_text, costs_text
+from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, total
-from robochoc.protocols.inference.maxsum_functions import checked
-from robochoc.protocols.inference.messages.bounded_maxsum import (
-    Assign,
-    Branch,
-    Choice,
-    Dependency,
-    Fragment,
-    Heaviest,
-    Merged,
-    NewRoot,
-)
-from robochoc.protocols.inference.spanning import SpanningProtocol
+from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, checked, total
+from robochoc.protocols.inference.spanning import Choice, Fragment, Heaviest, Merged, NewRoot, SpanningProtocol
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.messages.cycles import Domain
-from robochoc.protocols.shared.messages.cycles import Value as ValueMessage
+from robochoc.protocols.shared.cycles import Domain
+from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import check_exact
 
 if TYPE_CHECKING:
     from robochoc.solver.cost_table import Array
+
+
+class Dependency(Message, frozen=True):
+    """The sender's function of both robots: its `weight`, and what stays for the receiver if it is cut.
+
+    `weight` is None where there is no function. `rest` is empty where the sender keeps the rest.
+    """
+
+    weight: float | None
+    rest: list[float]
+
+    act = Act(Performative.INFORM, "the receiver comes to know how much the function binds both")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if self.weight is None:
+            return f"no function joins me and {words.receiver}"
+        return f"without our function, costs are at most {cost_text(self.weight)} off"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class Branch(Message, frozen=True):
+    """A lower bound on the cost of the sender's branch.
+
+    `costs` are of the receiver's values, if the sender holds their function (R), and of its own otherwise (Q). `cut`
+    is the weight of all that was cut there, `most` what all could add up to.
+    """
+
+    costs: list[float]
+    cut: float
+    most: float
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
+        """Return what the sender says."""
+        return f"my branch costs {costs_text(self.costs)}, and up to {cost_text(self.cut)} more"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself, as constraints are cut."""
+        return NOTHING
+
+
+class Assign(Message, frozen=True):
+    """The receiver's value: the best for the value of the sender, who holds their function."""
+
+    value: Value
+
+    act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"take {self.value} as your value, {words.receiver}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class BoundedMaxSum(SpanningProtocol):

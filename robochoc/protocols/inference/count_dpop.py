@@ -38,31 +38,163 @@ Choices:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import assert_never, cast
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, assert_never, cast
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
+from robochoc.model.wording import Wording, counted
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.dpop import DPOP, keep_once
-from robochoc.protocols.inference.dpop_counts import (
-    IncomingNumbers,
-    Numbers,
-    bytes_of_numbers,
-    bytes_to_count,
-    count_attaining,
-    numbers_of,
-    packed_numbers,
-)
-from robochoc.protocols.inference.dpop_tables import Codes, Extent
-from robochoc.protocols.inference.messages.count_dpop import MOST_BITS, CountDimensions, Counts
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Domain, Need, Proceed
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, keep_once
+from robochoc.protocols.inference.dpop_tables import PIECE, Codes, Extent, Table, costs_for
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
+
+MOST_BITS = 1 << 20
+"""Stands for all that is longer, too: it ends the run."""
+
+
+Bits = Annotated[int, msgspec.Meta(ge=0, le=MOST_BITS)]
+
+
+class CountDimensions(Dimensions, frozen=True):
+    """DPOP's `Dimensions`; `bits` are enough for the number of all assignments of the sender's subtree."""
+
+    bits: Bits
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{super().in_words(words)}; {counted(self.bits, 'bit')} are enough for my numbers"
+
+
+class Counts(Message, frozen=True):
+    """A piece of the sender's table of numbers, in the order of UTIL's cells: how many assignments attain each cost.
+
+    `numbers` are unsigned integers of `width` bytes, little-endian, of any size.
+    """
+
+    width: Annotated[int, msgspec.Meta(ge=1, le=MOST_BITS // 8)]
+    numbers: bytes
+
+    act = Act(Performative.INFORM, "the receiver comes to know in how many ways the sender's subtree attains its costs")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        cells = counted(len(self.numbers) // self.width, "cell")
+        return f"in how many ways my subtree attains the costs of my table: {cells}, of {counted(self.width, 'byte')}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+Numbers = NDArray[Any]
+
+
+WORD = 64
+
+
+_OBJECT = 40
+"""Bytes of Python's for an integer, besides its digits: its header, and the table's pointer to it."""
+
+
+_SCRATCH = 24
+"""Bytes for each cell while costs are compared: two sums, and what they have in common."""
+
+
+def bytes_of_numbers(cells: int, bits: int) -> int:
+    """Return the size of a table of numbers below 2^`bits`."""
+    return cells * (8 if bits <= WORD else _OBJECT + bits // 7)
+
+
+def bytes_to_count(cells: int, bits: int, below: int) -> int:
+    """Return the peak size of all that counting needs: the children's tables, `below` bytes, and the own ones.
+
+    The own table is there four times: a product, the sum, what is between, and the piece that is sent.
+    """
+    return 4 * bytes_of_numbers(cells, bits) + cells * _SCRATCH + 2 * below
+
+
+def count_attaining(
+    least: Codes, charges: Sequence[float], tables: Sequence[Table], own: Numbers, below: Sequence[Numbers]
+) -> Numbers:
+    """Return how many assignments attain each cost of `least`: none where it is infinite.
+
+    Args:
+        least: The least costs, of `tables` joined.
+        charges: What the own values cost.
+        tables: Tables of costs: the own axis first, then the axes of `least` (see `aligned`).
+        own: How many local solutions stand behind each own value.
+        below: The children's tables of numbers, with the same axes.
+    """
+    wanted = costs_for(least[np.newaxis, ...], 0)
+    found = np.zeros(least.shape, own.dtype)
+    for value, charge in enumerate(charges):
+        joined = np.full(least.shape, charge, np.float64)
+        for table in tables:
+            joined += costs_for(table, value)
+        product = np.full(least.shape, own[value], own.dtype)
+        for numbers in below:
+            product *= numbers[value if len(numbers) > 1 else 0]
+        product *= (joined == wanted) & (joined < math.inf)
+        found += product
+    return found
+
+
+def numbers_of(values: Sequence[int], bits: int) -> Numbers:
+    """Return a table of these values, with room for numbers below 2^`bits`."""
+    return np.array(values, np.uint64 if bits <= WORD else np.object_)
+
+
+def packed_numbers(table: Numbers) -> Iterator[tuple[int, bytes]]:
+    """Yield `table` in pieces for the wire, with as few bytes per number as the largest one needs."""
+    flat = table.reshape(-1)
+    width = max(1, -(-int(flat.max()).bit_length() // 8))
+    step = max(1, PIECE // width)
+    for start in range(0, flat.size, step):
+        yield width, b"".join([int(one).to_bytes(width, "little") for one in flat[start : start + step]])
+
+
+class IncomingNumbers:
+    """A table of numbers below 2^`bits` that arrives in pieces, to go with `costs`, which are there already."""
+
+    def __init__(self, costs: Codes, bits: int, own_bits: int) -> None:
+        self._costs = costs
+        self._bits = bits
+        self._numbers: list[int] = []
+        self._own_bits = own_bits
+
+    @property
+    def complete(self) -> bool:
+        """Whether the whole table has arrived."""
+        return len(self._numbers) == self._costs.size
+
+    @property
+    def table(self) -> Numbers:
+        """The numbers, in a table with the shape of the costs."""
+        return numbers_of(self._numbers, self._own_bits).reshape(self._costs.shape)
+
+    def add(self, width: int, piece: bytes) -> None:
+        """Append the next piece. Raises `ValueError` for bytes that do not fit."""
+        cells, odd = divmod(len(piece), width)
+        start, left = len(self._numbers), self._costs.size - len(self._numbers)
+        if odd or not 0 < cells <= left or width > max(1, -(-self._bits // 8)):
+            raise ValueError(f"{len(piece)} bytes, {width} a number, are no piece of a table that lacks {left}")
+        numbers = [int.from_bytes(piece[at : at + width], "little") for at in range(0, len(piece), width)]
+        if max(numbers).bit_length() > self._bits:
+            raise ValueError(f"a number is larger than 2^{self._bits}")
+        finite = costs_for(self._costs.reshape(1, -1)[:, start : start + cells], 0) < math.inf
+        if not np.array_equal(finite, [number > 0 for number in numbers]):
+            raise ValueError("a cost without an assignment, or assignments that cost infinitely much")
+        self._numbers += numbers
 
 
 class CountDPOP(DPOP):

@@ -40,23 +40,66 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, NamedTuple, assert_never, cast
+from typing import Annotated, ClassVar, NamedTuple, assert_never, cast
 
 import msgspec
 
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message
+from robochoc.model.wording import Wording, counted
 from robochoc.protocols.findings import Findings, Listing
-from robochoc.protocols.inference.count_dpop import CountDPOP
-from robochoc.protocols.inference.dpop_counts import Numbers, bytes_of_numbers, numbers_of
+from robochoc.protocols.inference.count_dpop import (
+    MOST_BITS,
+    CountDimensions,
+    CountDPOP,
+    Counts,
+    Numbers,
+    bytes_of_numbers,
+    numbers_of,
+)
+from robochoc.protocols.inference.dpop import UTIL, Domain, DPOPSettings, Proceed
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, cost_at, place_at, width_of
-from robochoc.protocols.inference.messages.count_dpop import MOST_BITS, CountDimensions, Counts
-from robochoc.protocols.inference.messages.dpop import UTIL, Domain, Proceed
-from robochoc.protocols.inference.messages.list_dpop import ListedValues
-from robochoc.protocols.inference.settings.list_dpop import ListDPOPSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+MOST_LISTED = 10_000
+
+
+class ListDPOPSettings(DPOPSettings, frozen=True):
+    """`limit`: the most optima that are listed. `memory`: the bytes that the tables of a robot may take."""
+
+    limit: int = 100
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` unless `memory` is positive, and `limit` is too and not too large."""
+        super().__post_init__()
+        if not 1 <= self.limit <= MOST_LISTED:
+            raise ValueError(f"limit is a number of optima from 1 to {MOST_LISTED:,}, not {self.limit}")
+
+
+Number = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]+\Z", max_length=MOST_BITS // 4)]
+"""In hexadecimal digits, as it may need more than 64 bits."""
+
+
+class ListedValues(Message, frozen=True):
+    """For each optimum that is listed, what DPOP's VALUE has for one, and which of several the receiver's subtree has.
+
+    `assignments` are the places of the values of the robots in the receiver's separator. `numbers` count, from 0 on,
+    the cheapest assignments of its subtree under these values.
+    """
+
+    assignments: list[list[int]]
+    numbers: list[Number]
+
+    act = Act(Performative.INFORM, "the receiver comes to know the values above it in each optimum")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        optima = "optimum" if len(self.numbers) == 1 else "optima"
+        different = counted(len({*map(tuple, self.assignments)}), "combination")
+        return f"{len(self.numbers):,} {optima}, with {different} of values of the robots in your separator"
 
 
 class KeptTables(NamedTuple):

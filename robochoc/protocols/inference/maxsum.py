@@ -60,17 +60,92 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording, costs_text
 from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, without_each
-from robochoc.protocols.inference.messages.maxsum import Q, R
-from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+MAX_SPLIT = 0.5
+"""With this share both halves of a function are alike."""
+
+
+class MaxSumSettings(CycleSettings, frozen=True):
+    """`damping`: the weight of the last Q. `preference`: the maximum for a value. `cycles`: the number of cycles.
+
+    `split`: each function becomes two, and the share of each entry is drawn from `split` to 1 - `split`. 0: none is.
+    """
+
+    damping: float = 0.5
+    preference: float = 0.01
+    split: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.damping < 1:
+            raise ValueError(f"damping is {self.damping:g}; it must be from 0 to below 1")
+        if not 0 <= self.preference < INFINITE:
+            raise ValueError(f"preference is {self.preference:g}; it must be a number, 0 or more")
+        if not 0 <= self.split <= MAX_SPLIT:
+            raise ValueError(f"split is {self.split:g}; it must be from 0 (none) to {MAX_SPLIT:g} (halves)")
+
+
+class R(wire.Message, frozen=True):
+    """Messages from functions to a variable, a row for each of the sender's functions with the receiver in it.
+
+    A row holds the minimum cost of the function for each of the receiver's values.
+    """
+
+    rows: list[Row]
+
+    act = Act(Performative.INFORM, "the receiver comes to know what each of its values costs")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        many = len(self.rows)
+        by = "our function" if many == 1 else f"our {many:,} functions, one after the other"
+        return f"by {by}, {words.receiver}'s values cost {_rows_in_words(self.rows)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver.
+
+        Nothing by itself: costs are sums over many robots, and may be split, damped, or from zero.
+        """
+        return NOTHING
+
+
+class Q(wire.Message, frozen=True):
+    """Messages from a variable to functions, a row for each of the receiver's functions, in the order of R.
+
+    A row holds the cost of each of the sender's values by all its other functions.
+    """
+
+    rows: list[Row]
+
+    act = Act(Performative.INFORM, "the receiver comes to know what each value costs elsewhere")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        many = len(self.rows)
+        by = "our function" if many == 1 else f"each of our {many:,} functions in turn"
+        return f"without {by}, {words.sender}'s values cost {_rows_in_words(self.rows)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver.
+
+        Nothing by itself: costs are sums over many robots, and may be split, damped, or from zero.
+        """
+        return NOTHING
+
+
+def _rows_in_words(rows: Sequence[Row]) -> str:
+    return "; ".join(map(costs_text, rows[:4]))
 
 
 class MaxSum(CycleProtocol):

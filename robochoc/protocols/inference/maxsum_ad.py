@@ -45,21 +45,31 @@ Choices that the papers leave open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.inference.maxsum_factor import Row, cheapest, from_zero, total, without_each
-from robochoc.protocols.inference.maxsum_functions import Functions, checked
-from robochoc.protocols.inference.messages.maxsum import Q, R
-from robochoc.protocols.inference.settings.maxsum_ad import MaxSumADSettings
+from robochoc.protocols.inference.maxsum import Q, R
+from robochoc.protocols.inference.maxsum_factor import Functions, Row, cheapest, checked, from_zero, total, without_each
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Domain, Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class MaxSumADSettings(CycleSettings, frozen=True):
+    """`variant`: AD, ADVP or ADSSVP. `preference`: the maximum for a value. `cycles`: the number of phases."""
+
+    variant: Literal["AD", "ADVP", "ADSSVP"] = "ADSSVP"
+    preference: float = 0.01
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.preference < INFINITE:
+            raise ValueError(f"preference is {self.preference:g}; it must be a number, 0 or more")
+
 
 FIRST_WITH_VALUES = 3
 """The phase from which on values may be told: both directions have been gone."""

@@ -46,38 +46,256 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from typing import assert_never, cast
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, assert_never, cast
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
-from robochoc.protocols.inference.dpop import MOST_AXES, keep_once
-from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, aligned, place_type, width_of
-from robochoc.protocols.inference.mb_dpop import MBDPOP, Sizes, is_place
-from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Proceed
-from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth
-from robochoc.protocols.inference.messages.rmb_dpop import (
-    Allocation,
-    Candidate,
-    ClusterLabel,
-    CutUTIL,
-    CutValue,
-    SepDegree,
+from robochoc.model.wording import Wording, cost_text, counted, listed
+from robochoc.protocols.inference.dpop import MOST_AXES, UTIL, VALUE, Cost, Dimensions, Need, Proceed, Size, keep_once
+from robochoc.protocols.inference.dpop_tables import (
+    PIECE,
+    Codes,
+    Extent,
+    Table,
+    Width,
+    aligned,
+    packed_costs,
+    piece_in_words,
+    place_type,
+    width_of,
 )
-from robochoc.protocols.inference.rmb_cuts import (
-    BestTables,
-    IncomingPlaces,
-    added_up,
-    best,
-    bytes_of_best,
-    picked,
-    thinned,
-)
+from robochoc.protocols.inference.mb_dpop import MBDPOP, Axis, Context, Depth, DomainAtDepth, Sizes, is_place
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class Candidate(msgspec.Struct, frozen=True, array_like=True):
+    """A robot that may be cut: the size of its domain, its depth, and the robots that this would relieve.
+
+    `relieved` is the number of robots with too large a separator that it belongs to; `lowest` is the depth of the
+    lowest of them.
+    """
+
+    size: Size
+    depth: Depth
+    relieved: Annotated[int, msgspec.Meta(ge=1)]
+    lowest: Depth
+
+
+class ClusterLabel(Message, frozen=True):
+    """The sender's separator; where this is too large, also who may be cut for the sender and its cluster below.
+
+    `dearest`, `induced_width` and `most` are those of DPOP's `Dimensions`.
+    """
+
+    separator: dict[str, Axis]
+    candidates: dict[str, Candidate]
+    dearest: Cost
+    induced_width: int
+    most: Need
+
+    act = Act(Performative.INFORM, "the receiver comes to know the sender's table, and who may be fixed for it")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        sizes = {name: axis.size for name, axis in self.separator.items()}
+        axes = listed([f"{robot} ({counted(size, 'value')})" for robot, size in sizes.items()])
+        cells = counted(math.prod(sizes.values()), "cell")
+        over = " over " if axes else ""
+        table = f"my table has {cells}{over}{axes}, and no cost above {cost_text(self.dearest)}"
+        return f"{table}; {_in_words(self.candidates)}" if self.candidates else table
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class SepDegree(Message, frozen=True):
+    """The robots that may still be cut for the cluster below; `most` is the largest memory need there by now."""
+
+    candidates: dict[str, Candidate]
+    most: Need
+
+    act = Act(Performative.INFORM, "the receiver comes to know who else may be fixed")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return _in_words(self.candidates) if self.candidates else "from me down, all tables are small enough"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class Allocation(Message, frozen=True):
+    """The cluster root's choice: `robot` is cut, and fixed for the tables that it makes too large."""
+
+    robot: str
+
+    act = Act(Performative.REQUEST, "the receiver is to make its tables for fixed values of one more robot")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"{self.robot} will be fixed; who else may be?"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class CutUTIL(Message, frozen=True):
+    """A piece of the sender's table, as in UTIL; with the best values of the cut robots from the sender down.
+
+    `places` has a row for each of these robots, in the order of their allocation, with a place for each cell.
+    """
+
+    width: Width
+    costs: bytes
+    places: bytes
+
+    act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs, and the values for it")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        values = counted(len(self.places), "byte")
+        return f"{piece_in_words(self.costs, self.width)}, with the values that are fixed for them ({values})"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class CutValue(Message, frozen=True):
+    """The optimal values, as places, of the receiver's cut robots: those above it, then those from it down."""
+
+    values: list[int]
+
+    act = Act(Performative.REQUEST, "the receiver is to make its table for the optimal values")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        places = listed([str(place + 1) for place in self.values])
+        return f"the best values of the robots that are fixed for you, or for others below, are by number {places}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+def _in_words(candidates: dict[str, Candidate]) -> str:
+    told = [f"{robot} (for {counted(one.relieved, 'table')})" for robot, one in candidates.items()]
+    return f"from me down, tables are too large, unless robots are fixed: {listed(told)}"
+
+
+Places = NDArray[np.unsignedinteger[Any]]
+
+
+SCRATCH = 16
+"""Bytes for each cell while results are compared: an index, a mask, and the part of a table that is better."""
+
+
+def added_up(all_candidates: Iterable[Mapping[str, Candidate]]) -> dict[str, Candidate]:
+    """Return the candidates of several robots or branches together."""
+    found = dict[str, Candidate]()
+    for candidates in all_candidates:
+        for name, one in candidates.items():
+            other = found.get(name)
+            found[name] = one if other is None else msgspec.structs.replace(
+                one, relieved=one.relieved + other.relieved, lowest=max(one.lowest, other.lowest)
+            )  # fmt: skip
+    return found
+
+
+def best(candidates: Mapping[str, Candidate]) -> str:
+    """Return the candidate that relieves the most robots; of several the one nearest to its lowest, then deepest."""
+
+    def merit(name: str) -> tuple[int, int, int, str]:
+        one = candidates[name]
+        return -one.relieved, one.lowest - one.depth, -one.depth, name
+
+    return min(candidates, key=merit)
+
+
+def thinned(candidates: Mapping[str, Candidate], above: Mapping[str, int]) -> dict[str, Candidate]:
+    """Return the candidates `above`, and the best of the others: their numbers do not grow any more."""
+    kept = {name: one for name, one in candidates.items() if name in above}
+    others = {name: one for name, one in candidates.items() if name not in above}
+    if others:
+        kept[best(others)] = others[best(others)]
+    return kept
+
+
+class BestTables:
+    """The best of several tables, cell by cell: costs, the own value, and the values of `cut` robots, as places."""
+
+    def __init__(self, shape: Sequence[int], costs: np.dtype[Any], own: int, cut: Sequence[int]) -> None:
+        self.costs: Codes = np.full(shape, np.iinfo(costs).max, costs)
+        self.choices: Codes = np.zeros(shape, place_type([own]))
+        self.places: Places = np.zeros((len(cut), *shape), place_type(cut or [own]))
+
+    def improve(
+        self, at: Sequence[slice | int], costs: Codes, choices: Codes | int, places: Sequence[Table | int]
+    ) -> None:
+        """Take over, in the part `at` these axes, what is cheaper."""
+        part = (*at, ...)
+        better = costs < self.costs[part]
+        np.copyto(self.costs[part], costs, where=better)
+        np.copyto(self.choices[part], choices, where=better, casting="unsafe")
+        for number, row in enumerate(places):
+            np.copyto(self.places[number, *part], row, where=better, casting="unsafe")
+
+    def packed(self) -> Iterator[tuple[Width, bytes, bytes]]:
+        """Yield the costs in pieces for the wire, each with the places that belong to it."""
+        rows, start = self.places.reshape(len(self.places), -1), 0
+        for width, piece in packed_costs(self.costs):
+            cells = len(piece) // width
+            yield width, piece, rows[:, start : start + cells].tobytes()
+            start += cells
+
+
+def bytes_of_best(shape: Sequence[int], width: int, own: int, cut: Sequence[int]) -> int:
+    """Return the peak size of `BestTables` and of what is sent of them."""
+    row = place_type(cut or [own]).itemsize * len(cut)
+    cells = math.prod(shape)
+    return cells * (width + place_type([own]).itemsize + row + SCRATCH) + min(cells, PIECE) * row
+
+
+class IncomingPlaces:
+    """The places of the values of cut robots, of so many values (`cut`), that come with a table of this `shape`."""
+
+    def __init__(self, shape: Sequence[int], cut: Sequence[int]) -> None:
+        self._limits = np.array(cut).reshape(-1, 1)
+        self._start = 0
+        self.table: Places = np.empty((len(cut), *shape), place_type(cut))
+
+    def add(self, cells: int, piece: bytes) -> None:
+        """Append the next piece, of so many cells. Raises `ValueError` for bytes that do not fit."""
+        rows = self.table.reshape(len(self.table), -1)
+        if len(piece) != cells * len(rows) * rows.itemsize or cells > rows.shape[1] - self._start:
+            raise ValueError(f"{len(piece)} bytes are not the places of {len(rows)} robots for {cells} cells")
+        places = np.frombuffer(piece, rows.dtype).reshape(len(rows), cells)
+        if (places >= self._limits).any():
+            raise ValueError("a robot has not so many values")
+        rows[:, self._start : self._start + cells] = places
+        self._start += cells
+
+
+def picked(table: Table, choices: Codes) -> Table:
+    """Return the part of `table` at the own values in `choices`; the own axis is the table's first."""
+    if len(table) == 1:
+        return np.broadcast_to(table[0], choices.shape)
+    whole = np.broadcast_to(table, (len(table), *choices.shape))
+    found: Table = np.take_along_axis(whole, choices[np.newaxis].astype(np.intp), 0)[0]
+    return found
+
 
 RMBMessage = (
     DomainAtDepth | ClusterLabel | SepDegree | Allocation | Proceed | Context | UTIL | CutUTIL | CutValue | VALUE

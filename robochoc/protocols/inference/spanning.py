@@ -15,13 +15,104 @@ trees", ACM TOPLAS 5(1), 1983, which needs no common rounds, and fewer messages.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
-from robochoc.protocols.inference.messages.bounded_maxsum import Choice, Ends, Fragment, Heaviest, Merged, NewRoot
+from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
+
+Ends = tuple[str, str]
+"""The two robots of a function, the higher first."""
+
+
+class Fragment(Message, frozen=True):
+    """The root of the sender's part of the forest."""
+
+    root: str
+
+    act = Act(Performative.INFORM, "the receiver comes to know whether both are in one part of the forest")
+
+    def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
+        """Return what the sender says."""
+        return f"my tree is that of {self.root}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class Heaviest(Message, frozen=True):
+    """The heaviest function that leads out of the sender's branch, and its robots. None: no function does."""
+
+    weight: float | None
+    ends: Ends | None
+
+    act = Act(Performative.PROPOSE, "the tree is to be joined with another one there")
+
+    def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
+        """Return what the sender says."""
+        if self.ends is None or self.weight is None:
+            return "nothing leads out of my branch"
+        return f"the heaviest function out of my branch is that of {' and '.join(self.ends)}: {cost_text(self.weight)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class Choice(Message, frozen=True):
+    """The robots of the function that joins this tree with another one. None: there is no other; the tree is done."""
+
+    ends: Ends | None
+
+    act = Act(Performative.INFORM, "the receiver comes to know where the tree grows")
+
+    def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
+        """Return what the sender says."""
+        if self.ends is None:
+            return "our tree is done"
+        return f"our tree is joined by the function of {' and '.join(self.ends)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class Merged(Message, frozen=True):
+    """Whether the sender's tree is joined with the receiver's by their function."""
+
+    joined: bool
+
+    act = Act(Performative.INFORM, "the receiver comes to know whether their function is in the tree")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"my tree is {'' if self.joined else 'not '}joined with that of {words.receiver} here"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class NewRoot(Message, frozen=True):
+    """The root of the tree that several have become; the sender is the receiver's parent."""
+
+    root: str
+
+    act = Act(Performative.INFORM, "the receiver comes to know its parent")
+
+    def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
+        """Return what the sender says."""
+        return f"we are in the tree of {self.root} now"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 Heaviness = tuple[float, int, int]
 """A weight, and what breaks ties."""

@@ -38,15 +38,43 @@ Differences, and why it ends:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, cast
 
 from robochoc.model import message as wire
-from robochoc.protocols.local_search.dsa import DSA
-from robochoc.protocols.local_search.messages.a_dsa import Tick
-from robochoc.protocols.local_search.settings.a_dsa import ADSASettings
+from robochoc.model.disclosure import Hearing, Proof, can_take
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
+from robochoc.protocols.local_search.dsa import DSA, DSASettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class ADSASettings(DSASettings, frozen=True):
+    """Those of `dsa`, but `cycles` are ticks of a robot; no `anytime`, as robots do not go in step."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.anytime == "yes":
+            raise ValueError("anytime is for robots that go through cycles together; here each has ticks of its own")
+
+
+class Tick(wire.Message, frozen=True):
+    """The sender's value after a tick, changed or not; `last`: it makes no more ticks."""
+
+    value: wire.Value
+    last: bool
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} {'for good' if self.last else 'at present'}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(hearing.sender, self.value)]
 
 
 class ADSA(DSA):

@@ -44,15 +44,25 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from robochoc.model.message import Message
-from robochoc.protocols.local_search.settings.dsa import DSASettings
-from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost
+
+
+class DSASettings(CycleSettings, frozen=True):
+    """`variant`: A, B, C, D or E. `probability` (p): the probability of a move. `cycles`: the number of cycles."""
+
+    variant: Literal["A", "B", "C", "D", "E"] = "B"
+    probability: float = 0.7
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.probability <= 1:
+            raise ValueError(f"probability is {self.probability:g}; it must be more than 0 and at most 1")
 
 
 class OnePhase(CycleProtocol):

@@ -48,19 +48,238 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar, assert_never, cast
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal, assert_never, cast
 
 from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import (
+    INFINITE,
+    NOTHING,
+    EveryValuePays,
+    Hearing,
+    Proof,
+    SomeValuePays,
+    StandsAt,
+    can_take,
+)
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.local_search.duct_samples import Samples
-from robochoc.protocols.local_search.messages.duct import Fixed, SampleContext, SampleCost, Separator
-from robochoc.protocols.local_search.settings.duct import DUCTSettings
+from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class DUCTSettings(Settings, frozen=True):
+    """`samples`: after how many samples a robot chooses its value at the latest.
+
+    `by`: whether values are compared by the `mean` cost of their samples, or by the `best` one. `bound`: by what the
+    confidence bound is multiplied; more tries dear values more often. `error` and `confidence`: a robot also chooses
+    when, with this confidence, no other value is better by more than this part of what its subtree can cost at most.
+    `contexts`: how many combinations of values above it a robot keeps samples of.
+    """
+
+    samples: int = 300
+    by: Literal["mean", "best"] = "mean"
+    bound: float = 1.0
+    error: float = 0.1
+    confidence: float = 0.9
+    contexts: int = 10_000
+
+    def __post_init__(self) -> None:
+        for name, number in (("samples", self.samples), ("contexts", self.contexts)):
+            if number < 1:
+                raise ValueError(f"{name} is {number}; it must be 1 or more")
+        for name, measure in (("bound", self.bound), ("error", self.error)):
+            if not 0 <= measure < math.inf:
+                raise ValueError(f"{name} is {measure:g}; it must be 0 or more")
+        if not 0 < self.confidence < 1:
+            raise ValueError(f"confidence is {self.confidence:g}; it must be between 0 and 1")
+
+
+class Separator(wire.Message, frozen=True):
+    """The robots above the sender that matter to its subtree, and the most that the subtree can cost.
+
+    That is, without broken hard constraints.
+    """
+
+    robots: list[str]
+    dearest: int
+
+    act = Act(Performative.INFORM, "the receiver comes to know whose values the sender has to be told")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"my subtree depends on {listed(self.robots)}, and costs {cost_text(self.dearest)} at most"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class SampleContext(wire.Message, frozen=True):
+    """The values of the receiver's separator in this sample (CONTEXT)."""
+
+    values: dict[str, wire.Value]
+
+    act = Act(Performative.REQUEST, "the receiver is to take a sample of its subtree for these values")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"sample your subtree with {words.assigned(self.values.items())}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(*chosen) for chosen in self.values.items()]
+
+
+class SampleCost(wire.Message, frozen=True):
+    """The cost of the sample in the sender's subtree: broken hard constraints, and costs (COST).
+
+    `best`: the least that is known for these values without a broken one, and None before there is any. `hopeless`:
+    there is none, whatever the subtree does.
+    """
+
+    broken: int
+    cost: int
+    best: int | None
+    hopeless: bool
+
+    act = Act(Performative.INFORM, "the receiver comes to know what its sample costs below")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        broken = f", and breaks {counted(self.broken, 'constraint')}" if self.broken else ""
+        if self.hopeless:
+            best = "with these values there is no solution"
+        else:
+            best = "no solution yet" if self.best is None else f"the best so far costs {cost_text(self.best)}"
+        return f"this sample costs my subtree {cost_text(self.cost)}{broken}; {best}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: the sender pays no more than its subtree does.
+
+        If all its neighbours are in the context, nobody is below, and what is hopeless is so by its own constraints.
+        """
+        asked = hearing.last(SampleContext, hearing.receiver, hearing.sender)
+        if asked is None:
+            return NOTHING
+        found: list[Proof] = []
+        if not self.broken:
+            found.append(SomeValuePays(hearing.sender, asked.values, self.cost))
+        if self.best is not None:
+            found.append(SomeValuePays(hearing.sender, asked.values, self.best))
+        if self.hopeless and asked.values.keys() >= set(hearing.neighbours(hearing.sender)):
+            found.append(EveryValuePays(hearing.sender, asked.values, INFINITE))
+        return found
+
+
+class Fixed(wire.Message, frozen=True):
+    """The values of the receiver's separator in the end: it goes on sampling for these only."""
+
+    values: dict[str, wire.Value]
+
+    act = Act(Performative.REQUEST, "the receiver is to choose its value for good, for these values")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.assigned(self.values.items())} for good; choose your own value"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(*chosen) for chosen in self.values.items()]
+
+
+class Samples:
+    """The samples of one context.
+
+    `local` are the costs of the own values with those above, and `options` the values that are still tried: those that
+    break nothing above, and below which no context was hopeless. `scale` is the most that the subtree can cost; a
+    broken constraint counts as much.
+    """
+
+    def __init__(self, local: Sequence[LexicographicCost], scale: int) -> None:
+        self.options = [place for place, (broken, _) in enumerate(local) if not broken]
+        self.taken = 0
+        """The number of samples, of all values."""
+        self._local = local
+        self._scale = max(1, scale)
+        self._tries = [0] * len(local)
+        self._sums = [0] * len(local)
+        self._least: list[int | None] = [None] * len(local)
+
+    @property
+    def best(self) -> int | None:
+        """The least cost of the subtree that is known here, without a broken constraint; None if there is none yet."""
+        return min((least for place in self.options if (least := self._least[place]) is not None), default=None)
+
+    def total(self, place: int, below: Sequence[LexicographicCost]) -> LexicographicCost:
+        """Return what a sample costs the subtree."""
+        costs = [self._local[place], *below]
+        return int(sum(broken for broken, _ in costs)), int(sum(cost for _, cost in costs))
+
+    def rule_out(self, place: int) -> None:
+        """Note that a value has no solution below."""
+        self.taken += 1
+        self.options = [option for option in self.options if option != place]
+
+    def add(self, place: int, sample: LexicographicCost, below: Sequence[int | None]) -> None:
+        """Note what a sample of a value has cost, and the best that each child knows for it."""
+        broken, cost = sample
+        self.taken += 1
+        self._tries[place] += 1
+        self._sums[place] += int(broken * self._scale + cost)
+        if None not in below:
+            self._least[place] = int(self._local[place][1]) + sum(best for best in below if best is not None)
+
+    def next(self, settings: DUCTSettings) -> int:
+        """Return the value for the next sample: one never tried, the cheapest first; then the least bound."""
+        new = [place for place in self.options if not self._tries[place]]
+        if new or not self.options:
+            return self._cheapest(new or range(len(self._local)))
+        return min(self.options, key=lambda place: self._measure(place, settings) - self._margin(place, settings))
+
+    def final(self) -> int:
+        """Return the value of the best solution; while there is none, the one that breaks least in the mean."""
+        if self.best is not None:
+            return next(place for place in self.options if self._least[place] == self.best)
+        tried = [place for place in self.options if self._tries[place]]
+        return min(tried, key=self._mean) if tried else self._cheapest(self.options or range(len(self._local)))
+
+    def enough(self, settings: DUCTSettings) -> bool:
+        """Return whether no other value is likely to be better by more than the error, or samples are used up."""
+        if self.taken >= settings.samples or not self.options:
+            return True
+        if self.best is None or not all(self._tries[place] for place in self.options):
+            return False
+        best = self.final()
+        threshold = self._measure(best, settings) - settings.error
+        spread = math.log(2 / (1 - settings.confidence))
+        others = [place for place in self.options if place != best]
+        return all(
+            self._measure(place, settings) - math.sqrt(spread / self._tries[place]) >= threshold for place in others
+        )
+
+    def _cheapest(self, places: Sequence[int]) -> int:
+        return min(places, key=self._local.__getitem__)
+
+    def _mean(self, place: int) -> float:
+        """Return the mean cost of a value's samples, as a part of what the subtree can cost."""
+        return self._sums[place] / (self._tries[place] * self._scale)
+
+    def _measure(self, place: int, settings: DUCTSettings) -> float:
+        """Return the cost by which a value is compared; the mean where no sample of it was a solution."""
+        least = self._least[place]
+        return self._mean(place) if settings.by == "mean" or least is None else least / self._scale
+
+    def _margin(self, place: int, settings: DUCTSettings) -> float:
+        """Return how much better than its samples a value may be: the less, the more often it was tried."""
+        return settings.bound * math.sqrt(2 * math.log(2 * self.taken) / self._tries[place])
+
 
 MOST_ROBOTS = 100_000
 """No separator has more."""

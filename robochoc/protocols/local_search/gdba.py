@@ -45,21 +45,42 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from robochoc.model import message as wire
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.local_search.messages.gdba import Improve
-from robochoc.protocols.local_search.mgm import Gainers
-from robochoc.protocols.local_search.settings.gdba import GDBASettings
+from robochoc.model.wording import Wording
+from robochoc.protocols.local_search.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.encoding import Cost
 from robochoc.solver.shared_constraint import OtherValues
+
+
+class GDBASettings(CycleSettings, frozen=True):
+    """The rule by which a constraint that is violated in a quasi-local minimum weighs more from then on.
+
+    `modifier`: A adds to what it charges, M multiplies it. `violation`: NZ (it charges anything), NM (more than its
+    minimum) or MX (its maximum). `scope`: E changes one entry of its table, R those of all own values against the
+    others' current ones, C those of the own value against all of theirs, T the whole table. `cycles`: the number of
+    cycles.
+    """
+
+    modifier: Literal["A", "M"] = "M"
+    violation: Literal["NZ", "NM", "MX"] = "NM"
+    scope: Literal["E", "R", "C", "T"] = "T"
+
+
+class Improve(Gain, frozen=True):
+    """The reduction of the sender's effective cost by its best move: broken hard constraints, and costs (`improve`)."""
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"as I weigh constraints by now, my move would save {saving_in_words(self.broken, self.cost)}"
+
 
 Raised = tuple[int, int]
 """Two counts of raised modifiers: where the constraint was broken, and where it just cost something."""

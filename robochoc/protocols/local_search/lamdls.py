@@ -43,16 +43,37 @@ move before it has told its own. So each move saves the team what it saves the r
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Annotated
+
+import msgspec
 
 from robochoc.model import message as wire
-from robochoc.protocols.local_search.messages.lamdls import Colour
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import Hearing, Proof, can_take
+from robochoc.model.wording import Wording
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class Colour(wire.Message, frozen=True):
+    """The sender's first value, and its colour: a number that no neighbour has."""
+
+    value: wire.Value
+    colour: Annotated[int, msgspec.Meta(ge=0)]
+
+    act = Act(Performative.INFORM, "the receiver comes to know when the sender will move")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} at first, and my colour is number {self.colour + 1}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(hearing.sender, self.value)]
 
 
 class LAMDLS(CycleProtocol):

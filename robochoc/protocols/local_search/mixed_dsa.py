@@ -37,15 +37,30 @@ constraint may do both. First values are random, and constraints may be n-ary, a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from robochoc.protocols.local_search.dsa import StochasticSearch
-from robochoc.protocols.local_search.settings.mixed_dsa import MixedDSASettings
-from robochoc.protocols.shared.cycles import gain
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost
+
+
+class MixedDSASettings(CycleSettings, frozen=True):
+    """`hard`: the probability of a move where hard constraints are violated. `soft`: that of any other move.
+
+    `variant`: A, B or C. `cycles`: the number of cycles.
+    """
+
+    hard: float = 0.7
+    soft: float = 0.5
+    variant: Literal["A", "B", "C"] = "B"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("hard", "soft"):
+            if not 0 < getattr(self, name) <= 1:
+                raise ValueError(f"{name} is {getattr(self, name):g}; it must be more than 0 and at most 1")
 
 
 class MixedDSA(StochasticSearch):

@@ -46,15 +46,34 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from robochoc.protocols.local_search.dsa import OnePhase
-from robochoc.protocols.local_search.settings.regret_matching import RegretMatchingSettings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleSettings, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class RegretMatchingSettings(CycleSettings, frozen=True):
+    """`variant`: rm, or rm+, in which regrets never fall below 0.
+
+    `weight` (rho): what part of a regret the last cycle makes up; 0: all cycles count alike. `inertia`: the probability
+    that a robot keeps its value whatever it regrets. `cycles`: the number of cycles.
+    """
+
+    variant: Literal["rm", "rm+"] = "rm+"
+    weight: float = 0.1
+    inertia: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.weight <= 1:
+            raise ValueError(f"weight is {self.weight:g}; it must be from 0 to 1")
+        if not 0 <= self.inertia < 1:
+            raise ValueError(f"inertia is {self.inertia:g}; it must be 0 or more, and less than 1")
+
 
 UNIT = 1 << 16
 """The integer that stands for a regret of one cost: room for fractions that integers hold exactly."""

@@ -42,7 +42,7 @@ Encryption: ElGamal with one share of the key for each robot, in the group Edwar
 The methods:
 
     circle, next root             `rerooting`        encrypt, open          `elgamal.TeamKey`
-    linear orders, largest cost   `linear_plans`     unary costs, + and min `encrypted_costs`
+    linear orders, largest cost   `linear_order`     unary costs, + and min `encrypted_costs`
     UTIL                          `_pass_table`      bisection              `_ask_team`, `bisection`
 
 Choices that the paper leaves open, and differences (its text was not at hand; this is built from its principle):
@@ -63,38 +63,113 @@ Choices that the paper leaves open, and differences (its text was not at hand; t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
 import msgspec
 import numpy as np
 
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.private.bisection import Bisection
+from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage
 from robochoc.protocols.private.ed25519 import NEEDS
 from robochoc.protocols.private.encrypted_costs import Pair
-from robochoc.protocols.private.linear_order import costs_to_add, own_costs, own_places, sources
-from robochoc.protocols.private.linear_plans import LinearOrderProtocol
-from robochoc.protocols.private.messages.anonymous_dfs import AnonymousTreeMessage
-from robochoc.protocols.private.messages.p2_dpop import (
+from robochoc.protocols.private.linear_order import (
     AskAxis,
     Axis,
     CostRange,
     CostSum,
-    EncryptedTable,
     Gone,
-    LinearMessage,
-    Opening,
+    LinearOrderProtocol,
     Plan,
+    costs_to_add,
+    own_costs,
+    own_places,
+    sources,
 )
-from robochoc.protocols.private.messages.p32_dpop import Join, Next, RerootingMessage, Setup, Vector
-from robochoc.protocols.private.messages.p_dpop import cells_of
+from robochoc.protocols.private.p_dpop import cells_of
+from robochoc.protocols.private.rerooting import Join, Next, RerootingMessage, Setup, Vector
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class EncryptedTable(Message, frozen=True):
+    """The table that was planned: for each cell a cipher for each cost, of whether so much is enough.
+
+    The last axis changes fastest, in the order of the plan, and costs within cells.
+    """
+
+    turn: int
+    ciphers: bytes
+
+    act = Act(Performative.REQUEST, "the receiver is to add its costs, without reading the table")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"the table of turn {self.turn + 1}, encrypted: {len(self.ciphers):,} bytes"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+class Opening(Message, frozen=True):
+    """One cipher that the root wants to read, blinded by all robots before the receiver, and without their shares."""
+
+    cipher: bytes
+
+    act = Act(Performative.REQUEST, "the receiver is to blind it, and to take its share of the key off")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"blind this cipher ({self.cipher[:2].hex()}), and take your share of the key off"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
+
+LinearMessage = CostSum | CostRange | Plan | AskAxis | Axis | Gone | EncryptedTable | Opening
+"""The messages of the linear orders, one for each turn."""
+
+
+class Bisection:
+    """Finds the first of `places` for which something is true; from there on it is true for all.
+
+    There are as many questions as it may take at most: once the place is found, the rest is asked for show.
+    """
+
+    def __init__(self, places: int) -> None:
+        self._last = places - 1
+        self._low = 0
+        self._high = places
+        self.left = places.bit_length()
+        """The number of questions still to be asked."""
+
+    @property
+    def place(self) -> int:
+        """The place to ask about next."""
+        return min((self._low + self._high) // 2, self._last)
+
+    def take(self, *, true: bool) -> None:
+        """Take the answer for `place`."""
+        if self._low < self._high:
+            if true:
+                self._high = self.place
+            else:
+                self._low = self.place + 1
+        self.left -= 1
+
+    @property
+    def found(self) -> int:
+        """The first place for which it is true, once no question is left; the number of places if there is none."""
+        return self._low
 
 
 class P2DPOP(LinearOrderProtocol):

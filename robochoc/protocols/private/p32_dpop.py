@@ -50,21 +50,53 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
+from robochoc.model.disclosure import EveryValuePays, Hearing, Proof
 from robochoc.model.message import Message
+from robochoc.model.wording import Wording
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage, Wave
 from robochoc.protocols.private.ed25519 import NEEDS
-from robochoc.protocols.private.messages.anonymous_dfs import AnonymousTreeMessage, Wave
-from robochoc.protocols.private.messages.p32_dpop import Join, Next, RerootingMessage, Setup, Table, Vector
-from robochoc.protocols.private.messages.p_dpop import Codes
-from robochoc.protocols.private.p_dpop import PDPOP, CellTable
-from robochoc.protocols.private.rerooting import RerootingProtocol
+from robochoc.protocols.private.p_dpop import PDPOP, UTIL, CellTable, Codes, PDPOPSettings
+from robochoc.protocols.private.rerooting import Join, Next, RerootingMessage, RerootingProtocol, Setup, Vector
 from robochoc.protocols.private.ring import Ring
-from robochoc.protocols.private.settings.p32_dpop import P32DPOPSettings
 from robochoc.solver.compiled import LocalProblem
+
+MOST = 1_000
+
+
+class P32DPOPSettings(PDPOPSettings, frozen=True):
+    """`cells`: as for P-DPOP. `spare`: at most so many turns more than there are robots, to hide how many there are."""
+
+    spare: int = 2
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` for numbers that cannot be."""
+        super().__post_init__()
+        if not 0 <= self.spare <= MOST:
+            raise ValueError(f"spare is a number of turns from 0 to {MOST}, not {self.spare}")
+
+
+class Table(UTIL, frozen=True):
+    """A table of P-DPOP in the turn of one root; robots that have had theirs have their values."""
+
+    turn: int
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{super().in_words(words)}, for turn {self.turn + 1}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: after the first turn nothing about every value of the sender.
+
+        The sender may have had its turn since, and then the table is about one value.
+        """
+        found = super().proves(hearing)
+        return found if self.turn == 0 else [one for one in found if not isinstance(one, EveryValuePays)]
 
 
 class P32DPOP(RerootingProtocol, PDPOP):

@@ -58,9 +58,8 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.messages.dba import Improve
 from robochoc.protocols.satisfaction.settings.dba import DBASettings
-from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.anytime import AnytimeMessage
+from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import Charged, LocalProblem
 

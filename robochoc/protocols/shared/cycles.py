@@ -18,19 +18,73 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import ClassVar, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 from robochoc.model import message as wire
+from robochoc.model.disclosure import HasOnly, Hearing, Proof, can_take
 from robochoc.model.outcome import Verdict
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.chance import one_of
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.shared.anytime import Anytime
-from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
-from robochoc.protocols.shared.messages.cycles import Domain, Value
-from robochoc.protocols.shared.settings.cycles import CycleCount, CycleSettings
+from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.shared.anytime import Anytime, Best, Paid, Place, Step
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class CycleCount(Settings, frozen=True):
+    """`cycles`: the number of cycles after which all robots stop."""
+
+    cycles: int = 100
+
+    def __post_init__(self) -> None:
+        if self.cycles < 1:
+            raise ValueError(f"cycles is {self.cycles}; it must be 1 or more")
+
+
+class CycleSettings(CycleCount, frozen=True):
+    """`cycles`: the number of cycles after which all robots stop.
+
+    `anytime`: whether the robots themselves find the best cycle, by messages, and end with their values in it.
+    """
+
+    anytime: Literal["no", "yes"] = "no"
+
+
+class Value(wire.Message, frozen=True):
+    """The sender's value (`value`)."""
+
+    value: wire.Value
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} in this cycle"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # It may move after the last cycle without a word.
+        return [can_take(hearing.sender, self.value)]
+
+
+class Domain(wire.Message, frozen=True):
+    """The sender's domain, sent first; later messages refer to places in it."""
+
+    values: list[wire.Value]
+
+    act = acts.TELL_DOMAIN
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return words.domain(self.values)
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, tuple(self.values))]
+
 
 T = TypeVar("T")
 

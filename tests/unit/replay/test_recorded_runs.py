@@ -19,7 +19,7 @@ from robochoc.journal.events import Sent, Settled
 from robochoc.journal.journal import Journal, JournalRecorder, lines_of
 from robochoc.privacy import Kind, Measure, PrivacyReport, privacy_of
 from robochoc.protocols.optimization.sfb import SFB
-from robochoc.protocols.shared.messages.anytime import Step
+from robochoc.protocols.shared.anytime import Step
 from robochoc.replay import ReplayOptions, replay
 from robochoc.replay.channels import MessageDecoder
 from robochoc.replay.steps import runs_of

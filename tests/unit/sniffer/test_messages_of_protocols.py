@@ -20,7 +20,7 @@ from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.messages.compapo import Table
-from robochoc.protocols.shared.messages.anytime import AnytimeMessage
+from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.acl_messages import PLATFORM

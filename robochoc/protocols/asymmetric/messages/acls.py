@@ -8,8 +8,8 @@ from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.disclosure import INFINITE, NOTHING, Hearing, PartPays, Proof, can_take
 from robochoc.model.wording import Wording
-from robochoc.protocols.local_search.messages.mgm import saving_in_words
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.local_search.mgm import saving_in_words
+from robochoc.protocols.shared.cycles import Value
 
 Paid = tuple[int, int | float]
 """Broken hard constraints, and costs."""

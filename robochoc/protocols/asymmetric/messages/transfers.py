@@ -5,7 +5,7 @@ from __future__ import annotations
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording
-from robochoc.protocols.local_search.messages.mgm import saving_in_words
+from robochoc.protocols.local_search.mgm import saving_in_words
 
 
 class Transfer(Message, frozen=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.protocols.shared.settings.cycles import CycleCount
+from robochoc.protocols.shared.cycles import CycleCount
 
 
 class ACLSSettings(CycleCount, frozen=True):

@@ -11,7 +11,7 @@ from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.disclosure import FINITE, INFINITE, NOTHING, Hearing, Pays, Proof
 from robochoc.model.wording import Wording, counted
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.cycles import Value
 
 Count = Annotated[int, msgspec.Meta(ge=0)]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.cycles import CycleSettings
 
 
 class DBASettings(CycleSettings, frozen=True):

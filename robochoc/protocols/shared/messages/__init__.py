@@ -1,1 +1,1 @@
-"""What is sent: the messages of `dfs.py` are in `messages/dfs.py`."""
+"""The messages of `dfs.py`, in a module of their own: mypyc compiles `dfs.py`, and cannot compile msgspec's classes."""

@@ -1,1 +1,0 @@
-"""The messages that these protocols send. Those of `dpop.py` are in `messages/dpop.py`."""

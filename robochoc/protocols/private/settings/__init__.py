@@ -1,1 +1,0 @@
-"""The settings of the protocols in this family."""
