@@ -60,7 +60,6 @@ class WinningBids(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the highest bids that the sender knows")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return listed([winning_bid_in_words(words, *bid) for bid in self.bids])
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:

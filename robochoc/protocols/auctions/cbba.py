@@ -78,7 +78,6 @@ class Bundles(wire.Message, frozen=True):
     shareable = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return listed([winning_bid_in_words(words, *one) for one in self.standings])
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:

@@ -69,7 +69,6 @@ class Partition(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know who does what as far as the sender knows")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         who = [f"{robot} does {lot_in_words(words, robot, lot)}" for robot, lot in self.coalitions.items()]
         return f"after move {self.evolution:,}, which was {self.mover}'s, {listed(who) or 'nobody does anything'}"
 

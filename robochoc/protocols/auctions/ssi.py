@@ -66,11 +66,9 @@ class Bid(wire.Message, frozen=True):
     act = Act(Performative.PROPOSE, "the highest bid is to win")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return _next_in_words(self.amount)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return next_proves(hearing.sender, self.amount, hearing)
 
 
@@ -83,7 +81,6 @@ class Won(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know that a task is the sender's")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         lots = listed([lot_in_words(words, words.sender, lot) for lot in self.lots])
         return f"{lots} {'is' if len(self.lots) == 1 else 'are'} mine, and {_next_in_words(self.amount)}"
 

@@ -83,7 +83,6 @@ class R(maxsum.R, frozen=True):
     act = maxsum.R.act
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{super().in_words(words)}{'' if self.settled else MORE}"
 
 
@@ -95,7 +94,6 @@ class Q(maxsum.Q, frozen=True):
     act = maxsum.Q.act
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{super().in_words(words)}{'' if self.settled else MORE}"
 
 

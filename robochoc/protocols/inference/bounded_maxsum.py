@@ -42,7 +42,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
@@ -72,16 +71,12 @@ class Dependency(Message, frozen=True):
     rest: list[float]
 
     act = Act(Performative.INFORM, "the receiver comes to know how much the function binds both")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         if self.weight is None:
             return f"no function joins me and {words.receiver}"
         return f"without our function, costs are at most {cost_text(self.weight)} off"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Branch(Message, frozen=True):
@@ -96,14 +91,10 @@ class Branch(Message, frozen=True):
     most: float
 
     act = acts.TELL_BOUNDS
+    proves_nothing = True  # constraints are cut
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
-        """Return what the sender says."""
         return f"my branch costs {costs_text(self.costs)}, and up to {cost_text(self.cut)} more"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing by itself, as constraints are cut."""
-        return NOTHING
 
 
 class Assign(Message, frozen=True):
@@ -112,14 +103,10 @@ class Assign(Message, frozen=True):
     value: Value
 
     act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"take {self.value} as your value, {words.receiver}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class BoundedMaxSum(SpanningProtocol):

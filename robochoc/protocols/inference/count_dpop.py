@@ -46,7 +46,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, counted
 from robochoc.protocols.findings import Findings
@@ -71,7 +70,6 @@ class CountDimensions(Dimensions, frozen=True):
     bits: Bits
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{super().in_words(words)}; {counted(self.bits, 'bit')} are enough for my numbers"
 
 
@@ -85,15 +83,11 @@ class Counts(Message, frozen=True):
     numbers: bytes
 
     act = Act(Performative.INFORM, "the receiver comes to know in how many ways the sender's subtree attains its costs")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         cells = counted(len(self.numbers) // self.width, "cell")
         return f"in how many ways my subtree attains the costs of my table: {cells}, of {counted(self.width, 'byte')}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 Numbers = NDArray[Any]

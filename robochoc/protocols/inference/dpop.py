@@ -126,11 +126,9 @@ class Domain(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return words.domain(self.values)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
@@ -146,9 +144,9 @@ class Dimensions(Message, frozen=True):
     most: Need
 
     act = Act(Performative.INFORM, "the receiver comes to know how large the sender's table will be")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         cells = counted(math.prod(self.separator.values()), "cell")
         axes = listed([f"{robot} ({counted(size, 'value')})" for robot, size in self.separator.items()])
         return (
@@ -156,10 +154,6 @@ class Dimensions(Message, frozen=True):
             f" from me down the induced width is {self.induced_width},"
             f" and {self.most.robot} needs the most memory, {cost_text(self.most.bytes)} bytes"
         )
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Proceed(Message, frozen=True):
@@ -171,15 +165,11 @@ class Proceed(Message, frozen=True):
     separator: list[str]
 
     act = Act(Performative.REQUEST, "the receiver is to make its table")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         axes = f", over {listed(self.separator)}" if self.separator else ""
         return f"all tables fit: make yours{axes}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class UTIL(Message, frozen=True):
@@ -194,7 +184,6 @@ class UTIL(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return piece_in_words(self.costs, self.width)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
@@ -222,14 +211,12 @@ class VALUE(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the values above it")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if not self.assignment:
             return "nobody above you has to do with your subtree: take your best value"
         places = listed([str(place + 1) for place in self.assignment])
         return f"by number, the values of the robots in your separator are {places}, the nearest robot first"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         axes = axes_of(hearing, hearing.sender, hearing.receiver)
         if axes is None:
             return NOTHING  # told in another epoch

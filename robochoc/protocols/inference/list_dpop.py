@@ -96,7 +96,6 @@ class ListedValues(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the values above it in each optimum")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         optima = "optimum" if len(self.numbers) == 1 else "optima"
         different = counted(len({*map(tuple, self.assignments)}), "combination")
         return f"{len(self.numbers):,} {optima}, with {different} of values of the robots in your separator"

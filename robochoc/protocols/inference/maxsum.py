@@ -61,7 +61,6 @@ from typing import ClassVar
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, costs_text
@@ -105,19 +104,13 @@ class R(wire.Message, frozen=True):
     rows: list[Row]
 
     act = Act(Performative.INFORM, "the receiver comes to know what each of its values costs")
+    # Costs are sums over many robots, and may be split, damped or shifted to a minimum of 0.
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         many = len(self.rows)
         by = "our function" if many == 1 else f"our {many:,} functions, one after the other"
         return f"by {by}, {words.receiver}'s values cost {_rows_in_words(self.rows)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver.
-
-        Nothing by itself: costs are sums over many robots, and may be split, damped, or from zero.
-        """
-        return NOTHING
 
 
 class Q(wire.Message, frozen=True):
@@ -129,19 +122,13 @@ class Q(wire.Message, frozen=True):
     rows: list[Row]
 
     act = Act(Performative.INFORM, "the receiver comes to know what each value costs elsewhere")
+    # Costs are sums over many robots, and may be split, damped or shifted to a minimum of 0.
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         many = len(self.rows)
         by = "our function" if many == 1 else f"each of our {many:,} functions in turn"
         return f"without {by}, {words.sender}'s values cost {_rows_in_words(self.rows)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver.
-
-        Nothing by itself: costs are sums over many robots, and may be split, damped, or from zero.
-        """
-        return NOTHING
 
 
 def _rows_in_words(rows: Sequence[Row]) -> str:

@@ -51,7 +51,7 @@ import msgspec
 import numpy as np
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof
+from robochoc.model.disclosure import HasOnly, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
@@ -109,11 +109,9 @@ class DomainAtDepth(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{counted(self.depth, 'robot')} above me in the tree; {words.domain(self.values)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
@@ -138,9 +136,9 @@ class Label(Message, frozen=True):
     most: Need
 
     act = Act(Performative.INFORM, "the receiver comes to know the sender's table, and who is fixed for it")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         free = {name: axis.size for name, axis in self.separator.items() if name not in self.cut}
         axes = listed([f"{robot} ({counted(size, 'value')})" for robot, size in free.items()])
         cells = counted(math.prod(free.values()), "cell")
@@ -149,10 +147,6 @@ class Label(Message, frozen=True):
             f"{fixed}my table has {cells}{' over ' if axes else ''}{axes}, and no cost above {cost_text(self.dearest)}"
         )
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
-
 
 class Context(Message, frozen=True):
     """Fixed values, as places, for the robots of the receiver's list of cycle-cut robots, in that order."""
@@ -160,15 +154,11 @@ class Context(Message, frozen=True):
     values: list[int]
 
     act = Act(Performative.REQUEST, "the receiver is to make its table for these values")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         places = listed([str(place + 1) for place in self.values])
         return f"make your table for these values of the robots that are fixed, by number: {places}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 Sizes = dict[str, int]

@@ -57,14 +57,10 @@ class Ask(Message, frozen=True):
     """A request for the receiver's next good."""
 
     act = Act(Performative.QUERY_REF, "the receiver is to send its next good")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "what is the next best for your subtree?"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Good(Message, frozen=True):
@@ -79,7 +75,6 @@ class Good(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs at least from here on")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         places = listed([str(place + 1) for place in self.assignment])
         where = f", with the values {places} (by number) in my separator" if places else ""
         return f"the next best for my subtree costs {cost_text(self.cost)}{where}"
@@ -94,14 +89,10 @@ class Done(Message, frozen=True):
     """The sender has no more goods: all other combinations break something hard."""
 
     act = Act(Performative.INFORM, "the receiver comes to know that no other combination is possible")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "nothing else is possible in my subtree"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class ODPOP(DPOP):

@@ -54,7 +54,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.inference.dpop import MOST_AXES, UTIL, VALUE, Cost, Dimensions, Need, Proceed, Size, keep_once
@@ -103,19 +102,15 @@ class ClusterLabel(Message, frozen=True):
     most: Need
 
     act = Act(Performative.INFORM, "the receiver comes to know the sender's table, and who may be fixed for it")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         sizes = {name: axis.size for name, axis in self.separator.items()}
         axes = listed([f"{robot} ({counted(size, 'value')})" for robot, size in sizes.items()])
         cells = counted(math.prod(sizes.values()), "cell")
         over = " over " if axes else ""
         table = f"my table has {cells}{over}{axes}, and no cost above {cost_text(self.dearest)}"
         return f"{table}; {_in_words(self.candidates)}" if self.candidates else table
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class SepDegree(Message, frozen=True):
@@ -125,14 +120,10 @@ class SepDegree(Message, frozen=True):
     most: Need
 
     act = Act(Performative.INFORM, "the receiver comes to know who else may be fixed")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return _in_words(self.candidates) if self.candidates else "from me down, all tables are small enough"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Allocation(Message, frozen=True):
@@ -141,14 +132,10 @@ class Allocation(Message, frozen=True):
     robot: str
 
     act = Act(Performative.REQUEST, "the receiver is to make its tables for fixed values of one more robot")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"{self.robot} will be fixed; who else may be?"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class CutUTIL(Message, frozen=True):
@@ -162,15 +149,11 @@ class CutUTIL(Message, frozen=True):
     places: bytes
 
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs, and the values for it")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         values = counted(len(self.places), "byte")
         return f"{piece_in_words(self.costs, self.width)}, with the values that are fixed for them ({values})"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class CutValue(Message, frozen=True):
@@ -179,15 +162,11 @@ class CutValue(Message, frozen=True):
     values: list[int]
 
     act = Act(Performative.REQUEST, "the receiver is to make its table for the optimal values")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         places = listed([str(place + 1) for place in self.values])
         return f"the best values of the robots that are fixed for you, or for others below, are by number {places}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 def _in_words(candidates: dict[str, Candidate]) -> str:

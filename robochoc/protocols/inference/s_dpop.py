@@ -48,7 +48,6 @@ from typing import assert_never, cast
 import numpy as np
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, listed
 from robochoc.protocols.dynamic import DynamicProtocol
@@ -70,29 +69,21 @@ class Check(Message, frozen=True):
     changed: list[str]
 
     act = Act(Performative.REQUEST, "the receiver is to tell whether its table has changed")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         news = f"the values of {listed(self.changed)} have changed" if self.changed else "no values have changed"
         return f"our tree stands, and above you {news}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Reuse(Message, frozen=True):
     """The sender's table is the one that the receiver has."""
 
     act = Act(Performative.CONFIRM, "the receiver may go on with the sender's table that it has")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "my table is still the one that you have"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class SDPOP(DPOP, DynamicProtocol):

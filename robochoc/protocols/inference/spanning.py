@@ -15,10 +15,9 @@ trees", ACM TOPLAS 5(1), 1983, which needs no common rounds, and fewer messages.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols.order import PriorityOrder
@@ -35,14 +34,10 @@ class Fragment(Message, frozen=True):
     root: str
 
     act = Act(Performative.INFORM, "the receiver comes to know whether both are in one part of the forest")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
-        """Return what the sender says."""
         return f"my tree is that of {self.root}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Heaviest(Message, frozen=True):
@@ -52,16 +47,12 @@ class Heaviest(Message, frozen=True):
     ends: Ends | None
 
     act = Act(Performative.PROPOSE, "the tree is to be joined with another one there")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
-        """Return what the sender says."""
         if self.ends is None or self.weight is None:
             return "nothing leads out of my branch"
         return f"the heaviest function out of my branch is that of {' and '.join(self.ends)}: {cost_text(self.weight)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Choice(Message, frozen=True):
@@ -70,16 +61,12 @@ class Choice(Message, frozen=True):
     ends: Ends | None
 
     act = Act(Performative.INFORM, "the receiver comes to know where the tree grows")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
-        """Return what the sender says."""
         if self.ends is None:
             return "our tree is done"
         return f"our tree is joined by the function of {' and '.join(self.ends)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Merged(Message, frozen=True):
@@ -88,14 +75,10 @@ class Merged(Message, frozen=True):
     joined: bool
 
     act = Act(Performative.INFORM, "the receiver comes to know whether their function is in the tree")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"my tree is {'' if self.joined else 'not '}joined with that of {words.receiver} here"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class NewRoot(Message, frozen=True):
@@ -104,14 +87,10 @@ class NewRoot(Message, frozen=True):
     root: str
 
     act = Act(Performative.INFORM, "the receiver comes to know its parent")
+    proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
-        """Return what the sender says."""
         return f"we are in the tree of {self.root} now"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 Heaviness = tuple[float, int, int]

@@ -69,11 +69,9 @@ class Tick(wire.Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} {'for good' if self.last else 'at present'}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(hearing.sender, self.value)]
 
 

@@ -93,12 +93,10 @@ class Inquiry(wire.Message, frozen=True):
     act = Act(Performative.QUERY_REF, "the sender asks what its values would cost the receiver")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         so_far = f"; so far {words.assigned(self.known.items())}" if self.known else ""
         return f"what would each of my {counted(len(self.values), 'value')} cost you at least?{so_far}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values)), *(can_take(*known) for known in self.known.items())]
 
 
@@ -110,7 +108,6 @@ class Costs(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what its values would cost the sender")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if not self.burdens:
             return "you have asked for no value"
         place = self.burdens.index(min(self.burdens))
@@ -147,14 +144,12 @@ class CostsAt(Costs, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what its values would cost the sender, and with which")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         told = super().in_words(words)
         if not self.burdens or len(self.values) != len(self.burdens):
             return told
         return f"{told}, with {words.own_value(self.values[self.burdens.index(min(self.burdens))])}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [*super().proves(hearing), *(can_take(hearing.sender, value) for value in dict.fromkeys(self.values))]
 
 
@@ -166,7 +161,6 @@ class FinalSide(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's parts charge for its values")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if not self.burdens:
             return "you have asked for no value"
         place = self.burdens.index(min(self.burdens))
@@ -189,14 +183,10 @@ class Hold(wire.Message, frozen=True):
     """The sender waits: too many of its values are equally good."""
 
     act = Act(Performative.INFORM, "the receiver comes to know that it may choose before the sender")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "I wait: too many of my values are equally good"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class SetValue(wire.Message, frozen=True):
@@ -207,11 +197,9 @@ class SetValue(wire.Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} for good"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(hearing.sender, self.value)]
 
 

@@ -52,7 +52,7 @@ import msgspec
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Trail
@@ -98,11 +98,9 @@ class Value(wire.Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} in this sample; {_record(self.kept)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(hearing.sender, self.value)]
 
 
@@ -116,16 +114,12 @@ class Difference(wire.Message, frozen=True):
     cost: int
 
     act = Act(Performative.INFORM, "the receiver comes to know what the sample changes in the sender's subtree")
+    proves_nothing = True  # it is a difference of sums
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         changes = [_change(self.broken, counted(abs(self.broken), "broken constraint"))] if self.broken else []
         changes += [_change(self.cost, f"{cost_text(abs(self.cost))} of cost")] if self.cost else []
         return f"by this sample my subtree has {listed(changes) or 'no other cost'}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing by itself, as it is a difference of sums."""
-        return NOTHING
 
 
 def _change(number: int, text: str) -> str:
@@ -138,14 +132,10 @@ class Finish(wire.Message, frozen=True):
     kept: bool
 
     act = acts.TERMINATE
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"the search is over: take your value of the best sample; {_record(self.kept)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 COLDEST = 1e-9

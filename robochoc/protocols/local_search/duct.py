@@ -111,14 +111,10 @@ class Separator(wire.Message, frozen=True):
     dearest: int
 
     act = Act(Performative.INFORM, "the receiver comes to know whose values the sender has to be told")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"my subtree depends on {listed(self.robots)}, and costs {cost_text(self.dearest)} at most"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class SampleContext(wire.Message, frozen=True):
@@ -129,11 +125,9 @@ class SampleContext(wire.Message, frozen=True):
     act = Act(Performative.REQUEST, "the receiver is to take a sample of its subtree for these values")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"sample your subtree with {words.assigned(self.values.items())}"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(*chosen) for chosen in self.values.items()]
 
 
@@ -152,7 +146,6 @@ class SampleCost(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what its sample costs below")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         broken = f", and breaks {counted(self.broken, 'constraint')}" if self.broken else ""
         if self.hopeless:
             best = "with these values there is no solution"
@@ -186,11 +179,9 @@ class Fixed(wire.Message, frozen=True):
     act = Act(Performative.REQUEST, "the receiver is to choose its value for good, for these values")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.assigned(self.values.items())} for good; choose your own value"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [StandsAt(*chosen) for chosen in self.values.items()]
 
 

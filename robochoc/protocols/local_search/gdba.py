@@ -78,7 +78,6 @@ class Improve(Gain, frozen=True):
     """The reduction of the sender's effective cost by its best move: broken hard constraints, and costs (`improve`)."""
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"as I weigh constraints by now, my move would save {saving_in_words(self.broken, self.cost)}"
 
 

@@ -58,7 +58,7 @@ from numpy.typing import NDArray
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Pays, Proof
+from robochoc.model.disclosure import Hearing, Pays, Proof
 from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
 from robochoc.protocols.local_search.mgm import saving_in_words
@@ -113,7 +113,6 @@ class Region(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the constraints of robots around")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if not self.parts:
             return "I have heard of no other robots' constraints"
         tables = sum(len(part.tables) for part in self.parts.values())
@@ -133,15 +132,11 @@ class Values(wire.Message, frozen=True):
     places: dict[str, Place]
 
     act = acts.TELL_VALUE
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         moved = [f"{robot} has its value number {place + 1}" for robot, place in self.places.items()]
         return listed(moved) or "I have heard of nobody who has moved"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Offer(msgspec.Struct, frozen=True, array_like=True):
@@ -158,9 +153,9 @@ class Offers(wire.Message, frozen=True):
     offers: dict[str, Offer]
 
     act = Act(Performative.PROPOSE, "what robots around would save by moving together")
+    proves_nothing = True  # the moves are those of several robots
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if not self.offers:
             return "I have heard of no move that saves anything"
         said = [
@@ -169,10 +164,6 @@ class Offers(wire.Message, frozen=True):
         ]
         return f"{'; '.join(said)}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing by itself, as the moves are of several robots."""
-        return NOTHING
-
 
 class MoveTogether(wire.Message, frozen=True):
     """The moves that are made: the places of the robots' new values, as far as they are new to the sender."""
@@ -180,14 +171,10 @@ class MoveTogether(wire.Message, frozen=True):
     moves: dict[str, Place]
 
     act = Act(Performative.REQUEST, "the robots of a group are to move")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"go: {listed(self.moves)}" if self.moves else "I have heard of no move that is made"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 def _part_proves(robot: str, part: Part, hearing: Hearing) -> Iterator[Proof]:

@@ -68,11 +68,9 @@ class Colour(wire.Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know when the sender will move")
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} at first, and my colour is number {self.colour + 1}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(hearing.sender, self.value)]
 
 

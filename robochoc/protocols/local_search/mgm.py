@@ -40,7 +40,6 @@ from collections.abc import Mapping, Sequence
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
@@ -62,18 +61,12 @@ class Gain(wire.Message, frozen=True):
     cost: int | float
 
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
+    # A gain may be that of two robots that move together (MGM-2), weighted (GDBA), or contain costs that were handed
+    # over (MCS-MGM). So it does not bound the sender's cost.
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"my move would save {saving_in_words(self.broken, self.cost)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing by itself.
-
-        A gain may be one of two that move together (MGM-2), weighed (GDBA), or have costs in it that were handed over
-        (MCS-MGM). So it does not bound what the sender pays.
-        """
-        return NOTHING
 
 
 class Gainers(CycleProtocol):

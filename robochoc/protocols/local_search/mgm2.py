@@ -85,7 +85,6 @@ class Offer(wire.Message, frozen=True):
     act = Act(Performative.PROPOSE, "what both would gain by moving together")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if self.gains is None:
             return "I have no offer for you"
         best = max(saving for row in self.gains for saving in row)
@@ -126,29 +125,21 @@ class Accept(wire.Message, frozen=True):
     cost: int | float
 
     act = acts.ACCEPT
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         saved = saving_in_words(self.broken, self.cost)
         return f"I take your offer: you take your value number {self.place + 1}, and we save {saved} in all"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Reject(wire.Message, frozen=True):
     """The rejection of an offer (`reject`)."""
 
     act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "I do not take your offer"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Go(wire.Message, frozen=True):
@@ -160,16 +151,12 @@ class Go(wire.Message, frozen=True):
     go: bool
 
     act = Act(Performative.INFORM, "the receiver comes to know whether the sender gains most")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if self.go:
             return "go: of my neighbours, nobody is to move before us"
         return "no go: one of my neighbours is to move instead"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 _DOMAINS, _VALUES, _OFFERS, _ANSWERS, _GAINS, _GO = range(-1, 5)

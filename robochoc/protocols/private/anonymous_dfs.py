@@ -16,7 +16,6 @@ from abc import abstractmethod
 from collections.abc import Sequence
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.wording import Wording
@@ -32,56 +31,40 @@ class Wave(Message, frozen=True):
     score: bytes
 
     act = Act(Performative.PROPOSE, "a candidate for the root, for the receiver to prefer or to drop")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"somebody whose score begins with {self.score[:2].hex()} wants to be the root"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Token(Message, frozen=True):
     """The token of the depth-first search; a receiver that it has not visited becomes the sender's child."""
 
     act = Act(Performative.REQUEST, "the receiver is to go on with the tree")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "if you are not in the tree yet, you are my child"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Bounce(Message, frozen=True):
     """The token comes back at once: the sender is in the tree already, above the receiver."""
 
     act = Act(Performative.REFUSE, "the sender is in the tree already")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "I am in the tree, above you"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Back(Message, frozen=True):
     """The token on its way back: all robots below the sender are in the tree."""
 
     act = Act(Performative.INFORM, "what `Token` asked for is done")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "all below me are in the tree"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 AnonymousTreeMessage = Wave | Token | Bounce | Back

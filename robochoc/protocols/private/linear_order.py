@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text, counted
@@ -56,14 +55,10 @@ class CostSum(Message, frozen=True):
     range: int
 
     act = Act(Performative.REQUEST, "the receiver is to add how far its costs may go")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "add to these two sums, which began with random numbers, how far your costs may go"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class CostRange(Message, frozen=True):
@@ -73,14 +68,10 @@ class CostRange(Message, frozen=True):
     range: int
 
     act = Act(Performative.INFORM, "the receiver comes to know what all costs may add up to")
+    proves_nothing = True  # about a single robot, if there are three robots or more
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"our costs add up to at least {cost_text(self.least)}, and to at most {cost_text(self.range)} more"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing about one robot, if there are three or more."""
-        return NOTHING
 
 
 class Plan(Message, frozen=True):
@@ -90,15 +81,11 @@ class Plan(Message, frozen=True):
     axes: Shape
 
     act = Act(Performative.REQUEST, "the receiver is to plan its own table")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         axes, cells = counted(len(self.axes), "codename"), counted(cells_of(self.axes), "cell")
         return f"in turn {self.turn + 1} there will be a table over {axes} here, with {cells}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class AskAxis(Message, frozen=True):
@@ -107,14 +94,10 @@ class AskAxis(Message, frozen=True):
     turn: int
 
     act = Act(Performative.QUERY_REF, "the receiver is asked for the axis of its values")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"what are you called in turn {self.turn + 1}, if you are still to come?"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Axis(Message, frozen=True):
@@ -125,14 +108,10 @@ class Axis(Message, frozen=True):
     values: list[Value]
 
     act = Act(Performative.INFORM, "the receiver comes to know the axis that it asked for")
+    proves_nothing = True  # the files declare these values
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"in turn {self.turn + 1} call me {self.codename[:4]}; as declared, {words.domain(self.values)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing, as the files declare these values."""
-        return NOTHING
 
 
 class Gone(Message, frozen=True):
@@ -141,14 +120,10 @@ class Gone(Message, frozen=True):
     turn: int
 
     act = Act(Performative.REFUSE, "the sender comes before the receiver")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"in turn {self.turn + 1} I come before you"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 T = TypeVar("T", bound=np.generic)

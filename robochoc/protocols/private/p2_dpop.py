@@ -63,14 +63,13 @@ Choices that the paper leaves open, and differences (its text was not at hand; t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import assert_never, cast
 
 import msgspec
 import numpy as np
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
@@ -109,14 +108,10 @@ class EncryptedTable(Message, frozen=True):
     ciphers: bytes
 
     act = Act(Performative.REQUEST, "the receiver is to add its costs, without reading the table")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"the table of turn {self.turn + 1}, encrypted: {len(self.ciphers):,} bytes"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Opening(Message, frozen=True):
@@ -125,14 +120,10 @@ class Opening(Message, frozen=True):
     cipher: bytes
 
     act = Act(Performative.REQUEST, "the receiver is to blind it, and to take its share of the key off")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"blind this cipher ({self.cipher[:2].hex()}), and take your share of the key off"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 LinearMessage = CostSum | CostRange | Plan | AskAxis | Axis | Gone | EncryptedTable | Opening

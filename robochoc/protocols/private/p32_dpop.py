@@ -87,7 +87,6 @@ class Table(UTIL, frozen=True):
     turn: int
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{super().in_words(words)}, for turn {self.turn + 1}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:

@@ -118,11 +118,9 @@ class Codes(Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"call me {self.codename[:4]}; {words.domain(self.values)}, and you get a key for each"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
@@ -138,7 +136,6 @@ class UTIL(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         axes = counted(len(self.axes), "codename")
         return f"a table over {axes}: {counted(len(self.cells) // WIDTH, 'cost')}, hidden by keys"
 
@@ -172,7 +169,6 @@ class VALUE(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver comes to know the values above it")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"the codes of {counted(len(self.codes), 'value')} above you"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:

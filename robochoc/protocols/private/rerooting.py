@@ -10,12 +10,10 @@ in multi-agent decision making", JAIR 47, 2013, rerooting.)
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
 from enum import IntEnum
 from typing import ClassVar, assert_never
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording
 from robochoc.protocols.key_stream import shuffled
@@ -47,14 +45,10 @@ class Join(Message, frozen=True):
     key: bytes
 
     act = Act(Performative.REQUEST, "the receiver is to take the number, and to add its public key")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"take the next number in the ring, and add your key to {self.key[:2].hex()}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Setup(Message, frozen=True):
@@ -65,14 +59,10 @@ class Setup(Message, frozen=True):
     turns: int
 
     act = Act(Performative.INFORM, "the receiver comes to know the team's key")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"our key begins with {self.key[:2].hex()}, and there are {self.turns} turns"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Vector(Message, frozen=True):
@@ -83,9 +73,9 @@ class Vector(Message, frozen=True):
     ciphers: bytes
 
     act = Act(Performative.REQUEST, "the receiver is to shuffle it, to open it, or to pass it on")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         to_do = {
             Stage.TO_FIRST: "pass it on to the first of the ring",
             Stage.MIXING: "shuffle it",
@@ -94,23 +84,15 @@ class Vector(Message, frozen=True):
         }
         return f"somebody's turns, encrypted ({self.tag[:2].hex()}): {to_do[self.stage]}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
-
 
 class Next(Message, frozen=True):
     """The root has its value: the next turn begins."""
 
     act = Act(Performative.INFORM, "the turn is over")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return "the next turn begins"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 RerootingMessage = Join | Setup | Vector | Next

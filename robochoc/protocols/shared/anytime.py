@@ -31,7 +31,7 @@ import msgspec
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
@@ -55,17 +55,13 @@ class Place(wire.Message, frozen=True):
     height: Natural | None
 
     act = Act(Performative.INFORM, "the receiver comes to know a root, and how far the sender is from it")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         parent = "I am a root" if self.parent is None else f"{self.parent} is my parent, {self.root} my root"
         if self.height is not None:
             return f"{parent}; the tree is complete, with a height of {self.height}"
         return f"{parent}, at a distance of {self.distance}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Step(wire.Message, frozen=True):
@@ -76,11 +72,9 @@ class Step(wire.Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} in the next step that is to be priced"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [can_take(hearing.sender, self.value)]
 
 
@@ -90,14 +84,10 @@ class Paid(wire.Message, frozen=True):
     cost: int | float
 
     act = Act(Performative.INFORM, "the receiver adds it to what it pays itself")
+    proves_nothing = True  # the cost is a sum over many robots
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"my subtree pays {cost_text(self.cost)} for the next step"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nothing by itself, as it is a sum over many robots."""
-        return NOTHING
 
 
 class Best(wire.Message, frozen=True):
@@ -106,16 +96,12 @@ class Best(wire.Message, frozen=True):
     step: Natural | None
 
     act = Act(Performative.INFORM, "the receiver comes to know which of its values to remember")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         if self.step is None:
             return "all steps so far broke a hard constraint"
         return f"the best step so far is that of cycle {self.step}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 AnytimeMessage = Place | Step | Paid | Best

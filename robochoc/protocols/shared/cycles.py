@@ -61,11 +61,9 @@ class Value(wire.Message, frozen=True):
     act = acts.TELL_VALUE
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return f"{words.own_value(self.value)} in this cycle"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         # It may move after the last cycle without a word.
         return [can_take(hearing.sender, self.value)]
 
@@ -78,11 +76,9 @@ class Domain(wire.Message, frozen=True):
     act = acts.TELL_DOMAIN
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
         return words.domain(self.values)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, counted, listed
 
@@ -23,14 +21,10 @@ class Wave(Message, frozen=True):
     candidate: str
 
     act = Act(Performative.PROPOSE, "a candidate for the root, for the receiver to prefer or to drop")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"{self.candidate}, which has {counted(self.neighbours, 'neighbour')}, wants to be the root"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 Visited = dict[str, Annotated[int, msgspec.Meta(ge=1)]]
@@ -43,14 +37,10 @@ class Token(Message, frozen=True):
     visited: Visited
 
     act = Act(Performative.REQUEST, "the receiver is to go on with the tree")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"you are my child in the tree{_news(self.visited)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 class Back(Message, frozen=True):
@@ -59,14 +49,10 @@ class Back(Message, frozen=True):
     visited: Visited
 
     act = Act(Performative.INFORM, "what `Token` asked for is done")
+    proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
         return f"all below me are in the tree{_news(self.visited)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver."""
-        return NOTHING
 
 
 def _news(visited: Visited) -> str:
