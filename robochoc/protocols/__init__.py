@@ -1,8 +1,8 @@
-"""Distributed Constraint Reasoning Protocols unit: one file a protocol, each beside its paper.
+"""Distributed Constraint Reasoning Protocols unit: one file a protocol, each naming its paper.
 
-What a protocol is stands here. Protocols stand in families: `satisfaction`, `optimization`, `inference` and
-`local_search`; what several families are built on is in `shared`. Messages and settings of a family have folders of
-their own: those of `satisfaction/abt.py` are in `satisfaction/messages/abt.py`.
+`protocol.py` declares the interface. Protocols are grouped in families, one folder each; `shared` contains parts that
+several families use. A protocol's file contains its messages and settings as well, except where mypyc compiles the
+protocol: then its messages are in `X_messages.py`.
 
 Everything here is pure: no clock, no chance, no process, no input or output (import-linter sees to it).
 """

@@ -27,7 +27,7 @@ from tests.support.program import robochoc_within
 
 WITHOUT_DOCSTRING = """
     from robochoc.protocols.satisfaction.first_fit import FirstFit
-    from robochoc.protocols.satisfaction.messages.first_fit import Placed
+    from robochoc.protocols.satisfaction.first_fit_messages import Placed
     from robochoc.protocols.dynamic import DynamicProtocol
     from robochoc.protocols.protocol import Protocol
     from robochoc.protocols.traits import Traits

@@ -28,7 +28,7 @@ from robochoc.communication.network.transport import CannotConnectError, Transpo
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.cases import looped
 from tests.support.limits import HANG_S

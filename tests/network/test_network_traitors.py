@@ -26,8 +26,8 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.awc import AWC
-from robochoc.protocols.satisfaction.messages.abt import Ok
 from tests.support.cases import looped
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.limits import HANG_S

@@ -32,12 +32,11 @@ from robochoc.model.message import Envelope, encode
 from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.findings import NOTHING, Trail
 from robochoc.protocols.local_search.dsa import DSA
-from robochoc.protocols.optimization.messages.syncbb import BestPath, Path
-from robochoc.protocols.optimization.syncbb import SyncBB
+from robochoc.protocols.optimization.syncbb import BestPath, Path, SyncBB
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.awc import AWC
-from robochoc.protocols.satisfaction.messages.abt import Ok
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.explanation import held_above

@@ -14,10 +14,8 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.satisfaction.aas import AAS
+from robochoc.protocols.satisfaction.aas import AAS, AASSettings, AddLink, Narrow, Nogood, Ok
 from robochoc.protocols.satisfaction.aggregates import AggregateStore, covers, matching, met
-from robochoc.protocols.satisfaction.messages.aas import AddLink, Narrow, Nogood, Ok
-from robochoc.protocols.satisfaction.settings.aas import AASSettings
 from robochoc.run import Runtime, solve
 from tests.support.agents import replies, started_robot, value
 from tests.support.examples import count

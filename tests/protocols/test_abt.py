@@ -6,8 +6,8 @@ from functools import partial
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.small_teams import different, odd_triple, triangle
 

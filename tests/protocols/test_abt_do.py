@@ -13,7 +13,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.abt_do import ABTDORetro, CurrentOrder
-from robochoc.protocols.satisfaction.messages.abt_do import AddLink, Counters, Nogood, Ok, Order
+from robochoc.protocols.satisfaction.abt_do_messages import AddLink, Counters, Nogood, Ok, Order
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.cases import cases, looped
 from tests.support.problems import random_team, team_of

@@ -10,8 +10,8 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.satisfaction.abt_hyb import ABTHyb
-from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.run import ScheduleName
 from tests.support.agents import replies, started_robot, value
 from tests.support.examples import count

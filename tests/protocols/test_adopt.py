@@ -5,8 +5,8 @@ from __future__ import annotations
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt import ADOPT
-from robochoc.protocols.optimization.messages.adopt import Cost, Threshold, Value
-from robochoc.protocols.optimization.messages.bounding import Terminate
+from robochoc.protocols.optimization.adopt_messages import Cost, Threshold, Value
+from robochoc.protocols.optimization.bounding_messages import Terminate
 from tests.support.agents import after, replies, value
 from tests.support.pseudo_trees import context, middle, placed, priced, root, to
 

@@ -10,14 +10,12 @@ import pytest
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization import adopt_messages as adopt
 from robochoc.protocols.optimization.adopt import ADOPT
-from robochoc.protocols.optimization.adopt_k import ADOPTk
+from robochoc.protocols.optimization.adopt_k import ADOPTk, ADOPTkSettings, Value
+from robochoc.protocols.optimization.bnb_adopt_messages import Cost
 from robochoc.protocols.optimization.bounding import BoundingProtocol
-from robochoc.protocols.optimization.messages import adopt
-from robochoc.protocols.optimization.messages.adopt_k import Value
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost
-from robochoc.protocols.optimization.messages.bounding import Terminate
-from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
+from robochoc.protocols.optimization.bounding_messages import Terminate
 from robochoc.run import solve
 from tests.support.agents import after, replies, value
 from tests.support.cases import cases, looped

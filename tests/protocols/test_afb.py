@@ -10,9 +10,8 @@ from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings, Incumbent
-from robochoc.protocols.optimization.afb import AFB
+from robochoc.protocols.optimization.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.optimization.afb_bounds import Cost
-from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.problems import team_of

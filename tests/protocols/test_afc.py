@@ -11,7 +11,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.afc import AFC, FilteredDomain
-from robochoc.protocols.satisfaction.messages.afc import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
+from robochoc.protocols.satisfaction.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import robot_of

@@ -13,8 +13,8 @@ from robochoc.model.message import Message, Value, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.protocols.satisfaction.afc_ng import AFCng, first_difference
-from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.complex_problems import complex_team
 from tests.support.problems import random_team, team_of

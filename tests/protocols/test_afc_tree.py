@@ -14,10 +14,10 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.afc_ng import AFCng
+from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved
 from robochoc.protocols.satisfaction.afc_tree import AFCTree
-from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
-from robochoc.protocols.satisfaction.messages.afc_tree import Accept
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.afc_tree_messages import Accept
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import violations

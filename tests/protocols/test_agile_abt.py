@@ -15,6 +15,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.wording import Wording
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.agile_abt import AgileABT
+from robochoc.protocols.satisfaction.agile_abt_messages import AddLink, Ok, Order
 from robochoc.protocols.satisfaction.agile_order import (
     UNKNOWN,
     Explanation,
@@ -24,8 +25,7 @@ from robochoc.protocols.satisfaction.agile_order import (
     proposed,
     updated,
 )
-from robochoc.protocols.satisfaction.messages.agile_abt import AddLink, Ok, Order
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.examples import count, examples
 from tests.support.problems import random_team

@@ -17,10 +17,9 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.satisfaction.compapo import CompAPO
+from robochoc.protocols.satisfaction.compapo import Assign, Changes, CompAPO, Evaluate, Evaluation, Ok, Release
 from robochoc.protocols.satisfaction.compapo_tables import sizes_in
 from robochoc.protocols.satisfaction.mediation import Mediation, allows
-from robochoc.protocols.satisfaction.messages.compapo import Assign, Changes, Evaluate, Evaluation, Ok, Release
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import violations

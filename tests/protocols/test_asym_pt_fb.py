@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 
 from robochoc.model.problem import INFINITE, Team
-from robochoc.protocols.asymmetric.asym_pt_fb import AsymPTFB
-from robochoc.protocols.asymmetric.messages.asym_pt_fb import Row, RowRequest
-from robochoc.protocols.optimization.messages.branching import Members, Report, Request, Result
-from robochoc.protocols.optimization.messages.pt_fb import CPA, Reduce
+from robochoc.protocols.asymmetric.asym_pt_fb import AsymPTFB, Row, RowRequest
+from robochoc.protocols.optimization.branching import Members, Report, Request, Result
+from robochoc.protocols.optimization.pt_fb import CPA, Reduce
 from tests.support.agents import after, replies
 from tests.support.asymmetric_problems import priced_part, two_valued
 from tests.support.pseudo_trees import placed

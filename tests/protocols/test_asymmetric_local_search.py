@@ -11,12 +11,9 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
-from robochoc.protocols.asymmetric.acls import ACLS
+from robochoc.protocols.asymmetric.acls import ACLS, ACLSSettings, Proposal, Sides
 from robochoc.protocols.asymmetric.gca_mgm import GCAMGM
-from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM
-from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
-from robochoc.protocols.asymmetric.messages.transfers import Transfer
-from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
+from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM, Transfer
 from robochoc.protocols.local_search.mgm import Gain
 from robochoc.protocols.shared.cycles import NO_GAIN, Value
 from robochoc.solver.agent_problem import RunParameters

@@ -9,9 +9,8 @@ import pytest
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Team
-from robochoc.protocols.asymmetric.atwb import ATWB
-from robochoc.protocols.asymmetric.messages.atwb import Side, SideRequest
-from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution
+from robochoc.protocols.asymmetric.atwb import ATWB, Side, SideRequest
+from robochoc.protocols.optimization.afb import CPA, FBCPA, FBEstimate, NewSolution
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import after, assert_refused, replies, started_robot, value
 from tests.support.asymmetric_problems import priced_part, two_valued

@@ -9,7 +9,7 @@ from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.satisfaction.awc import AWC, Kept, NogoodList
-from robochoc.protocols.satisfaction.messages.awc import AddLink, Nogood, Ok
+from robochoc.protocols.satisfaction.awc_messages import AddLink, Nogood, Ok
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.cases import looped
 from tests.support.complex_problems import complex_team

@@ -6,8 +6,8 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Value
-from robochoc.protocols.optimization.messages.bounding import Terminate
+from robochoc.protocols.optimization.bnb_adopt_messages import Cost, Value
+from robochoc.protocols.optimization.bounding_messages import Terminate
 from tests.support.agents import after, replies, value
 from tests.support.pseudo_trees import context, placed, priced, root, to
 

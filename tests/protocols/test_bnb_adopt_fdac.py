@@ -10,10 +10,15 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.optimization import bnb_adopt_fdac
-from robochoc.protocols.optimization.bnb_adopt_fdac import BnBADOPTFDAC
-from robochoc.protocols.optimization.messages.bnb_adopt_fdac import Cost, Domain, Moved, Value
-from robochoc.protocols.optimization.messages.bounding import Terminate
-from robochoc.protocols.optimization.settings.bnb_adopt_fdac import BnBADOPTFDACSettings
+from robochoc.protocols.optimization.bnb_adopt_fdac import (
+    BnBADOPTFDAC,
+    BnBADOPTFDACSettings,
+    Cost,
+    Domain,
+    Moved,
+    Value,
+)
+from robochoc.protocols.optimization.bounding_messages import Terminate
 from tests.support.agents import after, assert_refused, replies, value
 from tests.support.pseudo_trees import context, placed, priced, to
 from tests.support.spent import spent

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.adopt_k import ADOPTk
+from robochoc.protocols.optimization.adopt_k import ADOPTk, ADOPTkSettings
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
-from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
-from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
+from robochoc.protocols.optimization.bnb_adopt_messages import BnBADOPTSettings, Cost, Domain, Floor, Value
 from tests.support.agents import after, assert_refused, replies, sent, value
 from tests.support.cases import looped
 from tests.support.pseudo_trees import context, placed, priced

@@ -11,11 +11,9 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization import adopt, bnb_adopt
+from robochoc.protocols.optimization import adopt, adopt_messages, bnb_adopt, bnb_adopt_messages
 from robochoc.protocols.optimization.bounding import BoundingProtocol
-from robochoc.protocols.optimization.messages import adopt as adopt_messages
-from robochoc.protocols.optimization.messages import bnb_adopt as bnb_adopt_messages
-from robochoc.protocols.optimization.messages.bounding import Terminate
+from robochoc.protocols.optimization.bounding_messages import Terminate
 from robochoc.run.incumbent import lower_bound
 from tests.support.agents import after, replies, robot_of, started, started_robot
 from tests.support.brute_force import least_cost

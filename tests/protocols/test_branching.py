@@ -6,10 +6,9 @@ from random import Random
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization.branching import Members, Report, Request, Result, Terminate
 from robochoc.protocols.optimization.forward_bounding import CostsAbove
-from robochoc.protocols.optimization.messages.branching import Members, Report, Request, Result, Terminate
-from robochoc.protocols.optimization.messages.ncbb import Greedy, Search
-from robochoc.protocols.optimization.ncbb import NCBB
+from robochoc.protocols.optimization.ncbb import NCBB, Greedy, Search
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

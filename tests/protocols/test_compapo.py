@@ -13,19 +13,19 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.satisfaction.compapo import CompAPO
-from robochoc.protocols.satisfaction.mediation import Mediation, allows
-from robochoc.protocols.satisfaction.messages.compapo import (
+from robochoc.protocols.satisfaction.compapo import (
     Assign,
+    CompAPO,
     Evaluate,
     Evaluation,
     Free,
     Init,
     Ok,
     Release,
-    Table,
     Wait,
 )
+from robochoc.protocols.satisfaction.compapo_tables import Table
+from robochoc.protocols.satisfaction.mediation import Mediation, allows
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import after, assert_refused, replies, robot_of, started, value
 from tests.support.examples import count

@@ -8,9 +8,7 @@ from random import Random
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.satisfaction.dba import DBA
-from robochoc.protocols.satisfaction.messages.dba import Improve
-from robochoc.protocols.satisfaction.settings.dba import DBASettings
+from robochoc.protocols.satisfaction.dba import DBA, DBASettings, Improve
 from robochoc.protocols.shared.cycles import Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters

@@ -14,8 +14,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.satisfaction.disac import DisAC
-from robochoc.protocols.satisfaction.messages.disac import Del, Domain
+from robochoc.protocols.satisfaction.disac import Del, DisAC, Domain
 from robochoc.replay.replay import replay
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.options import Preprocess

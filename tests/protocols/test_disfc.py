@@ -19,7 +19,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, ConstraintModel, Team
 from robochoc.protocols.satisfaction.disfc import DisFC
-from robochoc.protocols.satisfaction.messages.disfc import AddLink, Nogood, Ok
+from robochoc.protocols.satisfaction.disfc_messages import AddLink, Nogood, Ok
 from robochoc.solver import filters
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows

@@ -25,9 +25,8 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.satisfaction.dynabt import DynABT
-from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
-from robochoc.protocols.satisfaction.messages.dynabt import Nogood
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
+from robochoc.protocols.satisfaction.dynabt import DynABT, Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated

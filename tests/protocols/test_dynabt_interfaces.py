@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from robochoc.model.change import apply_changes
 from robochoc.model.problem import AddAgent, AddConstraint, Child, Domain, Parent, RemoveAgent, Robot, Team, Variable
-from robochoc.protocols.satisfaction.messages.abt import Ok
-from robochoc.protocols.satisfaction.messages.dynabt import Nogood
+from robochoc.protocols.satisfaction.abt_messages import Ok
+from robochoc.protocols.satisfaction.dynabt import Nogood
 from robochoc.solver.explanation import invalidated_by
 from tests.support.agents import replies, value
 from tests.support.dynabt_robots import after, agent

@@ -23,7 +23,7 @@ from robochoc.model.message import Envelope, Message, Value
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import AgentProblem, agent_problems
 from robochoc.solver.encoding import TooLargeError

@@ -12,11 +12,21 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.hs_cai import HSCAI
-from robochoc.protocols.optimization.hs_cai_tables import MOST_CELLS, kept_axes, least_over, table_of
-from robochoc.protocols.optimization.messages.branching import Result
-from robochoc.protocols.optimization.messages.hs_cai import CPA, Axis, CtxtUtil, Domain, InferCtxt, PreUtil
-from robochoc.protocols.optimization.settings.hs_cai import HSCAISettings
+from robochoc.protocols.optimization.branching import Result
+from robochoc.protocols.optimization.hs_cai import (
+    CPA,
+    HSCAI,
+    MOST_CELLS,
+    Axis,
+    CtxtUtil,
+    Domain,
+    HSCAISettings,
+    InferCtxt,
+    PreUtil,
+    kept_axes,
+    least_over,
+    table_of,
+)
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies
 from tests.support.cases import looped

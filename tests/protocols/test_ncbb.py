@@ -12,9 +12,8 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import Incumbent
-from robochoc.protocols.optimization.messages.branching import Members, Request, Result, Terminate
-from robochoc.protocols.optimization.messages.ncbb import Greedy, Search
-from robochoc.protocols.optimization.ncbb import NCBB
+from robochoc.protocols.optimization.branching import Members, Request, Result, Terminate
+from robochoc.protocols.optimization.ncbb import NCBB, Greedy, Search
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost

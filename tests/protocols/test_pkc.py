@@ -18,9 +18,9 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.disfc import DisFC
-from robochoc.protocols.satisfaction.messages.abt import Ok
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

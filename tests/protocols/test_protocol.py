@@ -21,7 +21,7 @@ from robochoc.model.problem import (
 )
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import AddLink
+from robochoc.protocols.satisfaction.abt_messages import AddLink
 from robochoc.protocols.traits import ENDS_WITH_EITHER, ENDS_WITH_PROOF, UNDECLARED, Traits
 from tests.support.agents import robot_of
 from tests.support.cases import looped

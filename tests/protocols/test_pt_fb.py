@@ -6,9 +6,8 @@ import pytest
 
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.messages.branching import Members, Report, Request, Result
-from robochoc.protocols.optimization.messages.pt_fb import CPA, Reduce
-from robochoc.protocols.optimization.pt_fb import PTFB
+from robochoc.protocols.optimization.branching import Members, Report, Request, Result
+from robochoc.protocols.optimization.pt_fb import CPA, PTFB, Reduce
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies
 from tests.support.pseudo_trees import placed, priced

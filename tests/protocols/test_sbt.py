@@ -9,8 +9,8 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.satisfaction.messages.sbt import CPA, Backtrack
 from robochoc.protocols.satisfaction.sbt import SBT
+from robochoc.protocols.satisfaction.sbt_messages import CPA, Backtrack
 from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.brute_force import solutions
 from tests.support.cases import looped

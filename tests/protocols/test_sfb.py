@@ -16,9 +16,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.optimization.interchangeable import expanded
-from robochoc.protocols.optimization.messages.sfb import Above, Below, CPAs, Explored, Solution
-from robochoc.protocols.optimization.settings.sfb import SFBSettings
-from robochoc.protocols.optimization.sfb import LARGEST, SFB
+from robochoc.protocols.optimization.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT

@@ -6,8 +6,7 @@ import math
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.protocols.optimization.messages.sfb import Explored
-from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.optimization.sfb import SFB, Explored
 from tests.support.agents import replies
 from tests.support.cases import looped
 from tests.support.pseudo_trees import priced

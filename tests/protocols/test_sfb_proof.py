@@ -15,8 +15,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.protocols.optimization.messages.sfb import Explored, Solution
-from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.optimization.sfb import SFB, Explored, Solution
 from robochoc.protocols.optimization.sfb_bounds import BOUND, COST, VALUES
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import RunParameters, agent_problems

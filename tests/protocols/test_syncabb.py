@@ -10,10 +10,8 @@ import pytest
 
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
-from robochoc.protocols.asymmetric.messages.syncabb import CPA, CPABack, FullBack, Priced, TooCostly
-from robochoc.protocols.asymmetric.settings.syncabb import SyncABBSettings
-from robochoc.protocols.asymmetric.syncabb import SyncABB
-from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Terminate
+from robochoc.protocols.asymmetric.syncabb import CPA, CPABack, FullBack, Priced, SyncABB, SyncABBSettings, TooCostly
+from robochoc.protocols.optimization.syncbb import Backtrack, BestPath, Terminate
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 

@@ -13,8 +13,7 @@ from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings, Incumbent
-from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Cost, Path, Terminate
-from robochoc.protocols.optimization.syncbb import SyncBB
+from robochoc.protocols.optimization.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.brute_force import least_cost

@@ -8,7 +8,7 @@ import sexpdata
 
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.services.identifier import AgentIdentifier
 from robochoc.sniffer.acl import ACLMessage, parse, text

@@ -27,7 +27,7 @@ from robochoc.model.message import encode
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.in_memory_network import RUN, ScriptedTransport

@@ -12,8 +12,8 @@ from robochoc.model.message import Message
 from robochoc.model.problem import Constraint
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.settings_base import Settings
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.optimization.messages.bounding import Context
+from robochoc.protocols.optimization.bounding_messages import Context
 from robochoc.protocols.shared.dfs import TreeProtocol
 from tests.support.agents import robot_of
 from tests.support.cost_problems import with_costs

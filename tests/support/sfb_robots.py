@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 from robochoc.model.message import Message
 from robochoc.model.problem import Team
-from robochoc.protocols.optimization.messages.sfb import CPAs
-from robochoc.protocols.optimization.settings.sfb import SFBSettings
-from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.optimization.sfb import SFB, CPAs, SFBSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

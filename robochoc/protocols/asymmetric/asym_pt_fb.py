@@ -40,17 +40,39 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
+from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.asymmetric.messages.asym_pt_fb import Row, RowRequest
+from robochoc.model.wording import Wording, costs_text, counted
+from robochoc.protocols.optimization.branching import Members, Number, Report, Request, Result, Terminate
 from robochoc.protocols.optimization.forward_bounding import CostsAbove
-from robochoc.protocols.optimization.messages.branching import Members, Number, Report, Request, Result, Terminate
-from robochoc.protocols.optimization.messages.pt_fb import CPA, Reduce
-from robochoc.protocols.optimization.pt_fb import PTFB
+from robochoc.protocols.optimization.pt_fb import CPA, PTFB, Reduce
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class RowRequest(Message, frozen=True):
+    """A request for what the receiver's own side charges with its value for each of the sender's `values`."""
+
+    values: list[Value]
+
+    act = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side charges with each of its values")
+
+    def in_words(self, _: Wording) -> str:
+        return f"what does your side add for each of my {counted(len(self.values), 'value')}?"
+
+
+class Row(Message, frozen=True):
+    """For each value of the receiver, the cost that the sender's own side adds to what the sender counts itself."""
+
+    costs: list[Number]
+
+    act = Act(Performative.INFORM, "the answer to `RowRequest`")
+
+    def in_words(self, _: Wording) -> str:
+        return f"for your values my side adds {costs_text(self.costs)}"
 
 
 class CostsOfBothSides(CostsAbove):

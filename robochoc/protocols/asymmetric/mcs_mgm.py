@@ -40,12 +40,33 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from robochoc.model import message as wire
-from robochoc.protocols.asymmetric.messages.transfers import Transfer
-from robochoc.protocols.local_search.mgm import Gain, Gainers
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording
+from robochoc.protocols.local_search.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class Transfer(Message, frozen=True):
+    """An entry of the sender's part, at both robots' values: from now on the receiver pays it. None: no transfer.
+
+    A cost is a pair: broken hard constraints, and costs.
+    """
+
+    entry: tuple[int, int | float] | None
+
+    act = Act(Performative.INFORM, "the receiver comes to know what its move has cost the sender, if that is too much")
+    # The entry may contain costs that were handed over before.
+    proves_nothing = True
+
+    def in_words(self, _: Wording) -> str:
+        if self.entry is None:
+            return "I have no costs to hand over to you"
+        return f"you pay my side of our two values from now on: {saving_in_words(*self.entry)}"
+
 
 Entry = tuple[int, wire.Value]
 """An entry of the own side: the place of the own value, and the other robot's value."""

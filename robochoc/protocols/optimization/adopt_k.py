@@ -47,22 +47,54 @@ every lower t. And so on, down to a leaf, where LB = UB: a contradiction.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, cast
 
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols.optimization import bnb_adopt_messages as bnb_adopt
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
-from robochoc.protocols.optimization.messages import bnb_adopt
-from robochoc.protocols.optimization.messages.adopt_k import Value
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor
-from robochoc.protocols.optimization.messages.bounding import Entry, Number, Terminate
-from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
+from robochoc.protocols.optimization.bnb_adopt_messages import BnBADOPTSettings, Cost, Domain, Floor
+from robochoc.protocols.optimization.bounding_messages import Entry, Number, Terminate
 from robochoc.protocols.optimization.shares import clamp_share, split_threshold
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class ADOPTkSettings(BnBADOPTSettings, frozen=True):
+    """`k`: a value is left when its lower bound is k above the threshold; 1: as ADOPT does, `inf`: as BnB-ADOPT.
+
+    `heuristic`: where lower bounds begin: at 0 (`none`), or at what children say before the search (`dp`).
+    """
+
+    may_be_infinite: ClassVar[frozenset[str]] = frozenset({"k"})
+
+    k: int | float = 1000
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` unless `k` is a whole number from 1, or infinite."""
+        if self.k != INFINITE and (self.k < 1 or not isinstance(self.k, int)):
+            raise ValueError(f"k is {self.k}; it must be a whole number, 1 or more, or inf")
+
+
+class Value(bnb_adopt.Value, frozen=True):
+    """The sender's value, the number of its changes (ID), and the receiver's thresholds (TH^B, and TH^A, `allowance`).
+
+    The receiver keeps its value while its lower bound is less than k above the allowance, and below the threshold.
+    """
+
+    allowance: Number = 0
+
+    def in_words(self, words: Wording) -> str:
+        change = f"{words.own_value(self.value)} from now on (change {self.counter})"
+        if not self.allowance and math.isinf(self.threshold):
+            return change
+        dear = "" if math.isinf(self.threshold) else f", or {cost_text(self.threshold)}"
+        return f"{change}; try other values once yours costs k more than {cost_text(self.allowance)}{dear}"
 
 
 class ADOPTk(BnBADOPT):

@@ -59,10 +59,9 @@ from typing import Any, ClassVar, cast
 
 from robochoc.model import message
 from robochoc.model.message import Message
+from robochoc.protocols.optimization.bnb_adopt_messages import BnBADOPTSettings, Cost, Domain, Floor, Value
+from robochoc.protocols.optimization.bounding_messages import Number, Terminate
 from robochoc.protocols.optimization.depth_first import DepthFirstProtocol
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
-from robochoc.protocols.optimization.messages.bounding import Number, Terminate
-from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

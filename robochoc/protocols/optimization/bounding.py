@@ -17,7 +17,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.optimization.messages.bounding import Context, Entry, Number, Terminate
+from robochoc.protocols.optimization.bounding_messages import Context, Entry, Number, Terminate
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.solver.compiled import LocalProblem

@@ -12,9 +12,9 @@ import msgspec
 
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization.bnb_adopt_messages import Cost, Value
 from robochoc.protocols.optimization.bounding import BoundingProtocol
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Value
-from robochoc.protocols.optimization.messages.bounding import Context, Number, Terminate
+from robochoc.protocols.optimization.bounding_messages import Context, Number, Terminate
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

@@ -19,8 +19,7 @@ from collections.abc import Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.branching import BranchingProtocol
-from robochoc.protocols.optimization.messages.branching import Members, Number, Report, Request, Result
+from robochoc.protocols.optimization.branching import BranchingProtocol, Members, Number, Report, Request, Result
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

@@ -37,21 +37,220 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple, assert_never, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.model import message
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import HasOnly, Hearing, Proof, table_proves
 from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.branching import BranchingProtocol
-from robochoc.protocols.optimization.hs_cai_tables import Table, kept_axes, least_over, number_of, table_of
-from robochoc.protocols.optimization.messages.branching import Number, Result, Terminate
-from robochoc.protocols.optimization.messages.hs_cai import CPA, Axis, CtxtUtil, Domain, InferCtxt, PreUtil
-from robochoc.protocols.optimization.settings.hs_cai import HSCAISettings
+from robochoc.model.wording import Wording, cost_text, listed
+from robochoc.protocols import acts
+from robochoc.protocols.optimization.branching import BranchingProtocol, Number, Result, Terminate, allowance
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
+
+MOST_CELLS = 1 << 17
+"""Of a table, and of a message with one; and so many for each own value while it is made."""
+
+
+class Table(NamedTuple):
+    """Costs, with an axis for each robot of `names`."""
+
+    names: tuple[str, ...]
+    costs: NDArray[np.float64]
+
+    def at(self, places: Mapping[str, int]) -> Table:
+        """Return the part of it with these robots' values at these places."""
+        index = tuple([places.get(name, slice(None)) for name in self.names])
+        return Table(tuple(name for name in self.names if name not in places), self.costs[index])
+
+    def over(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Return the least costs with an axis for each of `names`, in this order; of length 1 where it has none."""
+        gone = tuple(axis for axis, name in enumerate(self.names) if name not in names)
+        left = [name for name in self.names if name in names]
+        least = self.costs.min(axis=gone)
+        least = least.transpose([left.index(name) for name in names if name in left])
+        aligned: NDArray[np.float64] = least[tuple([slice(None) if name in left else np.newaxis for name in names])]
+        return aligned
+
+
+def kept_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
+    """Return the axes that a table may have: the lowest robots, at most `most`, and not too many cells together."""
+    kept: list[Axis] = []
+    for axis in sorted(axes, key=lambda axis: axis[1], reverse=True)[:most]:
+        if math.prod([size for _, _, size in kept]) * axis[2] > MOST_CELLS:
+            break
+        kept.append(axis)
+    return kept[::-1]
+
+
+def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables: Sequence[Table]) -> list[Number]:
+    """Return the least sum of `charges` and `tables` over the own values, for each combination of values of `axes`.
+
+    Each table is minimised by itself over robots that are not in `axes`, so the sum is a lower bound.
+    """
+    shape = [size for _, _, size in axes]
+    names = [name for name, _, _ in axes]
+    least = np.full(shape, np.inf)
+    parts = [table.over([own, *names]) for table in tables]
+    for index, charge in enumerate(charges):
+        total = np.full(shape, float(charge))
+        for part in parts:
+            total = total + part[index if part.shape[0] > 1 else 0]
+        least = np.minimum(least, total)
+    return [number_of(cost) for cost in least.reshape(-1).tolist()]
+
+
+def table_of(axes: Sequence[Axis], costs: Sequence[Number]) -> Table:
+    """Return the table of a message.
+
+    Raises:
+        ValueError: if the costs are not as many as the axes say, or too many.
+    """
+    shape = [size for _, _, size in axes]
+    if min(shape, default=1) < 1 or math.prod(shape) != len(costs) or len(costs) > MOST_CELLS:
+        raise ValueError(f"{len(costs)} costs are no table of {shape}")
+    return Table(tuple(name for name, _, _ in axes), np.array(costs, np.float64).reshape(shape))
+
+
+def number_of(cost: float) -> Number:
+    """Return a cost as an integer, or infinity."""
+    return int(cost) if cost < INFINITE else INFINITE
+
+
+class HSCAISettings(Settings, frozen=True):
+    """The amount of inference before and during the search.
+
+    `k`: the most robots above that a table may be over. With as many as the tree's induced width, all bounds are exact.
+    `t`: a robot has its bounds inferred anew when a value above has stayed the same for more than `t` searches.
+    """
+
+    k: int = 4
+    t: int = 1
+
+    def __post_init__(self) -> None:
+        for name, number in (("k", self.k), ("t", self.t)):
+            if number < 1:
+                raise ValueError(f"{name} is {number}; it must be 1 or more")
+
+
+Axis = tuple[str, int, int]
+"""A robot, its depth in the tree, and the number of its values."""
+
+
+class Domain(Message, frozen=True):
+    """The sender's values, and its depth in the tree."""
+
+    values: list[message.Value]
+    level: int
+
+    act = acts.TELL_DOMAIN
+
+    def in_words(self, words: Wording) -> str:
+        return f"{words.domain(self.values)}; my depth in the tree is {self.level}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        return [HasOnly(hearing.sender, tuple(self.values))]
+
+
+class PreUtil(Message, frozen=True):
+    """A lower bound on the cost of the sender's subtree for all values of the robots of `axes` (PREUTIL).
+
+    `dropped`: other robots above that matter to the subtree; the bound holds whatever their values are. `dearest`: no
+    solution of the subtree costs more.
+    """
+
+    axes: list[Axis]
+    dropped: list[Axis]
+    dearest: int
+    costs: list[Number]
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, _: Wording) -> str:
+        names = listed(name for name, _, _ in self.axes)
+        told = f"my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
+        return f"{told}; left out: {listed(name for name, _, _ in self.dropped)}" if self.dropped else told
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        return bounds_prove(self.axes, self.costs, hearing)
+
+
+class CPA(Message, frozen=True):
+    """A request to search the receiver's subtree for less than `bound` (CPA).
+
+    `places`: of the robots above that matter to it, the places of their values in their domains.
+    """
+
+    bound: Number
+    places: dict[str, int]
+
+    act = acts.PROPOSE_CPA
+    proves_nothing = True
+
+    def in_words(self, _: Wording) -> str:
+        return f"search your subtree {allowance(self.bound)}, with {places_in_words(self.places)}"
+
+
+class InferCtxt(Message, frozen=True):
+    """A request for a tighter table, with the values at these places (INFERCTXT)."""
+
+    places: dict[str, int]
+
+    act = Act(Performative.REQUEST, "the receiver is to infer a tighter lower bound")
+    proves_nothing = True
+
+    def in_words(self, _: Wording) -> str:
+        return f"what does your subtree cost at least with {places_in_words(self.places)}?"
+
+
+class CtxtUtil(Message, frozen=True):
+    """A lower bound as in PREUTIL, with the values that the receiver's request named (CTXTUTIL)."""
+
+    axes: list[Axis]
+    costs: list[Number]
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, _: Wording) -> str:
+        names = listed(name for name, _, _ in self.axes)
+        return f"with these values my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver, whichever request it answers."""
+        return bounds_prove(self.axes, self.costs, hearing)
+
+
+def places_in_words(places: dict[str, int]) -> str:
+    """Return values, by their places."""
+    return listed([f"{name}'s value number {place + 1}" for name, place in places.items()]) or "any values"
+
+
+def span_in_words(costs: list[Number]) -> str:
+    """Return between what and what lower bounds are: `at least 3 to 9`."""
+    finite = [cost for cost in costs if not math.isinf(cost)]
+    if not finite:
+        return "infinity"
+    least, most = min(finite), max(finite)
+    return f"at least {cost_text(least)}{'' if least == most else f' to {cost_text(most)}'}"
+
+
+def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], hearing: Hearing) -> Sequence[Proof]:
+    """Return what lower bounds over `axes` prove: as much as a table of DPOP, as they hold whatever is left out."""
+    places = itertools.product(*[range(size) for _, _, size in axes])
+    return table_proves([name for name, _, _ in axes], zip(places, costs, strict=True), hearing)
+
 
 Places = Mapping[str, int]
 

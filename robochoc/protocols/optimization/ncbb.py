@@ -38,19 +38,57 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import assert_never, cast
 
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
 from robochoc.protocols.findings import Incumbent
-from robochoc.protocols.optimization.branching import Assignment
+from robochoc.protocols.optimization.branching import (
+    Assignment,
+    Members,
+    Number,
+    Report,
+    Request,
+    Result,
+    Terminate,
+    allowance,
+)
 from robochoc.protocols.optimization.forward_bounding import ForwardBoundingProtocol
-from robochoc.protocols.optimization.messages.branching import Members, Number, Report, Request, Result, Terminate
-from robochoc.protocols.optimization.messages.ncbb import Greedy, Search
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+
+
+class Greedy(Message, frozen=True):
+    """The value of the sender in the greedy assignment of the first phase (VALUE)."""
+
+    value: Value
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        return f"{words.own_value(self.value)} in the first assignment"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        return [can_take(hearing.sender, self.value)]
+
+
+class Search(Message, frozen=True):
+    """A request to search the receiver's subtree for less than `bound`, with the values that were told (SEARCH)."""
+
+    bound: Number
+
+    act = Act(Performative.REQUEST, "the receiver is to search its subtree")
+    proves_nothing = True
+
+    def in_words(self, _: Wording) -> str:
+        return f"search your subtree {allowance(self.bound)}"
 
 
 class NCBB(ForwardBoundingProtocol):

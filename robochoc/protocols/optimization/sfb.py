@@ -60,8 +60,6 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
 from robochoc.protocols.optimization.interchangeable import expanded, fits
-from robochoc.protocols.optimization.messages.sfb import Above, Below, Charges, CPAs, Domain, Explored, Solution
-from robochoc.protocols.optimization.settings.sfb import MIB, SFBSettings
 from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -73,6 +71,249 @@ if TYPE_CHECKING:
     from robochoc.protocols.optimization.sfb_bounds import ForwardBounds
 
     Bounds = ForwardBounds | ForwardBits
+from collections.abc import Iterable, Iterator
+from typing import Self
+
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import (
+    FINITE,
+    INFINITE,
+    HasOnly,
+    Hearing,
+    Pays,
+    Proof,
+    StandsAt,
+    Total,
+    View,
+    partial_assignment,
+)
+from robochoc.model.message import Value
+from robochoc.model.wording import Wording, along, cost_text, counted, incumbent_text, listed
+from robochoc.protocols.optimization.interchangeable import Run, cut_off, grouped
+from robochoc.protocols.settings_base import Settings
+
+MIB = 1 << 20
+
+
+class SFBSettings(Settings, frozen=True):
+    """Limits on the CPAs that are extended and sent at once.
+
+    `batch`: the maximum number of CPAs that are extended at once. `window`: the maximum number of CPA messages of each
+    robot that are sent and not yet explored. `memory`: the bytes that the CPAs in all these messages of all robots may
+    take together.
+
+    Each message has the same share of the memory: memory / (robots * window), 4 MiB at most. Only a message with a
+    single CPA may take more. CPAs that do not fit are not extended yet, or wait at the robot that has extended them (at
+    most one share, or the extensions of a single CPA). With less memory there are more messages, and the verdict is the
+    same. The total traffic is not bounded: it is as large as the search. The first waves are not bounded either: their
+    messages grow with the number of different domains and charges.
+    """
+
+    batch: int = 4096
+    window: int = 1
+    memory: int = 64 * MIB
+
+    def __post_init__(self) -> None:
+        if self.batch < 1 or self.window < 1 or self.memory < 1:
+            raise ValueError("batch, window and memory are 1 or more")
+
+
+Domain = tuple[Value, ...]
+Charges = tuple[float, ...]
+
+
+class Above(Message, frozen=True):
+    """The domains of all robots above the receiver: distinct `domains`, and the `runs` of robots that have each."""
+
+    domains: list[Domain]
+    runs: list[Run]
+
+    act = Act(Performative.INFORM, "the receiver comes to know the domains above it")
+
+    @classmethod
+    def of(cls, domains: Iterable[Domain]) -> Self:
+        """Return the message for robots with these `domains`, in priority order."""
+        return cls(*grouped(domains))
+
+    def in_words(self, words: Wording) -> str:
+        domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
+        return f"above you there are {_sizes(words.order, domains)}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        domains = expanded(self.domains, cut_off(self.runs, len(hearing.order)))
+        return [HasOnly(robot, tuple(values)) for robot, values in zip(hearing.order, domains, strict=False)]
+
+
+class Below(Message, frozen=True):
+    """The domains and charges of all robots below the receiver; `runs` map robots to the distinct ones.
+
+    `most` is an upper bound on the sum of these charges and of the constraints whose lowest two robots are below.
+    """
+
+    domains: list[Domain]
+    charges: list[Charges]
+    runs: list[Run]
+    most: int
+
+    act = Act(Performative.INFORM, "the receiver comes to know the domains and charges below it")
+
+    @classmethod
+    def of(cls, robots: Iterable[tuple[Domain, Charges]], most: int) -> Self:
+        """Return the message for robots with these domains and charges, in priority order."""
+        kinds, runs = grouped(robots)
+        return cls([domain for domain, _ in kinds], [charges for _, charges in kinds], runs, most)
+
+    @property
+    def robots(self) -> list[tuple[Domain, Charges]]:
+        """The domain and charges of each robot."""
+        return expanded(list(zip(self.domains, self.charges, strict=True)), self.runs)
+
+    def in_words(self, words: Wording) -> str:
+        domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
+        if not domains:
+            return "nobody is below me"
+        order = list(words.order)
+        names = order[order.index(words.receiver) + 1 :] if words.receiver in order else []
+        return f"below you there are {_sizes(names, domains)}; all together they cost at most {cost_text(self.most)}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        below = hearing.order[hearing.order.index(hearing.receiver) + 1 :]
+        found: list[Proof] = []
+        for robot, (values, charges) in zip(below, self.robots, strict=False):
+            paid = [Pays(robot, value, {}, cost, cost) for value, cost in zip(values, charges, strict=True)]
+            found += [HasOnly(robot, tuple(values)), *paid]
+        return found
+
+
+class CPAs(Message, frozen=True):
+    """A number (`count`) of partial assignments of all robots above the receiver (see `sfb_bounds`).
+
+    Their lower bounds are below `least`: the cost of the best known solution, or the `ceiling`, an upper bound on all
+    costs.
+    """
+
+    count: int
+    rows: bytes
+    least: int
+    ceiling: int
+
+    act = Act(Performative.PROPOSE, "partial assignments, for the receiver to extend or to drop")
+
+    def in_words(self, words: Wording) -> str:
+        known = incumbent_text(self.least if self.least < self.ceiling else math.inf)
+        return f"{counted(self.count, 'partial assignment')} for {words.receiver} to extend; {known}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+        """Return what the message proves to its receiver: each row holds what the robots from it on have to pay."""
+        if self.count > MOST_ROWS:
+            return None
+        if hearing.minimises:
+            return [*costs_prove(self.rows, self.count, self.ceiling, hearing)]
+        return [*bits_prove(self.rows, self.count, hearing)]
+
+
+class Explored(Message, frozen=True):
+    """The end of the exploration of the oldest unanswered `CPAs` from the receiver."""
+
+    act = Act(Performative.INFORM, "what was proposed with `CPAs` has been seen to the end")
+    proves_nothing = True
+
+    def in_words(self, _: Wording) -> str:
+        return "nothing is left of the oldest partial assignments that I have had from you and have not answered"
+
+
+class Solution(Message, frozen=True):
+    """A solution cheaper than all before, as the place of each robot's value in its domain."""
+
+    cost: int
+    places: list[int]
+
+    act = Act(Performative.INFORM, "the receiver comes to know a solution that costs less")
+
+    def in_words(self, _: Wording) -> str:
+        places = listed([str(place + 1) for place in self.places])
+        return (
+            f"a solution costs {cost_text(self.cost)}, less than all before;"
+            f" by number, robots' values in it are {places}"
+        )
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        view = _chosen(hearing.order, self.places, hearing)
+        return [*(StandsAt(*one) for one in view.items()), Total(view, self.cost)]
+
+
+def _sizes(names: Sequence[str], domains: Sequence[Domain]) -> str:
+    return listed([f"{name} ({counted(len(values), 'value')})" for name, values in along(names, domains)]) or "nobody"
+
+
+def _chosen(robots: Sequence[str], places: Sequence[int], hearing: Hearing) -> dict[str, Value]:
+    """Return the values of robots whose domains the receiver knows."""
+    known = [(robot, hearing.values(robot), place) for robot, place in zip(robots, places, strict=False)]
+    return {robot: values[place] for robot, values, place in known if values is not None}
+
+
+MOST_ROWS = 2_000
+"""For messages with more rows no rule says what they prove: it would take too long."""
+_SIZES = (1, 2, 4, 8)
+_COST, _VALUES = 1, 2
+
+
+def costs_prove(content: bytes, count: int, ceiling: int, hearing: Hearing) -> Iterator[Proof]:
+    """Yield what rows of costs prove. Raises `ValueError` if `content` is not of that form."""
+    rank, domains = _known(hearing)
+    largest = max(2 * ceiling, *map(len, domains))
+    size = next(size for size in _SIZES if largest < 1 << 8 * size - (size == _SIZES[-1]))
+    columns = _VALUES + rank + sum(map(len, domains[rank:]))
+    if len(content) != count * columns * size:
+        raise ValueError(f"{len(content)} bytes are not {count} rows")
+    for start in range(0, len(content), columns * size):
+        cells = [
+            int.from_bytes(content[start + at * size : start + (at + 1) * size], "little") for at in range(columns)
+        ]
+        view = _view(cells[_VALUES : _VALUES + rank], hearing, domains)
+        yield Total(view, cells[_COST])
+        at = _VALUES + rank
+        for robot, values in zip(hearing.order[rank:], domains[rank:], strict=True):
+            for value in values:
+                cost = INFINITE if cells[at] >= ceiling else cells[at]
+                yield Pays(robot, value, view, cost, cost)
+                at += 1
+
+
+def bits_prove(content: bytes, count: int, hearing: Hearing) -> Iterator[Proof]:
+    """Yield what rows of bits prove. Raises `ValueError` if `content` is not of that form."""
+    rank, domains = _known(hearing)
+    largest = max(map(len, domains))
+    size = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
+    length = rank * size + (sum(len(values) + 1 for values in domains[rank:]) + 7) // 8
+    if len(content) != count * length:
+        raise ValueError(f"{len(content)} bytes are not {count} rows")
+    for start in range(0, len(content), length):
+        row = content[start : start + length]
+        places = [int.from_bytes(row[at * size : (at + 1) * size], "little") for at in range(rank)]
+        view = _view(places, hearing, domains)
+        yield from partial_assignment(list(view), list(view.values()))
+        left = int.from_bytes(row[rank * size :], "little")
+        for robot, values in zip(hearing.order[rank:], domains[rank:], strict=True):
+            for value in values:
+                least, most = (0.0, FINITE) if left & 1 else (INFINITE, INFINITE)
+                yield Pays(robot, value, view, least, most)
+                left >>= 1
+            left >>= 1
+
+
+def _known(hearing: Hearing) -> tuple[int, list[Sequence[Value]]]:
+    """Return the receiver's rank, and all robots' values, which it has been told."""
+    domains = [hearing.values(robot) for robot in hearing.order]
+    known = [values for values in domains if values is not None]
+    if len(known) < len(domains):
+        raise ValueError("rows come before all robots' values")
+    return hearing.order.index(hearing.receiver), known
+
+
+def _view(places: Sequence[int], hearing: Hearing, domains: Sequence[Sequence[Value]]) -> View:
+    return {robot: values[at] for robot, values, at in zip(hearing.order, domains, places, strict=False)}
+
 
 LARGEST = 4 * MIB
 """No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.protocols.optimization.bounding import Bounds
-from robochoc.protocols.optimization.messages.bounding import Number
+from robochoc.protocols.optimization.bounding_messages import Number
 
 
 def clamp_share(t: list[Number], bounds: Bounds, index: int) -> None:

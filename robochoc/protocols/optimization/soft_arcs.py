@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.messages.bounding import Number
+from robochoc.protocols.optimization.bounding_messages import Number
 
 Row = list[Number]
 

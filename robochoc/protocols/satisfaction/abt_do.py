@@ -60,8 +60,8 @@ from typing import Any, ClassVar, assert_never, cast
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.abt_do_messages import AddLink, Counters, Nogood, Ok, Order
 from robochoc.protocols.satisfaction.backtracking import Backtracking
-from robochoc.protocols.satisfaction.messages.abt_do import AddLink, Counters, Nogood, Ok, Order
 from robochoc.protocols.satisfaction.nogood import contradicts
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem

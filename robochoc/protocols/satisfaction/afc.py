@@ -48,7 +48,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.afc import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
+from robochoc.protocols.satisfaction.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

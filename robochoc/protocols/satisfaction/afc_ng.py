@@ -55,10 +55,10 @@ from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Assignment, Solved
 from robochoc.protocols.satisfaction.afc_ng_view import AgentView
-from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Assignment, Solved
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.protocols.satisfaction.nogood import NogoodStore, contradicts
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

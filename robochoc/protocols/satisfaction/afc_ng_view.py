@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
 from robochoc.model.message import Value
-from robochoc.protocols.satisfaction.messages.afc_ng import Assignment
+from robochoc.protocols.satisfaction.afc_ng_messages import Assignment
 
 
 class AgentView(Mapping[str, Value]):

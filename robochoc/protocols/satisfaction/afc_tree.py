@@ -46,9 +46,9 @@ from typing import Any, ClassVar, assert_never, cast
 from robochoc.model.message import Message, Value
 from robochoc.protocols.order import PriorityOrder, PseudoTree
 from robochoc.protocols.satisfaction.afc_ng import AFCng
-from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
-from robochoc.protocols.satisfaction.messages.afc_tree import Accept
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved
+from robochoc.protocols.satisfaction.afc_tree_messages import Accept
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

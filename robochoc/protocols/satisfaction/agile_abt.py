@@ -54,6 +54,7 @@ from typing import Any, ClassVar, assert_never, cast
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.agile_abt_messages import AddLink, Ok, Order
 from robochoc.protocols.satisfaction.agile_order import (
     UNKNOWN,
     Explanation,
@@ -65,9 +66,8 @@ from robochoc.protocols.satisfaction.agile_order import (
     updated,
 )
 from robochoc.protocols.satisfaction.backtracking import Backtracking
-from robochoc.protocols.satisfaction.messages.agile_abt import AddLink, Ok, Order
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.protocols.satisfaction.nogood import LeftSide, NogoodStore, contradicts, joined
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

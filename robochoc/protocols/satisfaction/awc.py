@@ -50,7 +50,7 @@ from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.awc import AddLink, Nogood, Ok
+from robochoc.protocols.satisfaction.awc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.satisfaction.nogood import LeftSide, joined
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem

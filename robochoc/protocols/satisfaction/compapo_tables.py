@@ -2,11 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
+import msgspec
+
 from robochoc.model.message import Value
-from robochoc.protocols.satisfaction.messages.compapo import Table
 from robochoc.solver.compiled import LocalProblem
+
+
+class Table(msgspec.Struct, frozen=True, array_like=True):
+    """All constraints over the same robots in one table: a bit for each combination of their values, set if allowed.
+
+    The place of the last robot's value runs fastest; bit i of the table is bit i % 8 of byte i // 8.
+    """
+
+    robots: tuple[str, ...]
+    sizes: tuple[int, ...]
+    allowed: bytes
+
+    def __post_init__(self) -> None:
+        """Check that the table is complete."""
+        if not len({*self.robots}) == len(self.robots) == len(self.sizes) > 0 or min(self.sizes) < 1:
+            raise ValueError("a table does not say how many values each of its robots has")
+        if len(self.allowed) != -(-math.prod(self.sizes) // 8):
+            raise ValueError("a table does not have a bit for each combination of values")
+
+    def allows(self, places: Iterable[int]) -> bool:
+        """Return whether the values at these `places` of the robots are allowed."""
+        at = 0
+        for place, size in zip(places, self.sizes, strict=True):
+            at = at * size + place
+        return bool(self.allowed[at >> 3] >> (at & 7) & 1)
 
 
 def own_tables(

@@ -46,7 +46,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.disfc import AddLink, Nogood, Ok
+from robochoc.protocols.satisfaction.disfc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.satisfaction.nogood import NogoodStore
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem

@@ -42,13 +42,18 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
-from robochoc.protocols.satisfaction.messages.dynabt import Nogood
-from robochoc.protocols.satisfaction.messages.nogood import Nogood as PlainNogood
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.nogood import NOTHING, Explanation, NogoodStore
+from robochoc.protocols.satisfaction.nogood_messages import Nogood as PlainNogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated, domain_key
+
+
+class Nogood(PlainNogood, frozen=True):
+    """A nogood: the receiver cannot take `value` while all in `lhs` and all constraints in `because` hold."""
+
+    because: list[str]
 
 
 class DynABT(ABT, DynamicProtocol):

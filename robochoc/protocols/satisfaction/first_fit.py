@@ -26,7 +26,7 @@ from typing import Any, ClassVar, cast
 from robochoc.model.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.first_fit import Placed
+from robochoc.protocols.satisfaction.first_fit_messages import Placed
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from robochoc.protocols.satisfaction.messages.compapo import Table
+from robochoc.protocols.satisfaction.compapo_tables import Table
 
 
 class _Node(NamedTuple):

@@ -37,7 +37,7 @@ from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.sbt import CPA, Backtrack
+from robochoc.protocols.satisfaction.sbt_messages import CPA, Backtrack
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr

@@ -10,9 +10,9 @@ from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
-from robochoc.protocols.satisfaction.messages.first_fit import Placed
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
+from robochoc.protocols.satisfaction.first_fit_messages import Placed
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.cases import looped

@@ -25,7 +25,7 @@ from robochoc.model.problem import (
 )
 from robochoc.privacy import Kind, Loss, Measure, PrivacyError, PrivacyReport, privacy_of
 from robochoc.privacy.page import page_of
-from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run import Options, Runtime, solve
 from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import team_of

@@ -29,7 +29,7 @@ from robochoc.journal.journal import Header, Journal, JournalRecorder, read_jour
 from robochoc.model.message import Message, Value
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.dynabt import DynABT
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.replay import CannotReplayError, ReplayOptions, replay
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.scenario import ScenarioRun

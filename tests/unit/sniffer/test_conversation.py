@@ -13,9 +13,9 @@ import pytest
 from robochoc.model.communicative_acts import Performative
 from robochoc.model.message import Message, encode
 from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.first_fit import FirstFit
-from robochoc.protocols.satisfaction.messages.abt import Ok
-from robochoc.protocols.satisfaction.messages.nogood import Nogood
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.services.identifier import AgentIdentifier
 from robochoc.sniffer.acl import ACLError, ACLMessage
 from robochoc.sniffer.conversation import MAX_JSON, Conversation
@@ -96,7 +96,7 @@ def test_what_is_no_message_has_no_acl_message() -> None:
 
 
 def test_bounds_that_are_infinite_are_words() -> None:
-    from robochoc.protocols.optimization.messages.adopt import Cost  # noqa: PLC0415
+    from robochoc.protocols.optimization.adopt_messages import Cost  # noqa: PLC0415
 
     acl = returned(conversation("adopt"), OK._replace(content=encode(Cost({"R1": ((2, None), 5)}, 0, math.inf))), 1)
     assert acl.content == '["Cost",{"context":{"R1":[[2,null],5]},"lb":0,"ub":{"float":"inf"}}]'

@@ -15,7 +15,7 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Domain, Predicate, Relation, Robot, Semantics, Team, Variable
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.checker import (
     RefutedError,

@@ -1,4 +1,4 @@
-"""The messages of nogood-based Asynchronous Forward Checking (see `afc_ng.py`)."""
+"""Messages of AFC-ng: apart from `afc_ng.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

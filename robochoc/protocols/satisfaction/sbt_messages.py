@@ -1,4 +1,4 @@
-"""The messages of synchronous backtracking (see `sbt.py`)."""
+"""Messages of synchronous backtracking: apart from `sbt.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nogood that Asynchronous Backtracking, AFC-ng, AFC-tree and Agile-ABT send alike; DynABT adds to it."""
+"""The nogood that ABT, AFC-ng, AFC-tree and Agile-ABT send; apart, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages of ADOPT (see `adopt.py`)."""
+"""Messages of ADOPT: apart from `adopt.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from robochoc.model.disclosure import Hearing, Proof, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
-from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words, bounds_prove
+from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
 
 
 class Value(Message, frozen=True):

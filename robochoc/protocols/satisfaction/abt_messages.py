@@ -1,4 +1,4 @@
-"""The messages of Asynchronous Backtracking (see `abt.py`)."""
+"""Messages of Asynchronous Backtracking: apart from `abt.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages of Asynchronous Forward Checking (see `afc.py`)."""
+"""Messages of Asynchronous Forward Checking: apart from `afc.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

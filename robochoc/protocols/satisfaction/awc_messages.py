@@ -1,4 +1,4 @@
-"""The messages of Asynchronous Weak-Commitment search (see `awc.py`)."""
+"""Messages of Asynchronous Weak-Commitment search: apart from `awc.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages of Agile-ABT (see `agile_abt.py`)."""
+"""Messages of Agile-ABT: apart from `agile_abt.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages of DisFC (see `disfc.py`)."""
+"""Messages of DisFC: apart from `disfc.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

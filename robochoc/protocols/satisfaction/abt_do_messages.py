@@ -1,4 +1,4 @@
-"""The messages of ABT with dynamic ordering (see `abt_do.py`)."""
+"""Messages of ABT with dynamic ordering: apart from `abt_do.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""The messages of BnB-ADOPT (see `bnb_adopt.py`)."""
+"""Messages of BnB-ADOPT, and its settings: apart from `bnb_adopt.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Literal
 
 from robochoc.model import message
 from robochoc.model.disclosure import HasOnly, Hearing, Proof, StandsAt
@@ -11,7 +12,14 @@ from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
-from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words, bounds_prove
+from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
+from robochoc.protocols.settings_base import Settings
+
+
+class BnBADOPTSettings(Settings, frozen=True):
+    """`heuristic`: where lower bounds begin: at 0 (`none`), or at what children say before the search (`dp`)."""
+
+    heuristic: Literal["none", "dp"] = "none"
 
 
 class Value(Message, frozen=True):

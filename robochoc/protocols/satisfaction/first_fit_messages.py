@@ -1,4 +1,4 @@
-"""The message of first fit (see `first_fit.py`)."""
+"""The message of first fit: apart from `first_fit.py`, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

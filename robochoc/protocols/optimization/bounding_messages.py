@@ -1,4 +1,4 @@
-"""What is common to the messages of ADOPT and BnB-ADOPT: contexts, bounds, and the end of the search."""
+"""Message parts that ADOPT and BnB-ADOPT share; apart, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,1 +1,0 @@
-"""The messages that these protocols send. Those of `adopt.py` are in `messages/adopt.py`."""

@@ -1,1 +1,0 @@
-"""Settings of these protocols, in files of the same names."""
