@@ -14,44 +14,47 @@ INTERRUPTED = 128 + signal.SIGINT
 UNREAD = 128 + signal.SIGPIPE
 EXIT_STATUS = """\b
 Exit status:
-  0  a verdict was reached (no-solution is one)
+  0  a verdict was reached (also no-solution)
   1  the input is invalid
-  2  wrong usage, or more than this version can do
-  3  a limit was reached without a verdict
-  4  robots were lost, the answer was refuted, or a replay is different
+  2  wrong usage, or a request that this version does not support
+  3  a limit was reached before a verdict
+  4  robots were lost, an answer was refuted, or a replay differs
 """
 
 
 COMMANDS = {
     "animate": ("animate", "Write or show the 3D scene of a saved result."),
-    "app": ("app", "Model, decide and fly in a browser, without a formula."),
+    "app": ("app", "Model, solve and fly in a browser, without formulas."),
     "authority": ("authority", "Enrol and revoke robots for runs on several machines."),
     "cache": ("cache", "Show or clear the cache of solved local problems."),
     "compare": ("compare", "Compare protocols on problems: a table, a picture."),
-    "compile": ("compile_team", "Compile the robots' local problems, and show their sizes."),
-    "completion": ("completion", "Print the script for completion in bash, zsh or fish."),
+    "compile": ("compile_team", "Compile the robots' local problems and show their sizes."),
+    "completion": ("completion", "Print the completion script for bash, zsh or fish."),
     "directory": ("directory", "List the agents of a running master, and their services."),
-    "experiment": ("experiment", "Carry out studies of protocols, and report on them."),
+    "experiment": ("experiment", "Run studies of protocols and report their results."),
     "export": ("export", "Write a team's problem for other tools, or as a graph."),
     "fly": ("fly", "Simulate the flight of a saved result: 3D scene, ROS."),
     "generate": ("generate", "Write a team of a problem family."),
-    "import": ("import_", "Make teams of the files of FRODO, pyDCOP, XCSP3, ..."),
+    "import": ("import_", "Convert files of FRODO, pyDCOP, XCSP3, ... to teams."),
     "journal": ("journal", "Summarise or export a journal."),
     "master": ("master", "Lead a team whose robots run on other machines."),
-    "privacy": ("privacy", "Measure what robots have learnt of each other in a run."),
+    "privacy": ("privacy", "Measure how much robots learned about each other in a run."),
     "protocols": ("protocols", "List the installed protocols, or explain one."),
-    "replay": ("replay", "Replay a journal, and compare it with the protocol of today."),
-    "robot": ("robot", "Run one robot on this machine, in the run of a master."),
-    "serve": ("serve", "Decide for others on request: a service of ROS 2."),
+    "replay": ("replay", "Replay a journal and compare it with the installed protocol."),
+    "robot": ("robot", "Run one robot on this machine, led by a master."),
+    "serve": ("serve", "Solve teams on request: a ROS 2 service."),
     "sniff": ("sniff", "Show and explain the messages of a run on a page."),
     "solve": ("solve", "Solve teams, each robot in its own process."),
-    "validate": ("validate", "Check teams, and print all errors with file and line."),
+    "validate": ("validate", "Check teams and print all errors with file and line."),
 }
-"""Each command: its function in the module of its name, and its line in `robochoc --help`, which imports no command."""
+"""Each command: its function in the module of the same name, and its line in `robochoc --help`.
+
+The lines are here so that `robochoc --help` imports no command.
+"""
 
 
 class Commands(click.Group):
-    """The group of commands. A command is imported when it is used."""
+    """The group of commands. Each command is imported when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's
         """Return all names, sorted."""
@@ -65,14 +68,14 @@ class Commands(click.Group):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
-        """Write a line for each command, as click does, without importing any."""
+        """Write a line for each command, without importing the commands."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Resolve as click does, and suggest the nearest name if there is no such command."""
+        """Resolve the command; for an unknown name, suggest the nearest one."""
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
@@ -84,8 +87,8 @@ class Commands(click.Group):
             raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from None
 
 
-def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> None:  # noqa: FBT001 - click's own
-    """Tell the version, and whether compiled modules run."""
+def _print_version(context: click.Context, _: click.Parameter, asked: bool) -> None:  # noqa: FBT001 - click's own
+    """Print the version, and whether the core is compiled."""
     if asked and not context.resilient_parsing:
         from robochoc.system.compiled_core import kind_of_core
 
@@ -101,24 +104,24 @@ def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> No
     is_flag=True,
     expose_value=False,
     is_eager=True,
-    callback=_tell_version,
+    callback=_print_version,
     help="Show the version and exit.",
 )
 def cli() -> None:
     """Distributed constraint solving by teams of robots.
 
-    Each robot reads only its own XML file, runs as its own OS process, and exchanges messages of a distributed protocol
+    Each robot reads only its own XML file, runs in its own OS process, and exchanges messages of a distributed protocol
     with its neighbours. The team finds a solution (with costs: an optimum) or proves that there is none.
 
     \b
     robochoc generate queens3d --n 4
     robochoc validate
     robochoc solve instances/
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
 
 
 def run() -> int:
-    """Run the command line, and return the exit status that docs/reference/cli.md lists; never a traceback."""
+    """Run the command line, and return the exit status (docs/reference/cli.md); foreseen errors show no traceback."""
     try:
         status = cli.main(prog_name="robochoc", standalone_mode=False)
     except click.ClickException as error:
@@ -127,15 +130,15 @@ def run() -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo("robochoc: interrupted", err=True)
         return INTERRUPTED
-    except SystemExit as leaving:
-        # The reader of our output has gone: click would exit with the status of invalid input.
-        if leaving.code == 1:
+    except SystemExit as end:
+        # The reader of our output has closed the pipe: click would exit with the status of invalid input.
+        if end.code == 1:
             return UNREAD
         raise
     except OSError as error:
         from robochoc.system.plain_text import on_one_line
 
-        told = f"{os.fsdecode(error.filename)}: {error.strerror}" if isinstance(error.filename, str | bytes) else error
-        click.echo(on_one_line(f"robochoc: {told}"), err=True)
+        text = f"{os.fsdecode(error.filename)}: {error.strerror}" if isinstance(error.filename, str | bytes) else error
+        click.echo(on_one_line(f"robochoc: {text}"), err=True)
         return 1
     return status if isinstance(status, int) else 0

@@ -1,7 +1,7 @@
-"""`robochoc`: where the program begins, and how signals end it.
+"""The entry point of `robochoc`, and its signal handlers.
 
-Ctrl-C and SIGTERM end it as exceptions do, so that every `finally` has its say: exit status 130 or 143, no process
-left, no file half written. Handlers are set before anything else is imported.
+Ctrl-C and SIGTERM end the program by an exception, so that every `finally` runs: exit status 130 or 143, no child
+process left, no partly written file. The handlers are installed before anything else is imported.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
 def main() -> NoReturn:
-    """Run the command line, and leave with its exit status."""
+    """Run the command line, and exit with its status."""
     _open_standard_streams()
-    ending = TerminationSignals()
+    signals = TerminationSignals()
     try:
-        ending.listen()
+        signals.install()
         from robochoc.system.streams import prepare_standard_streams
 
         prepare_standard_streams()
         from robochoc.cli.group import run
 
         status = run()
-        ending.ignore()
+        signals.ignore()
     except KeyboardInterrupt:
         sys.stderr.write("robochoc: interrupted\n")
         status = 128 + signal.SIGINT
@@ -44,7 +44,7 @@ def main() -> NoReturn:
 
 
 def _open_standard_streams() -> None:
-    """Let streams that the caller has closed go nowhere: no pipe of ours must take their place."""
+    """Redirect standard streams that the caller has closed to /dev/null: no pipe of ours must get their descriptors."""
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(descriptor)
@@ -56,20 +56,20 @@ def _open_standard_streams() -> None:
 class TerminationSignals:
     """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `Terminated`.
 
-    It does not raise during an import, as many modules print or swallow exceptions while they load.
+    It never raises during an import, as many modules print or suppress exceptions while they load.
     """
 
     def __init__(self) -> None:
         self._signum = 0
         self._since: float | None = None
 
-    def listen(self) -> None:
+    def install(self) -> None:
         """Install the handlers. Signals that the caller makes the program ignore (`nohup`, `&`) stay ignored."""
-        signal.signal(signal.SIGALRM, self._again)
-        sys.unraisablehook = self._swallowed
+        signal.signal(signal.SIGALRM, self._retry)
+        sys.unraisablehook = self._raise_again
         for signum in _STOPPING:
             if signal.getsignal(signum) is not signal.SIG_IGN:
-                signal.signal(signum, self._hear)
+                signal.signal(signum, self._handle)
 
     def ignore(self) -> None:
         """Ignore further signals: the work is done."""
@@ -77,7 +77,7 @@ class TerminationSignals:
         for signum in (*_STOPPING, signal.SIGALRM):
             signal.signal(signum, signal.SIG_IGN)
 
-    def _hear(self, signum: int, frame: FrameType | None) -> None:
+    def _handle(self, signum: int, frame: FrameType | None) -> None:
         if self._since is not None:
             if time.monotonic() - self._since > PATIENCE_S:
                 signal.signal(signum, signal.SIG_DFL)
@@ -92,11 +92,11 @@ class TerminationSignals:
             raise KeyboardInterrupt
         raise Terminated(128 + signum)
 
-    def _again(self, _signum: int, frame: FrameType | None) -> None:
-        self._hear(self._signum, frame)
+    def _retry(self, _signum: int, frame: FrameType | None) -> None:
+        self._handle(self._signum, frame)
 
-    def _swallowed(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Raise again, soon, what Python has dropped because it was raised within a finaliser or a callback."""
+    def _raise_again(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """Raise the exception again, soon, if Python dropped it because it occurred in a finaliser or a callback."""
         if self._since is not None and isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
             self._since = None
             signal.setitimer(signal.ITIMER_REAL, _RETRY_S)

@@ -170,7 +170,7 @@ def test_without_the_extra_it_says_what_to_install(tmp_path: Path) -> None:
     words = [sys.executable, "-c", program, "authority", "init", "--authority", str(tmp_path / "authority")]
     done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=ROOT)
     assert done.returncode == 2
-    assert done.stderr == "the Authority needs 'cryptography'; say: pip install 'robochoc[network]'\n"
+    assert done.stderr == "the Authority requires 'cryptography'; run: pip install 'robochoc[network]'\n"
 
 
 def test_the_docs_know_it() -> None:

@@ -73,17 +73,17 @@ def test_a_model_gives_an_order_if_a_robot_has_a_priority() -> None:
 
 def test_it_is_said_once_that_another_order_is_usually_faster(capsys: pytest.CaptureFixture[str]) -> None:
     note = OrderNote(queens3d(4), Options(protocol="abt"))
-    show = note.watching(lambda _: None)
+    show = note.observing(lambda _: None)
     assert show is not None
     show(Progress(0, 2 * LONG_S, "compiling"))
     show(Progress(9, LONG_S / 2, ""))
     assert capsys.readouterr().err == ""
     show(Progress(9, LONG_S, ""))
     show(Progress(9, LONG_S, ""))
-    note.tell_if_late(LONG_S)
+    note.print_if_slow(LONG_S)
     said = capsys.readouterr().err
-    assert (
-        said == "queens3d-4: --order max-degree is usually faster than the files'; --protocol auto chooses one itself\n"
+    assert said == (
+        "queens3d-4: --order max-degree is usually faster than the order of the files; --protocol auto chooses one\n"
     )
 
 
@@ -97,5 +97,5 @@ def test_it_is_said_once_that_another_order_is_usually_faster(capsys: pytest.Cap
     ],
 )
 def test_it_is_not_said_where_it_is_not_so(options: Options, capsys: pytest.CaptureFixture[str]) -> None:
-    OrderNote(queens3d(4), options).tell_if_late(LONG_S)
+    OrderNote(queens3d(4), options).print_if_slow(LONG_S)
     assert capsys.readouterr().err == ""

@@ -59,7 +59,7 @@ def test_animate_refuses_another_team(four: Path) -> None:
     other = ROOT / "docs" / "examples" / "scouts"
     done = robochoc_within("animate", saved, "--team", other, "-o", four.parent / "page.html")
     assert done.returncode == 1
-    assert "not the team" in done.stderr
+    assert "the team here is not" in done.stderr
 
 
 def test_animate_says_what_is_missing(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_run_that_is_refused_leaves_an_older_journal_alone(four: Path, tmp_pat
 def test_a_full_disk_is_said_after_the_verdict(four: Path) -> None:
     done = robochoc_within("solve", four, "--runtime", "simulator", "--journal", "/dev/full")
     assert done.returncode == 1
-    assert done.stderr.startswith("/dev/full: the journal could not be written to its end: No space left on device (")
+    assert done.stderr.startswith("/dev/full: the journal could not be written completely: No space left on device (")
     assert len(done.stderr.splitlines()) == 1
     assert "no solution" in done.stdout
 

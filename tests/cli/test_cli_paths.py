@@ -137,10 +137,10 @@ def test_nothing_that_is_read_is_written_over(four: Path, tmp_path: Path) -> Non
         for words, said in [
             (("export", "{team}", "-o", "{team}/Robot1.1.xml"), "would be a file of the team"),
             (("solve", "{team}", "--html", "{team}/page.xml"), "would be a file of the team"),
-            (("solve", "{team}", "--order", "{file}", "--journal", "{file}"), "are one place"),
-            (("animate", "{file}", "-o", "{file}"), "are one place"),
-            (("fly", "{file}", "--html", "{link}"), "are one place"),
-            (("journal", "export", "{file}", "--format", "csv", "-o", "{file}"), "are one place"),
+            (("solve", "{team}", "--order", "{file}", "--journal", "{file}"), "are the same place"),
+            (("animate", "{file}", "-o", "{file}"), "are the same place"),
+            (("fly", "{file}", "--html", "{link}"), "are the same place"),
+            (("journal", "export", "{file}", "--format", "csv", "-o", "{file}"), "are the same place"),
         ]:
             with each(words):
                 status, told = line(*(word.format(file=file, team=four, link=tmp_path / "link") for word in words))

@@ -169,7 +169,7 @@ def test_a_terminal_shows_which_robot_is_compiled(rows: Path) -> None:
 def test_compile_names_the_robot_without_local_solution(torn: Path) -> None:
     done = robochoc_within("compile", torn)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "without local solution: Bob; so the team has no solution" in done.stdout
+    assert "without local solutions: Bob; so the team has no solution" in done.stdout
     by_name = {robot["robot"]: robot for robot in answered("compile", torn)["robots"]}
     assert [by_name[name]["local_solutions"] for name in ("Ann", "Bob", "Zoe")] == [3, 0, 3]
 

@@ -47,7 +47,7 @@ def test_run_show_and_export(small: Path) -> None:
     planned = robochoc_within("experiment", "run", small, "--dry-run")
     assert planned.stdout.splitlines() == [
         "small: 12 runs: 6 problems, 2 ways to run (abt, afc-ng)",
-        f"{small.with_suffix('.sqlite')}: 0 are there, 12 are to be run",
+        f"{small.with_suffix('.sqlite')}: 0 done, 12 to be run",
     ]
     assert not small.with_suffix(".sqlite").exists()
     done = robochoc_within("experiment", "run", small, "--jobs", 1)
@@ -62,11 +62,11 @@ def test_run_show_and_export(small: Path) -> None:
     only = robochoc_within("experiment", "show", results, "--metric", "ncccs").stdout.splitlines()
     assert [line.split()[:2] for line in only if line.startswith("0.5")] == [["0.5", f"{median:,}"]]
     again = robochoc_within("experiment", "run", small, "--dry-run").stdout
-    assert "12 are there, 0 are to be run" in again
+    assert "12 done, 0 to be run" in again
     longer = small.with_name("longer.toml")
     longer.write_text(SMALL.replace("1..3", "1..5"))
     told = robochoc_within("experiment", "run", longer, "-o", results, "--dry-run").stdout
-    assert "12 are there, 8 are to be run; about " in told
+    assert "12 done, 8 to be run; about " in told
 
 
 @pytest.mark.usefixtures("runs_here")
@@ -76,7 +76,7 @@ def test_journals_are_files_that_other_commands_read(tmp_path: Path) -> None:
     path = tmp_path / "study.sqlite"
     export = ("experiment", "export", path, "--format", "journals")
     refused = robochoc_within(*export)
-    assert (refused.returncode, "name a folder" in refused.stderr) == (2, True)
+    assert (refused.returncode, "name it with -o" in refused.stderr) == (2, True)
     done = robochoc_within(*export, "-o", tmp_path / "journals")
     assert (done.returncode, "12 journals" in done.stderr) == (0, True)
     rows = {row["key"]: row for row in read(path)}
@@ -144,7 +144,7 @@ def test_a_dry_run_knows_runs_that_another_plan_has_made(small: Path) -> None:
     finished(SMALL, small.with_suffix(".sqlite"))
     altered(small.with_suffix(".sqlite"), "DELETE FROM plan")
     planned = robochoc_within("experiment", "run", small, "--dry-run").stdout
-    assert "12 are there, 0 are to be run" in planned
+    assert "12 done, 0 to be run" in planned
 
 
 def test_what_a_file_says_does_not_reach_the_terminal_as_it_is(tmp_path: Path) -> None:
@@ -204,12 +204,12 @@ def test_what_has_failed_can_be_run_again(small: Path) -> None:
     for status, row in zip(("invalid", "crashed", "refused", "memory"), whole.rows, strict=False):
         altered(path, f"UPDATE runs SET status = '{status}', messages = 1 WHERE key = '{row['key']}'")  # noqa: S608
     planned = robochoc_within("experiment", "run", small, "--dry-run")
-    assert "10 are there, 2 are to be run" in planned.stdout
+    assert "10 done, 2 to be run" in planned.stdout
     assert robochoc_within("experiment", "run", small).returncode == 0
     assert [row["status"] for row in read(path)] == ["done", "done", "refused", "memory", *["done"] * 8]
     again = ["--again", "refused", "--again", "memory"]
     planned = robochoc_within("experiment", "run", small, "--dry-run", *again)
-    assert "10 are there, 2 are to be run" in planned.stdout
+    assert "10 done, 2 to be run" in planned.stdout
     done = robochoc_within("experiment", "run", small, *again)
     assert done.returncode == 0
     assert comparable(path) == comparable(whole)
@@ -240,10 +240,10 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
             (
                 ["report", "{}", "-o", "figures.pdf"],
                 2,
-                "figures in SVG and PDF go to a folder, whose name has no ending",
+                "or a folder for figures in SVG and PDF (without an ending)",
             ),
             (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
-            (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "there is no folder /nothing"),
+            (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "the folder /nothing does not exist"),
         ]:
             with each(words):
                 if "report" in words:
@@ -295,10 +295,10 @@ def test_compare_a_family_and_folders(tmp_path: Path) -> None:
 
 def test_what_compare_cannot_take_is_wrong_usage() -> None:
     for words, said in [
-        ("random --protocols ,", "--protocols names no protocol"),
+        ("random --protocols ,", "--protocols is empty"),
         ("rando --protocols abt", "did you mean 'random'?"),
-        ("random agents --protocols abt", "random takes NAME=VALUE, not 'agents'"),
-        ("random agents=3 --protocols abt --set x", "--set takes NAME=VALUE"),
+        ("random agents --protocols abt", "random requires NAME=VALUE, not 'agents'"),
+        ("random agents=3 --protocols abt --set x", "--set requires NAME=VALUE"),
     ]:
         done = robochoc_within("compare", *words.split())
         assert (done.returncode, said in done.stderr) == (2, True), done.stderr

@@ -69,12 +69,12 @@ def test_a_table_for_people(two: Path) -> None:
     result = ran("fly", two)
     assert result.exit_code == 0
     title, head, leg, *rest = result.stdout.splitlines()
-    assert title == "two: 2 drones: 2 at their places"
+    assert title == "two: 2 drones: 2 at their goals"
     assert head.split() == ["leg", "opened", "by", "verdict", "fly", "land", "from", "s", "to", "s"]
     assert leg.split()[:6] == ["0", "the", "start", "solution", "2", "0"]
     assert [line.split(":")[0].split(" within")[0].strip() for line in rest[:2]] == ["all", "nearest"]
-    assert "set: 0.50 m" in rest[1]
-    assert "drones are named for variables" in result.stderr
+    assert "minimum: 0.50 m" in rest[1]
+    assert "drones are named after variables" in result.stderr
 
 
 @pytest.mark.parametrize("n", [7, pytest.param(11, marks=pytest.mark.more)])
@@ -105,10 +105,10 @@ def test_of_four_rows_those_that_withdrew_land(tmp_path: Path) -> None:
 def test_who_falls_is_told_and_is_status_4(two: Path) -> None:
     result = ran("fly", two, "--fail", "V1.2@2", "--fail", "V1.2@2.1", "--fail", "V1.1@1e9")
     assert result.exit_code == 4
-    assert "two: 2 drones: 1 at their places, 1 fallen" in result.stdout
+    assert "two: 2 drones: 1 at their goals, 1 fallen" in result.stdout
     assert "V1.2: motor 0 has stopped" in result.stdout
     assert "V1.2 fell; all others within" in result.stdout
-    assert "with one that fell: " in result.stdout
+    assert "to a fallen drone: " in result.stdout
     told = json.loads(ran("fly", two, "--fail", "V1.2@2", "--json").stdout)
     assert [drone["error_m"] is None for drone in told["drones"]] == [False, True]
     assert [one["drone"] for one in told["happenings"]] == ["V1.2", "V1.2"]
@@ -118,13 +118,13 @@ def test_who_falls_is_told_and_is_status_4(two: Path) -> None:
 def test_who_does_not_arrive_is_status_4(two: Path) -> None:
     result = ran("fly", two, "--wind", 60)
     assert result.exit_code == 4
-    assert "not at their places: V1.1, V1.2" in result.stdout or "fell" in result.stdout
+    assert "not at their goals: V1.1, V1.2" in result.stdout or "fell" in result.stdout
 
 
 def test_who_comes_nearer_than_set_is_status_4(tmp_path: Path) -> None:
     result = ran("fly", saved(tmp_path, {"V1.1": 1, "V1.2": 1}), "--distance", 0.9, "--gusts", 8)
     assert result.exit_code == 4
-    assert "nearer than set: " in result.stdout
+    assert "too near: " in result.stdout
 
 
 def test_the_scale_is_that_of_places(two: Path) -> None:
@@ -184,7 +184,7 @@ def test_a_team_without_a_solution_stays_on_the_ground(tmp_path: Path) -> None:
     assert [leg["verdict"] for leg in told["legs"]] == ["solution", "no-solution"]
     result = ran("fly", saved(tmp_path, {}))
     assert (result.exit_code, result.stdout) == (1, "")
-    assert "it cannot be flown: there are no drones to fly" in result.stderr
+    assert "the result cannot be flown: there are no drones to fly" in result.stderr
 
 
 # What is published and shown
@@ -258,9 +258,9 @@ def test_what_cannot_be_flown_is_one_clear_line(two: Path) -> None:
             (("--wind", 500), 2, "faster than 200 m/s"),
             (("--gusts", 1e9), 2, "gusts have to be"),
             (("--fail", "nobody"), 2, "there is no drone 'nobody' that could fail, but V1.1, V1.2"),
-            (("--fail", "V1.1@-1"), 2, "is not ROBOT or ROBOT@SECONDS"),
+            (("--fail", "V1.1@-1"), 2, "is not of the form ROBOT or ROBOT@SECONDS"),
             (("--ros", "mcap:run.mcap"), 2, "give their folder with --team"),
-            (("--team", HANGAR), 1, "this is not the team of"),
+            (("--team", HANGAR), 1, "the team here is not"),
         ]:
             with each(words):
                 result = ran("fly", two, *words)

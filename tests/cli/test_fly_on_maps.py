@@ -52,7 +52,7 @@ def test_fly_and_animate_find_the_walls_beside_the_robots(team: Path, result: Pa
     assert "</i>wall</li>" in page.read_text()
     report = ran("fly", result, "--team", team).output
     assert "nearest to a wall: 0.2" in report
-    assert "; set: 0.20 m" in report
+    assert "; minimum: 0.20 m" in report
     assert ran("animate", result, "--team", team, "--html", page).exit_code == 0
     assert "0.2 m)" in page.read_text()
     # A map that is handed over counts in its place.
@@ -85,7 +85,7 @@ def test_on_an_octomap_they_fly_around_its_voxels(tmp_path: Path) -> None:
 def test_a_drone_that_is_blown_against_a_wall_is_told(team: Path, result: Path) -> None:
     blown = ran("fly", result, "--team", team, "--wind", "12", "--gusts", "4")
     assert blown.exit_code == 4
-    assert "nearer to a wall than set: " in blown.output
+    assert "too near to a wall: " in blown.output
 
 
 def test_solve_flies_and_publishes_in_the_scale_of_the_map(team: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.cli.options.generated import next_step
+from robochoc.cli.options.generate import next_step
 from robochoc.cli.reports.failures import INVALID
 from robochoc.formats import read_team
 from robochoc.formats.occupancy.grid import read_occupancy_grid
@@ -119,9 +119,9 @@ def test_what_does_not_fit_is_wrong_usage(tmp_path: Path) -> None:
                 "--connected is for --graph random or",
             ),
             ("random --domain 3 --tightness 0.2 --agents 7 --graph grid --rows 2", "7 robots do not fill 2 rows"),
-            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --places 2", "give --max-cost, too"),
-            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --maximize", "give --max-cost, too"),
-            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --asymmetric", "give --max-cost, too"),
+            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --places 2", "require --max-cost"),
+            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --maximize", "require --max-cost"),
+            ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --asymmetric", "require --max-cost"),
             ("random --domain 3 --tightness 2 --agents 5 --graph tree", "tightness is 2.0"),
             ("coloring --agents 5 --graph small-world --neighbours 3", "must be even"),
             ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),

@@ -82,14 +82,14 @@ def test_import_of_a_folder_makes_a_team_of_each_problem(problem: Path, tmp_path
     ]
     assert "is of no format" not in done.stderr
     nothing = robochoc_within("import", teams, "-o", tmp_path / "more")
-    assert "no file here is of a format that is read (a team's folder needs no import" in nothing.stderr
+    assert "no file with a known format (a team's folder needs no import" in nothing.stderr
 
 
 def test_wrong_usage(problem: Path, tmp_path: Path) -> None:
     mixed = robochoc_within("import", problem, tmp_path, "-o", tmp_path / "team")
-    assert (mixed.returncode, "Give the files of one problem, or folders." in mixed.stderr) == (2, True)
+    assert (mixed.returncode, "Give either the files of one problem, or folders." in mixed.stderr) == (2, True)
     pattern = robochoc_within("import", problem, "--owner", "(", "-o", tmp_path / "team")
-    assert (pattern.returncode, "is no regular expression" in pattern.stderr) == (2, True)
+    assert (pattern.returncode, "is not a regular expression" in pattern.stderr) == (2, True)
     unknown = tmp_path / "notes.txt"
     unknown.write_text("notes")
     told = robochoc_within("import", unknown, "-o", tmp_path / "team")
@@ -278,7 +278,7 @@ def test_an_optimum_that_reaches_the_bound_of_the_file_is_told_so(
     file = tmp_path / name
     file.write_text(text.replace("BOUND", reached))
     run = ("solve", file, "--protocol", "syncbb", "--runtime", "simulator")
-    assert f"bound: {words} the file's bound: there this is no solution" in robochoc_within(*run).stderr
+    assert f"bound: {words} the file's bound: by the file this is not a solution" in robochoc_within(*run).stderr
     file.write_text(text.replace("BOUND", other).replace(reached, other))
     done = robochoc_within(*run)
     assert (done.returncode, "this is no solution" in done.stderr) == (0, False)
@@ -326,7 +326,7 @@ def test_several_files_are_exported_to_named_ones_only(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
     assert robochoc_within("import", tmp_path / "a.yaml", tmp_path / "b.yaml", "-o", team).returncode == 0
     done = robochoc_within("export", team, "--format", "pydcop")
-    assert (done.returncode, "the scenario is a file of its own; name the first one: -o" in done.stderr) == (2, True)
+    assert (done.returncode, "problem and scenario are two files; name the first one: -o" in done.stderr) == (2, True)
     first, second = robochoc_within("export", team, "--format", "pydcop", "-o", exported).stdout.splitlines()
     assert first.endswith(" bytes, 2 variables")
     assert second.endswith(" bytes")
@@ -337,14 +337,16 @@ def test_an_exported_problem_may_have_any_name(tmp_path: Path) -> None:
     file, exported = tmp_path / "pairs.yaml", tmp_path / "pairs.txt"
     file.write_text(PYDCOP)
     assert robochoc_within("export", file, "--format", "pydcop", "-o", exported).returncode == 0
-    assert "it is pyDCOP's YAML" in robochoc_within("validate", exported).stdout
+    assert "this is pyDCOP's YAML" in robochoc_within("validate", exported).stdout
     assert robochoc_within("import", exported, "-o", tmp_path / "team").returncode == 0
 
 
 def test_validate_says_what_a_file_is(problem: Path) -> None:
     done = robochoc_within("validate", problem)
     assert done.returncode == 0
-    assert "2 robots, 2 variables, 1 constraint: ok\n  it is FRODO's XCSP 2.1: 'robochoc solve' takes it" in done.stdout
+    assert (
+        "2 robots, 2 variables, 1 constraint: ok\n  this is FRODO's XCSP 2.1: 'robochoc solve' reads it" in done.stdout
+    )
     told = json.loads(robochoc_within("validate", problem, "--json").stdout)
     assert (told["valid"], told["format"]) == (True, "frodo")
     folder = robochoc_within("validate", problem.parent)
@@ -354,8 +356,8 @@ def test_validate_says_what_a_file_is(problem: Path) -> None:
     assert "is FRODO's XCSP 2.1, not a file of a robot" in solved.stderr
     problem.rename(problem.with_suffix(".xcsp"))
     hidden = robochoc_within("solve", problem.parent)
-    assert f"'robochoc import {problem.parent} -o FOLDER' makes a team of it" in hidden.stderr
-    assert "makes a team of it" in robochoc_within("validate", problem.parent).stdout
+    assert f"convert it to a team: robochoc import {problem.parent} -o FOLDER" in hidden.stderr
+    assert "convert it to a team" in robochoc_within("validate", problem.parent).stdout
     wrong = problem.with_suffix(".xcsp")
     wrong.write_text(wrong.read_text().replace("3 1", "3 x"))
     assert "problem.xcsp:4: 'x' is no integer" in robochoc_within("validate", wrong).stdout

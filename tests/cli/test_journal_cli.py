@@ -67,7 +67,7 @@ def test_show_says_what_is_in_it(file: Path) -> None:
     assert lines[1] == "protocol   abt (simulator, seed 0)"
     assert f"messages   {len(trace.messages.t):,}, {sum(trace.messages.bytes):,} bytes" in lines
     assert any(line.strip().startswith("Ok ") for line in lines)
-    assert lines[-2:] == ["replay     possible", "whole      yes"]
+    assert lines[-2:] == ["replay     possible", "complete   yes"]
 
 
 def test_show_tells_of_an_end_that_is_missing_and_keeps_names_on_their_lines(tmp_path: Path) -> None:
@@ -207,7 +207,7 @@ def test_a_diagram_that_nobody_could_read_is_refused(tmp_path: Path) -> None:
     path.write_bytes(content_of(recorded("mgm")))
     result = journal("export", path, "--format", "mermaid")
     assert result.exit_code == USAGE
-    assert f"at most {MOST_ARROWS} (choose some, by --robots" in result.output
+    assert f"at most {MOST_ARROWS} (select fewer with --robots" in result.output
 
 
 @pytest.mark.parametrize("chosen", [(), ("--types", "*", "--from", "7", "--conversation", "1")])
@@ -216,7 +216,7 @@ def test_with_the_refusal_comes_a_command_that_works(chosen: tuple[str, ...], tm
     path.write_bytes(content_of(recorded("mgm")))
     result = journal("export", path, "--format", "mermaid", "-o", output, *chosen)
     assert result.exit_code == USAGE
-    command = shlex.split(result.output.strip().rsplit("; the first of them: ", 1)[1])
+    command = shlex.split(result.output.strip().rsplit("; for the first messages: ", 1)[1])
     assert command[0] == "robochoc"
     again = CliRunner().invoke(cli, command[1:])
     assert again.exit_code == 0, again.output
@@ -254,14 +254,14 @@ def test_a_page_holds_the_whole_run_and_shows_some_robots_at_first(file: Path) -
     assert (told["messages"], told["chosen"]) == (len(trace_of(file).messages.t), ["Robot1.*"])
     refused = journal("export", file, "--format", "html", "--types", "Nogood")
     assert refused.exit_code == USAGE
-    assert "a page holds the whole run; filter on the page" in refused.output
+    assert "--format html exports all messages: filter on the page" in refused.output
 
 
 def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.cli.commands.journal.MOST_IN_PAGE", 10)
     result = journal("export", file, "--format", "html")
     assert result.exit_code == USAGE
-    assert "too many for one page: at most 10 (look at them" in result.output
+    assert "too many for one page: at most 10 (use 'robochoc sniff'" in result.output
 
 
 def test_a_choice_that_fits_nothing_is_told(file: Path) -> None:
@@ -270,7 +270,7 @@ def test_a_choice_that_fits_nothing_is_told(file: Path) -> None:
             (("--types", "Okay"), "no type of message is called 'Okay'; there are AddLink, Nogood, Ok"),
             (("--robots", "Robot1.1,X*"), "no robot is called 'X*'; there are Robot1.1, "),
             (("--conversation", "2"), "there is no conversation 2, only 1 to 1"),
-            (("--from", "-1"), "'-1' is no whole number of at least 0"),
+            (("--from", "-1"), "'-1' is not a whole number of at least 0"),
             (("--from", "5", "--to", "3"), "there is no message from 5 to 3, only 0 to "),
             (("--from", "999999"), "there is no message from 999999 on, only 0 to "),
         ]:
@@ -292,9 +292,9 @@ def test_a_journal_that_is_not_whole_is_exported_and_that_is_told(file: Path, mo
     monkeypatch.setattr(Trace, "of", lambda _: trace)
     result = journal("export", file, "--format", "csv")
     assert result.exit_code == 0
-    assert result.stderr == f"{file}: it is not whole, this is what can be read: block 3 is broken\n"
+    assert result.stderr == f"{file}: only a part of the journal can be read: block 3 is broken\n"
     assert len(result.stdout.splitlines()) == 1 + len(trace.messages.t)
-    assert journal("show", file).stdout.splitlines()[-1] == "whole      no: block 3 is broken"
+    assert journal("show", file).stdout.splitlines()[-1] == "complete   no: block 3 is broken"
 
 
 def test_what_is_no_journal_is_told(tmp_path: Path) -> None:
@@ -304,7 +304,7 @@ def test_what_is_no_journal_is_told(tmp_path: Path) -> None:
         for command in (("show", path), ("export", path, "--format", "csv")):
             result = journal(*command)
             assert result.exit_code == INVALID
-            assert "give what 'robochoc solve --journal' wrote" in result.output
+            assert "give a file of 'robochoc solve --journal'" in result.output
     assert journal("show", tmp_path / "none").exit_code == INVALID
 
 

@@ -48,7 +48,7 @@ def test_json_holds_every_pair(saved: Path) -> None:
 def test_a_folder_that_is_not_needed_is_not_ignored_without_a_word(saved: Path) -> None:
     plain, told = run("privacy", saved, "--no-cache"), run("privacy", saved, "--team", saved.parent / "team")
     assert told.exit_code == 0
-    assert told.stderr == "--team is not used: the journal says what the robots were given\n"
+    assert told.stderr == "--team is not used: the journal contains the robots' problems\n"
     assert told.stdout == plain.stdout
     assert not plain.stderr
 

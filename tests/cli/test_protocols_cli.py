@@ -123,7 +123,7 @@ def test_the_long_list_has_all_traits() -> None:
     assert row(told, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
     assert abt.ABT.traits.paper in row(told, "abt")
     assert abt.ABT.traits.privacy in row(told, "abt")
-    assert "no protocol" in row(told, "central")
+    assert "not a protocol" in row(told, "central")
     assert "n-ary, PKC" in row(told, "central")
 
 
@@ -145,7 +145,7 @@ def test_the_list_can_be_of_one_kind_of_problem() -> None:
 def test_one_protocol_is_not_asked_for_by_kind() -> None:
     done = run("abt", "--for", "costs")
     assert done.exit_code == 2
-    assert "--for is for the list" in done.stderr
+    assert "--for selects rows of the list" in done.stderr
 
 
 @pytest.mark.usefixtures("package")

@@ -78,10 +78,10 @@ def test_the_first_difference(two: Journal, tmp_path: Path) -> None:
     assert result.return_value == LOST
     assert result.output.endswith(
         """\
-  different, first in step 0 of Robot1.1 in run 0 (ABT)
-    it began
-    recorded  said Ok to Robot1.2: {"value":[2]}, 6 bytes (clock 0)
-    replayed  said Ok to Robot1.2: {"value":[1]}, 6 bytes (clock 0)
+  first difference: step 0 of Robot1.1 in run 0 (ABT)
+    its start
+    recorded  sent Ok to Robot1.2: {"value":[2]}, 6 bytes (clock 0)
+    replayed  sent Ok to Robot1.2: {"value":[1]}, 6 bytes (clock 0)
     differs   in value
 """
     )
@@ -104,8 +104,8 @@ def test_one_that_breaks_off(two: Journal, tmp_path: Path) -> None:
     (tmp_path / "journal").write_bytes(recorder.content())
     result = run(tmp_path / "journal")
     assert result.exit_code == 0
-    assert "the journal does not say how the run ended" in result.output
-    assert result.output.endswith("the same, as far as it goes\n")
+    assert "the journal does not contain the end of the run" in result.output
+    assert result.output.endswith("the same, as far as the journal could be replayed\n")
 
 
 def test_one_that_was_altered_is_invalid_and_names_the_place(two: Journal, tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_what_stands_before_the_damage_is_played(two: Journal, tmp_path: Path) -
     status, said = ended(tmp_path / "journal")
     assert status == INVALID
     assert f"the journal was altered: line {len(lines) - 4}: " in said
-    assert said.endswith("what stands before the damage is the same; this is not the journal that was written\n")
+    assert said.endswith("the same up to the damage; but the journal was altered after it was written\n")
 
 
 def test_one_without_its_end_says_how_far_it_goes(two: Journal, tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_one_without_its_end_says_how_far_it_goes(two: Journal, tmp_path: Path) 
         status, said = ended(tmp_path / "journal")
         assert status == 0
         assert "the journal ends early: " in said
-        assert said.endswith("the same, as far as it goes\n")
+        assert said.endswith("the same, as far as the journal could be replayed\n")
 
 
 def many_blocks(journal: Journal) -> bytes:
@@ -168,7 +168,7 @@ def test_a_run_that_was_decided_before_any_robot_began_is_no_failure(tmp_path: P
     journal = recorded(team, Options(protocol="abt", runtime=Runtime.SIMULATOR))
     status, said = ended(written(journal, tmp_path / "journal"))
     assert status == 0
-    assert said.endswith("there are no steps to compare: it was decided before, as RB has no solution by itself\n")
+    assert said.endswith("no steps to compare: the run was decided before it began, as RB has no local solution\n")
     assert msgspec.json.decode(ended(tmp_path / "journal", "--json")[1])["decided_before"] is True
     other = replace(journal, header=msgspec.structs.replace(journal.header, seed=7))
     assert ended(written(other, tmp_path / "other"))[0] == LOST
@@ -186,7 +186,7 @@ def test_a_verdict_that_does_not_follow_is_a_difference(two: Journal, tmp_path: 
     assert status == LOST
     assert said.endswith(
         """\
-  different, though all steps are the same:
+  different, although all steps are the same:
     the outcome's verdict
       recorded  "solution"
       replayed  "optimal"
@@ -210,5 +210,5 @@ def test_what_is_no_journal(content: bytes, tmp_path: Path) -> None:
     path.write_bytes(content)
     result = run(path)
     assert result.exit_code == INVALID
-    assert "give what 'robochoc solve --journal' wrote" in result.output
+    assert "give a file of 'robochoc solve --journal'" in result.output
     assert run(tmp_path / "nowhere").exit_code == INVALID

@@ -7,7 +7,7 @@ from io import StringIO
 
 import pytest
 
-from robochoc.cli.commands.master import _Teller
+from robochoc.cli.commands.master import _EventPrinter
 from robochoc.cli.reports import progress
 from robochoc.cli.reports.table import table_lines
 from robochoc.journal.events import DroppedOut, Registered
@@ -69,21 +69,21 @@ def test_work_that_reports_nothing_shows_how_long_it_has_taken(monkeypatch: pyte
 
 
 def test_that_robots_can_come_is_said_before_who_has_come(capfd: pytest.CaptureFixture[str]) -> None:
-    teller = _Teller(Address("127.0.0.1", 7447))
-    teller.tell(Registered(t=0.0, robot="Scout"))
+    printer = _EventPrinter(Address("127.0.0.1", 7447))
+    printer.print_event(Registered(t=0.0, robot="Scout"))
     assert capfd.readouterr() == ("", "")
-    teller.listening()
-    teller.tell(Registered(t=0.0, robot="Base"))
+    printer.print_listening()
+    printer.print_event(Registered(t=0.0, robot="Base"))
     assert capfd.readouterr().err.splitlines() == [
         "listening at 127.0.0.1:7447; start robots with --master 127.0.0.1:7447",
-        "Scout is there",
-        "Base is there",
+        "Scout has registered",
+        "Base has registered",
     ]
 
 
 def test_that_a_robot_has_dropped_out_is_said_in_one_line(capfd: pytest.CaptureFixture[str]) -> None:
-    teller = _Teller(Address("127.0.0.1", 7447))
-    teller.listening()
-    teller.tell(DroppedOut(t=0.0, robot="Scout", why="it has not been there for 10 s"))
-    line = "Scout has dropped out: it has not been there for 10 s; waiting for it again"
+    printer = _EventPrinter(Address("127.0.0.1", 7447))
+    printer.print_listening()
+    printer.print_event(DroppedOut(t=0.0, robot="Scout", why="it has not been there for 10 s"))
+    line = "Scout has disconnected: it has not been there for 10 s; waiting for its return"
     assert capfd.readouterr().err.splitlines()[1:] == [line]

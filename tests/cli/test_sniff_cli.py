@@ -122,7 +122,7 @@ def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path) -> None:
         done = robochoc_within("sniff", file)
         assert done.returncode == 1
         assert re.fullmatch(
-            rf".*/file: .*{re.escape(said)}.* \(give what 'robochoc solve --journal' wrote\)\n", done.stderr
+            rf".*/file: .*{re.escape(said)}.* \(give a file of 'robochoc solve --journal'\)\n", done.stderr
         )
 
 
@@ -231,7 +231,7 @@ def test_a_page_outlives_its_run_and_a_run_its_page(teams: Path, monkeypatch: py
     monkeypatch.setattr(PlayedViewer, "is_gone", True)
     done = robochoc_within("solve", teams / "short", "--sniff", "--runtime", "simulator")
     assert (done.returncode, "no solution" in done.stdout) == (0, True)
-    assert "the page is gone: its process ended during the run, which went on without it\n" in done.stderr
+    assert "the page is gone: its process ended during the run, which continued without it\n" in done.stderr
 
 
 def robot_of(run: Run, viewer: int) -> int:
@@ -251,7 +251,7 @@ def test_a_run_goes_on_without_its_viewer_and_says_so(teams: Path, tmp_path: Pat
         run.strike(signal.SIGKILL, robot_of(run, viewer))
         all_is_gone(run)
         assert run.status() == 4, "it went on until a robot was lost"
-        assert "the page is gone: its process ended during the run, which went on without it" in run.errors()
+        assert "the page is gone: its process ended during the run, which continued without it" in run.errors()
 
 
 @pytest.mark.more

@@ -121,7 +121,7 @@ def test_all_decisions_of_the_central_judge(tmp_path: Path) -> None:
 def test_with_downwash_drones_keep_more_distance_above_each_other() -> None:
     words = ("--situation", "flight", "--distance", "0.4")
     assert "above each other" not in solved(HANGAR, *words).stdout
-    assert "; set: 0.40 m, 0.80 m above each other" in solved(HANGAR, *words, "--downwash", "2").stdout
+    assert "; minimum: 0.40 m, 0.80 m above each other" in solved(HANGAR, *words, "--downwash", "2").stdout
 
 
 @pytest.mark.slow
@@ -153,13 +153,13 @@ def test_what_one_robot_knows_of_its_goal() -> None:
 def test_a_flight_that_goes_wrong_is_a_failure() -> None:
     result = solved(HANGAR, "--situation", "flight", "--wind", "80")
     assert result.exit_code == 4
-    assert "not at their places: " in result.stdout
+    assert "not at their goals: " in result.stdout
 
 
 def test_a_failure_that_comes_too_late_is_told() -> None:
     result = solved(HANGAR, "--situation", "flight", "--fail", "Fin@99")
     assert result.exit_code == 0
-    assert "--fail Fin@99: the flight was over after" in result.stderr
+    assert "--fail Fin@99: the flight ended earlier, after" in result.stderr
 
 
 def test_reports_that_nobody_can_use_are_told(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_a_result_that_is_flown_is_not_written_over(tmp_path: Path) -> None:
     before = result.read_text()
     flown = ran("fly", result, "--team", HANGAR, "--ros", f"mcap:{result}")
     assert (flown.exit_code, result.read_text()) == (2, before)
-    assert "are one place" in " ".join(flown.stderr.split())
+    assert "are the same place" in " ".join(flown.stderr.split())
     windy = ran("fly", result, "--wind", "1e9")
     assert windy.exit_code == 2
     assert "is faster than 200 m/s" in windy.stderr

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 from click.testing import CliRunner, Result
 
-from robochoc.cli.options.tokens import LONGEST, token_options
+from robochoc.cli.options.network import LONGEST, token_options
 
 TOKEN = "abc.def"  # noqa: S105 - none that works
 
@@ -54,22 +54,22 @@ def test_a_file_that_others_may_read_is_refused_as_ssh_does(tmp_path: Path) -> N
         path = file_of(tmp_path, b"abc.def", mode)
         result = said("--token-file", path)
         assert result.exit_code == 1
-        why = f"{path}: others may read it (mode {mode:03o}), and so have the token; say: chmod 600 {path}\n"
+        why = f"{path}: others may read it (mode {mode:03o}) and use the token; run: chmod 600 {path}\n"
         assert result.output == why
         assert TOKEN not in result.output
 
 
 def test_a_file_that_holds_no_token(tmp_path: Path) -> None:
     for content, found in [
-        (b"", "nothing"),
-        (b" \n", "nothing"),
+        (b"", "no token"),
+        (b" \n", "no token"),
         (b"A a.b\nB c.d\n", "more than one token"),
         (b"x" * (LONGEST + 1), "more than one token"),
         (b"\0 \xff \x1b[2J", "more than one token"),
     ]:
         path = file_of(tmp_path, content)
         result = said("--token-file", path)
-        expected = f"{path}: there is {found} (expected one line of 'robochoc authority enrol')\n"
+        expected = f"{path}: {found} (expected one line of 'robochoc authority enrol')\n"
         assert (result.exit_code, result.output) == (1, expected)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache, partial
 from random import Random
 
-from robochoc.cli.reports.notes import notes_told
+from robochoc.cli.reports.notes import note_lines
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions
 from robochoc.formats.dialects.names_file import NAMES_FILE, names_json, original_names
@@ -90,7 +90,7 @@ def _checked(read: Callable[[], Imported]) -> Team | None:
     except InvalidInputError as invalid:
         assert_clear(str(invalid))
         return None
-    for line in notes_told(imported.notes, "'--report' lists them"):
+    for line in note_lines(imported.notes, "'--report' lists them"):
         assert_clear(line)
     if sum(1 for _ in imported.team.constraints()) > MANY:
         return imported.team

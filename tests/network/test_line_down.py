@@ -102,7 +102,7 @@ def test_a_line_that_goes_down_for_good_while_the_team_gathers(apart: Apart) -> 
     files, tokens = apart.enrolled(CROWD)
     master = apart.master(files, "--gather", 30)
     crew = apart.robots(files, dict(list(tokens.items())[1:]))
-    master.wait_to_say(" is there", len(crew))
+    master.wait_to_say(" has registered", len(crew))
     apart.line.set("down")
     ended(crew, 4)
     assert master.status() == 3, master.errors

@@ -37,7 +37,7 @@ def test_sixteen_machines_find_what_sixteen_processes_do(site: Deployment) -> No
     assert len(told["withdrawn"]) == len(robots) - FLYING
     assert told["verified"]
     assert "6 withdraw" in robots["Robot1.1"].output
-    assert master.errors.count("granted to redeem a token") == master.errors.count(" is there") == len(robots)
+    assert master.errors.count("granted to redeem a token") == master.errors.count(" has registered") == len(robots)
     assert master.errors.count("\n") == 1 + 2 * len(robots)
     listed = [json.loads(line) for line in site.authority("list", "--json").splitlines()]
     assert {member["state"] for member in listed if member["role"] == "robot"} == {"in force"}
@@ -85,7 +85,7 @@ def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
     files, tokens = enrolled(PAIR, site)
     master = site.master("--team", files)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     first.kill()
     robots = {"RA": site.robot(files / "RA.xml"), **site.robots(files, {"RB": tokens["RB"]})}
     assert master.status() == 0, master.errors
@@ -98,14 +98,14 @@ def test_a_robot_that_drops_out_is_told_and_waited_for_again(site: Deployment) -
     journal = site.folder / "run.jsonl"
     master = site.master("--team", files, "--journal", journal)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     first.kill()
-    dropped = "RA has dropped out: it has not been there for 10 s; waiting for it again\n"
+    dropped = "RA has disconnected: it has not been there for 10 s; waiting for its return\n"
     master.hurry_until(lambda: dropped in master.errors)
     robots = {"RA": site.robot(files / "RA.xml"), **site.robots(files, {"RB": tokens["RB"]})}
     assert master.status() == 0, master.errors
     ended(robots)
-    assert (master.errors.count(dropped), master.errors.count("RA is there")) == (1, 2)
+    assert (master.errors.count(dropped), master.errors.count("RA has registered")) == (1, 2)
     found = [(entry["event"], entry["robot"]) for entry in entries_of(journal) if entry["event"] == "DroppedOut"]
     assert found == [("DroppedOut", "RA")]
 
@@ -115,9 +115,9 @@ def test_who_has_dropped_out_is_named_when_the_time_is_over(site: Deployment) ->
     files = written(PAIR, site)
     robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
     master = site.master("--gather", 3600, "--patience", 1, "--team", files)
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     robot.kill()
-    master.wait_to_say("RA has dropped out: it has not been there for 1 s; waiting for it again")
+    master.wait_to_say("RA has disconnected: it has not been there for 1 s; waiting for its return")
     assert master.hurried_status() == 3
     assert "awaited: RA (it was there, and has dropped out), RB" in master.errors
 
@@ -129,9 +129,7 @@ def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
     master = site.master("--team", files)
     assert master.status() == 0, master.errors
     ended(robots)
-    assert master.output.startswith(
-        "files: solution for all 2 robots, checked; by their owner alone: 1 of 1 constraint"
-    )
+    assert master.output.startswith("files: solution for all 2 robots, checked; by their owner only: 1 of 1 constraint")
 
 
 # The directory
@@ -144,7 +142,7 @@ def test_whom_the_directory_knows_while_the_master_waits(site: Deployment) -> No
     late = tokens.pop("RC")
     master = site.master("--protocol", "abt", "--team", files, "--withdraw", "--json")
     robots = site.robots(files, tokens)
-    master.wait_to_say(" is there", 2)
+    master.wait_to_say(" has registered", 2)
 
     def asked(*words: object) -> Program:
         return site.start("desk", "directory", "--master", site.place, "--as", "Watcher", *words)
@@ -194,11 +192,11 @@ def test_revoked_while_the_others_wait_for_it(site: Deployment) -> None:
     late = tokens.pop("RC")
     master = site.master("--on-loss", "withdraw", "--json", "--gather", 60)
     robots = site.robots(files, tokens)
-    master.wait_to_say(" is there", 2)
+    master.wait_to_say(" has registered", 2)
     site.authority("revoke", "RB")
     master.wait_to_say("refused: RB, take part: its certificate was revoked")
     last = site.robot(files / "RC.xml", "--token", late)
-    master.wait_to_say("RC is there")
+    master.wait_to_say("RC has registered")
     robots["RB"].kill()
     again = site.enrol("RB")["RB"]
     back = site.robot(files / "RB.xml", "--token", again, "--identity", site.folder / "anew")
@@ -213,7 +211,7 @@ def test_revoked_in_mid_run(site: Deployment) -> None:
     endless = ("--protocol", "dsa", "--set", "cycles=1000000", "--timeout", 15)
     master = site.master("--on-loss", "withdraw", "--json", *endless)
     robots = site.robots(files, tokens, "--patience", 2)
-    master.wait_to_say(" is there", 3)
+    master.wait_to_say(" has registered", 3)
     site.authority("revoke", "RB")
     master.wait_to_say("RB is lost: its certificate was revoked")
     assert master.status() == 0, master.errors
@@ -228,7 +226,7 @@ def test_ctrl_c_at_the_master_sends_everybody_home(site: Deployment) -> None:
     del tokens["RC"]
     master = site.master()
     robots = site.robots(files, tokens)
-    master.wait_to_say(" is there", 2)
+    master.wait_to_say(" has registered", 2)
     master.strike(signal.SIGINT)
     assert master.status() == 130
     assert master.errors.endswith("robochoc: interrupted\n")

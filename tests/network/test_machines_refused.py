@@ -38,7 +38,7 @@ def test_tokens_that_do_not_work(site: Deployment) -> None:
     assert "no token" in refused(files / "RA.xml", tokens["RA"][:20])
     assert "expired" in refused(site.folder / "other" / "Late.xml", expired)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     assert "used already" in refused(files / "RA.xml", tokens["RA"], "--identity", site.folder / "second")
     with Deployment(site.folder / "elsewhere") as elsewhere:
         foreign = elsewhere.enrol("RB")["RB"]
@@ -55,7 +55,7 @@ def test_identities_that_do_not_fit(site: Deployment) -> None:
     assert nobody.status() == 1
     assert "enrol with a token" in one_line(nobody)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"], "--identity", site.folder / "RA.id")
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     borrowed = site.robot(files / "RB.xml", "--identity", site.folder / "RA.id")
     assert borrowed.status() == 1
     assert "is the identity of RA, not of RB" in one_line(borrowed)
@@ -82,7 +82,7 @@ def test_no_master_there(site: Deployment) -> None:
         assert "is 'robochoc master' running there?" in one_line(program)
     master = site.master("--gather", 60)
     known = site.robot(files / "RA.xml", "--token", token)
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     master.kill()
     known.strike(signal.SIGINT)
     assert known.status() == 130, known.errors
@@ -96,7 +96,7 @@ def test_ctrl_c_ends_a_robot_that_waits_for_its_master(site: Deployment) -> None
     files = written(PAIR, site)
     master = site.master("--gather", 60)
     site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     with socket.create_server((LOOPBACK, 0)) as silent:
         silent.settimeout(LONG_S)
         place = f"{LOOPBACK}:{silent.getsockname()[1]}"
@@ -121,7 +121,7 @@ def test_a_robot_hears_that_the_others_did_not_come(site: Deployment) -> None:
     files = written(PAIR, site)
     robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
     master = site.master("--gather", 3600)
-    master.wait_to_say("RA is there")
+    master.wait_to_say("RA has registered")
     assert master.hurried_status() == 3
     assert "awaited: RB" in master.errors
     assert robot.status() == 4
@@ -160,9 +160,9 @@ def test_a_port_in_use(higher: int, site: Deployment) -> None:
         (["master", "--protocol", "nonsense"], 2, "nonsense"),
         (["master", "--filter", "nonsense"], 2, "--filter"),
         (["master", "--set", "colour=red"], 2, "colour"),
-        (["master", "--gather", "nan"], 2, "--gather takes a number of seconds, more than 0"),
-        (["master", "--timeout", "0"], 2, "--timeout takes a number of seconds"),
-        (["master", "--deadline", "nan"], 2, "--deadline takes a number of seconds, more than 0"),
+        (["master", "--gather", "nan"], 2, "--gather requires a number of seconds greater than 0"),
+        (["master", "--timeout", "0"], 2, "--timeout requires a number of seconds greater than 0"),
+        (["master", "--deadline", "nan"], 2, "--deadline requires a number of seconds greater than 0"),
         (["master", "--deadline", "1", "--timeout", "1"], 2, "--deadline and --timeout both limit the time"),
         (["master", "--improve", "1"], 2, "--improve goes on after --deadline SECONDS: add it"),
         (["master", "--deadline", "1", "--improve", "inf"], 2, "inf is not a finite number"),
@@ -176,7 +176,7 @@ def test_a_port_in_use(higher: int, site: Deployment) -> None:
         (["directory", "--master", "127.0.0.1:17000", "--as", "Watcher"], 1, "enrol with a token"),
         (["directory", "--master", "127.0.0.1:17000", "--as", "../up"], 2, "../up"),
         (["directory", "--master", "h", "--as", "A", "--search", "colour=red"], 2, "slots are name, protocol"),
-        (["directory", "--master", "127.0.0.1:17000", "--as", "A", "--sl", "--json"], 2, "--sl and --json"),
+        (["directory", "--master", "127.0.0.1:17000", "--as", "A", "--sl", "--json"], 2, "--sl cannot be used with --json"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_line(
@@ -215,4 +215,6 @@ def test_without_the_extra_it_says_what_to_install(missing: str) -> None:
     words = [sys.executable, "-c", WITHOUT_AN_EXTRA, missing]
     done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=ROOT)
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == f"this needs {missing}, which is an extra; say: pip install 'robochoc[network]'\n" * 3
+    assert (
+        done.stderr == f"this command requires {missing}, which is an extra; run: pip install 'robochoc[network]'\n" * 3
+    )

@@ -165,11 +165,11 @@ def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deploym
     ("words", "told"),
     [
         ([], "give a JOURNAL"),
-        (["{file}", "--master", "127.0.0.1"], "drop one"),
-        (["{file}", "--as", "Eye"], "--as goes with --master"),
-        (["{file}", "--no-page"], "--no-page goes with --master"),
-        (["--master", "127.0.0.1", "--no-page"], "--no-page goes with --journal"),
-        (["--master", "127.0.0.1", "--team", "{folder}"], "--team goes with a JOURNAL"),
+        (["{file}", "--master", "127.0.0.1"], "remove one"),
+        (["{file}", "--as", "Eye"], "--as requires --master"),
+        (["{file}", "--no-page"], "--no-page requires --master"),
+        (["--master", "127.0.0.1", "--no-page"], "--no-page requires --journal"),
+        (["--master", "127.0.0.1", "--team", "{folder}"], "--team requires a JOURNAL"),
         (["--master", "nowhere:port"], "is no HOST:PORT"),
     ],
 )

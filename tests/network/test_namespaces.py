@@ -108,7 +108,7 @@ def crowd(apart: Apart, *words: object) -> tuple[Program, list[Program], Path]:
     watched = ("--protocol", "sbt", "--json", "--journal", journal, "--timeout", 90)
     master = apart.site.master(*watched, *words, inside=apart.hill)
     crew = robots(apart.site, files, tokens, apart.field, "--patience", 60)
-    master.wait_to_say(" is there", len(tokens))
+    master.wait_to_say(" has registered", len(tokens))
     return master, crew, journal
 
 

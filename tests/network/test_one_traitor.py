@@ -193,18 +193,18 @@ SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
         (
             {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES, "checked": CheckCounts(1, 1)},
             None,
-            "t: solution for all 3 robots, checked; by their owner alone: 1 of 2 constraints",
+            "t: solution for all 3 robots, checked; by their owner only: 1 of 2 constraints",
         ),
         ({"verdict": Verdict.SOLUTION, "reason": "so"}, ALL_ROBOTS, "t: solution for all 3 robots, not checked: so"),
         (
             {"verdict": Verdict.OPTIMAL, "verified": True, "assignment": VALUES, "cost": 3},
             ALL_ROBOTS,
-            f"t: optimal solution for all 3 robots, cost 3, {CHECKED}; the minimum cost is what all robots report",
+            f"t: optimal solution for all 3 robots, cost 3, {CHECKED}; the minimum cost is as reported by all robots",
         ),
         (
             {"verdict": Verdict.OPTIMAL, "verified": True, "assignment": {"A": 1, "C": 2}, "withdrawn": ("RB",)},
             ALL_ROBOTS,
-            f"t: 2 of 3 fly (proven maximum); {WHOLE}; {CHECKED}; the minimum withdrawal is what all robots report",
+            f"t: 2 of 3 fly (proven maximum); {WHOLE}; {CHECKED}; the minimum withdrawal is as reported by all robots",
         ),
         (
             {"verdict": Verdict.SOLUTION, "verified": True, "assignment": {"A": 1, "C": 2}, "withdrawn": ("RB",)},

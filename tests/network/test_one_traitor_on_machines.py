@@ -88,7 +88,7 @@ def test_it_judges_its_own_constraint(site: Deployment) -> None:
     master, status = betrayed(site, "a wrong value", team=PAIR)
     assert status == 0, master.errors
     assert master.output.startswith(
-        "files: solution for all 2 robots, checked; by their owner alone: 1 of 1 constraint\n"
+        "files: solution for all 2 robots, checked; by their owner only: 1 of 1 constraint\n"
     )
 
 

@@ -159,14 +159,14 @@ def test_a_recording_without_a_clock(tmp_path: Path) -> None:
 def test_it_needs_a_source(words: tuple[str, ...]) -> None:
     code, told = solved(*words, "--use-sim-time")
     assert code != 0
-    assert "--use-sim-time is for robots that report: add --situation" in told
+    assert "--use-sim-time applies to reports of robots: add --situation" in told
 
 
 @looped("word", [("--tf",), ("--diagnostics",), ("--ros-type", "nav_msgs/Path")])
 def test_what_else_is_published_needs_a_sink(word: tuple[str, ...]) -> None:
     code, told = solved("--situation", "flight", *word)
     assert code != 0
-    assert f"{word[0]} is for what is published: add --ros SINK" in told
+    assert f"{word[0]} requires --ros SINK" in told
 
 
 def test_a_type_without_a_mapping_is_refused(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ _NETWORK = 0x40000000
 """What `setns` calls CLONE_NEWNET."""
 
 _PACKAGES = ("robochoc.authority", "robochoc.communication.network", "robochoc.run.networked")
-_COMMANDS = tuple(f"robochoc.cli.commands.{name}" for name in ("directory", "master", "robot", "sniff", "sniff_master"))
+_COMMANDS = tuple(f"robochoc.cli.commands.{name}" for name in ("directory", "master", "robot", "sniff"))
 _MODULES = (
     *_COMMANDS,
     "robochoc.cli.group",

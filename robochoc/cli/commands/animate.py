@@ -1,4 +1,4 @@
-"""`robochoc animate`: the 3D scene of a run that was saved."""
+"""`robochoc animate`: the 3D scene of a saved result."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from pathlib import Path
 
 import click
 
-from robochoc.cli.options.ground import ground_map, map_option
-from robochoc.cli.options.numbers import WholeNumber
-from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
+from robochoc.cli.options.scene import ground_map, html_option, map_option, serve_option
+from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 
 
@@ -25,20 +24,20 @@ from robochoc.cli.reports.failures import invalid_input_fails
 def animate(
     saved: Path, html: Path | None, folder: Path | None, ground: Path | None, port: int, *, serve: bool
 ) -> None:
-    """Write or show the 3D scene of a saved result: what 'robochoc solve' wrote with --json or --journal.
+    """Write or show the 3D scene of a result that 'robochoc solve' saved with --json or --journal.
 
-    It is the page of 'robochoc solve --html'. 'robochoc fly' simulates the flight as well.
+    The page is the same as that of 'robochoc solve --html'. 'robochoc fly' also simulates the flight.
 
     \b
     robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
     robochoc animate out/result.json --html out/page.html
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.scene import scene_for, show_scene
 
     if not (html or serve):
-        raise click.UsageError("say where to write the page (--html FILE), or show it live (--serve)")
+        raise click.UsageError("no output: write the page with --html FILE, or show it with --serve")
     if port and not serve:
-        raise click.UsageError("--port is for --serve")
+        raise click.UsageError("--port requires --serve")
     refuse_same_places({"--html": html}, {"the result": saved, "--map": ground}, teams=[folder] if folder else [])
     outcome, team = saved_outcome(saved)
     team, folder = saved_team(outcome, team, saved, folder)

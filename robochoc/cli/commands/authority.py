@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,13 +16,14 @@ from robochoc.cli.reports.failures import INVALID, USAGE, Failure, invalid_input
 
 if TYPE_CHECKING:
     from robochoc.authority.authority import Authority
+    from robochoc.authority.registry import EnrolledName
 
 _LONGEST_TTL_HOURS = 24 * 366
 
 
-def _lasting(_context: click.Context, _parameter: click.Parameter, hours: float) -> float:
-    if not 0 < hours <= _LONGEST_TTL_HOURS:  # neither is it true of NaN, which click's own range lets pass
-        raise click.BadParameter(f"{hours:g} is not more than 0 and at most {_LONGEST_TTL_HOURS} (a year).")
+def _checked_hours(_context: click.Context, _parameter: click.Parameter, hours: float) -> float:
+    if not 0 < hours <= _LONGEST_TTL_HOURS:  # also rejects NaN, which a range of click accepts
+        raise click.BadParameter(f"{hours:g} is not greater than 0 and at most {_LONGEST_TTL_HOURS} (a year).")
     return hours
 
 
@@ -30,7 +31,7 @@ def _lasting(_context: click.Context, _parameter: click.Parameter, hours: float)
 def authority() -> None:
     """Manage the Authority, which enrols robots and observers and certifies their keys.
 
-    Its folder holds the key that signs all certificates. Keep it on the master's machine only
+    Its folder contains the key that signs all certificates. Store it on the master's machine only
     (docs/guides/security.md).
 
     \b
@@ -38,19 +39,19 @@ def authority() -> None:
     robochoc authority enrol Robot1.1 Robot1.2
     robochoc authority list
     robochoc authority revoke Robot1.2
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
 
 
 @authority.command(short_help="Create an Authority.")
 @authority_option
 def init(folder: Path | None) -> None:
-    """Create an Authority: a key and a certificate for ten years."""
-    with _failures_told():
+    """Create an Authority: a key, and a certificate that is valid for ten years."""
+    with _errors_as_failures():
         from robochoc.authority.authority import Authority, default_authority_folder
 
-        made = Authority.create(folder or default_authority_folder())
-        until = made.certificate.not_valid_after_utc
-        click.echo(f"{made.folder}: a new Authority, until {until:%Y-%m-%d}; next: robochoc authority enrol NAME")
+        created = Authority.create(folder or default_authority_folder())
+        until = created.certificate.not_valid_after_utc
+        click.echo(f"{created.folder}: a new Authority, until {until:%Y-%m-%d}; next: robochoc authority enrol NAME")
 
 
 @authority.command(short_help="Enrol robots or observers: one token per name.")
@@ -68,14 +69,14 @@ def init(folder: Path | None) -> None:
     type=click.Choice(["sniff"]),
     multiple=True,
     metavar="sniff",
-    help="Allow them to follow runs (robochoc sniff). Without it, the right is taken away.",
+    help="Allow the names to follow runs (robochoc sniff). Without this option, the right is removed.",
 )
 @click.option(
     "--token-ttl",
     "hours",
     type=float,
     default=24,
-    callback=_lasting,
+    callback=_checked_hours,
     show_default=True,
     metavar="HOURS",
     help="Lifetime of the tokens.",
@@ -95,19 +96,19 @@ def enrol(
 ) -> None:
     """Create a token for each NAME, and print one line per name.
 
-    Copy each token to its robot. It can be used once. Enrol a name again if its robot has lost its key or was revoked:
-    when the new token is used, the earlier certificates are revoked. The role and the rights change at once.
+    Copy each token to its robot. A token can be used once. Enrol a name again if its robot has lost its key or was
+    revoked: when the new token is used, the earlier certificates are revoked. Role and rights change at once.
     """
     if team:
         from robochoc.formats import robot_names
 
         names = (*names, *robot_names(team))
     if not names:
-        raise Failure(USAGE, "no names to enrol: give names, or --team DIR")
-    with _failures_told(), _opened(folder) as found:
+        raise Failure(USAGE, "there are no names to enrol: give names, or --team DIR")
+    with _errors_as_failures(), _opened(folder) as opened:
         from robochoc.authority.registry import Right, Role
 
-        tokens = found.enrol_all(names, Role(role), timedelta(hours=hours), map(Right, may))
+        tokens = opened.enrol_all(names, Role(role), timedelta(hours=hours), map(Right, may))
     if as_json:
         import msgspec
 
@@ -129,16 +130,14 @@ def list_members(folder: Path | None, *, as_json: bool) -> None:
     invited    has a token that is not used yet
     in force   has a certificate, and renews it during runs
     expired    token or certificate is too old: enrol the name again
-    revoked    is refused
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    with _failures_told(), _opened(folder) as found:
-        from robochoc.cli.reports.authority import members_json, print_members
-
-        members, now = found.members(), found.clock()
+    revoked    is not accepted
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    with _errors_as_failures(), _opened(folder) as opened:
+        members, now = opened.members(), opened.clock()
     if as_json:
-        click.echo(members_json(members, now), nl=False)
+        _print_json(members, now)
     elif members:
-        print_members(members, now)
+        _print_members(members, now)
     else:
         click.echo("no names are enrolled; next: robochoc authority enrol NAME")
 
@@ -149,10 +148,10 @@ def list_members(folder: Path | None, *, as_json: bool) -> None:
 def revoke(name: str, folder: Path | None) -> None:
     """Revoke the certificates of NAME, and its token if it is not used yet.
 
-    A running master notices it. To accept the name again, enrol it again.
+    A running master notices the change. To accept the name again, enrol it again.
     """
-    with _failures_told(), _opened(folder) as found:
-        found.revoke(name)
+    with _errors_as_failures(), _opened(folder) as opened:
+        opened.revoke(name)
     click.echo(f"{name} is revoked; to accept it again: robochoc authority enrol {name}")
 
 
@@ -164,7 +163,7 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 
 
 @contextmanager
-def _failures_told() -> Iterator[None]:
+def _errors_as_failures() -> Iterator[None]:
     """Turn the Authority's errors into `Failure`: one line and an exit status."""
     try:
         from robochoc.authority.names import InvalidNameError, UnknownNameError
@@ -172,7 +171,8 @@ def _failures_told() -> Iterator[None]:
     except ModuleNotFoundError as missing:
         if missing.name is None or missing.name.partition(".")[0] != "cryptography":
             raise
-        raise Failure(USAGE, "the Authority needs 'cryptography'; say: pip install 'robochoc[network]'") from missing
+        message = "the Authority requires 'cryptography'; run: pip install 'robochoc[network]'"
+        raise Failure(USAGE, message) from missing
     from robochoc.formats import on_one_line
 
     try:
@@ -181,3 +181,35 @@ def _failures_told() -> Iterator[None]:
         raise Failure(USAGE, on_one_line(str(error))) from error
     except AuthorityError as error:
         raise Failure(INVALID, on_one_line(str(error))) from error
+
+
+def _print_json(members: Sequence[EnrolledName], now: float) -> None:
+    """Print one JSON object per line: name, role, rights, state at Unix time `now`, and expiry or null."""
+    import msgspec
+
+    for member in members:
+        row = {
+            "name": member.name,
+            "role": member.role,
+            "may": member.may,
+            "state": member.state(now),
+            "expires": _expiry(member, now),
+        }
+        click.echo(msgspec.json.encode(row))
+
+
+def _print_members(members: Sequence[EnrolledName], now: float) -> None:
+    """Print name, role, rights, state and expiry (UTC) of each of `members`."""
+    from robochoc.cli.reports.table import print_table
+
+    rows = []
+    for member in members:
+        until = _expiry(member, now)
+        expires = f"{until:%Y-%m-%d %H:%M}" if until else "-"
+        rows.append((member.name, str(member.role), ", ".join(member.may) or "-", str(member.state(now)), expires))
+    print_table(("name", "role", "may", "state", "expires (UTC)"), rows)
+
+
+def _expiry(member: EnrolledName, now: float) -> datetime | None:
+    until = member.expires(now)
+    return datetime.fromtimestamp(int(until), UTC) if until else None

@@ -9,11 +9,11 @@ import click
 def cache() -> None:
     """Show or clear the cache of solved local problems, in your cache folder (XDG_CACHE_HOME, or ~/.cache).
 
-    'robochoc compile' and 'solve' fill it. It can be cleared at any time.
+    'robochoc compile' and 'solve' write to the cache. It can be cleared at any time.
     """
 
 
-@cache.command(short_help="Show its folder and size.")
+@cache.command(short_help="Show the cache's folder and size.")
 def show() -> None:
     """Show the folder of the cache, its number of problems, and its size."""
     from robochoc.solver.cache import SolutionCache
@@ -24,11 +24,11 @@ def show() -> None:
     click.echo(f"{store.folder}: {problems}, {sum(sizes):,} bytes")
 
 
-@cache.command(short_help="Remove all problems from it.")
+@cache.command(short_help="Remove all problems from the cache.")
 def clear() -> None:
     """Remove all problems from the cache."""
     from robochoc.solver.cache import SolutionCache
 
     store = SolutionCache()
-    gone = store.clear()
-    click.echo(f"{store.folder}: {gone} problem{'s' * (gone != 1)} removed")
+    removed = store.clear()
+    click.echo(f"{store.folder}: {removed} problem{'s' * (removed != 1)} removed")

@@ -1,4 +1,4 @@
-"""`robochoc compare`: protocols side by side, at once."""
+"""`robochoc compare`: protocols side by side, without a study file."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import OutputFile
+from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 
 if TYPE_CHECKING:
@@ -22,18 +22,24 @@ DEFAULT_SEEDS = "1..10"
 @click.command(short_help="Compare protocols on problems: a table and a picture.")
 @click.argument("problem", nargs=-1, required=True, metavar="PATH ...|FAMILY [NAME=VALUE ...]")
 @click.option("--protocols", required=True, metavar="NAME,NAME,...", help="The protocols.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Set a parameter of all. Repeatable.")
-@click.option("--order", metavar="NAME", help="Priority order of the robots, or several with commas.")
+@click.option(
+    "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Set a parameter of all protocols. Repeatable."
+)
+@click.option("--order", metavar="NAME", help="Priority order of the robots, or several, separated by commas.")
 @click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator, arrays, processes.")
 @click.option("--channel", metavar="NAME", help="Channel model of the simulator: wlan, wpan, wman, wwan.")
 @click.option(
     "--timeout", type=Number(0, min_open=True), default=30, show_default=True, metavar="SECONDS",
-    help="Limit of each run.",
+    help="Time limit of each run.",
 )  # fmt: skip
-@click.option("--over", metavar="PARAMETER", help="A row for each value of it.  [default: the first with several]")
+@click.option(
+    "--over", metavar="PARAMETER", help="Parameter whose values are the rows.  [default: the first with several values]"
+)
 @click.option("--html", type=OutputFile(), metavar="FILE", help="Write a page with figures and tests.")
-@click.option("--save", type=OutputFile(), metavar="FILE", help="Keep the results: an SQLite file to go on with.")
-@click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
+@click.option(
+    "--save", type=OutputFile(), metavar="FILE", help="Save the results in an SQLite file, for 'robochoc experiment'."
+)
+@click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Number of workers.  [default: one per processor]")
 @invalid_input_fails
 def compare(
     problem: tuple[str, ...],
@@ -46,24 +52,24 @@ def compare(
 ) -> None:
     """Run protocols on the same problems, and show medians side by side.
 
-    The problems are those of folders and files, or of a family of 'robochoc generate', whose parameters are given as
-    NAME=VALUE; a range such as 1..30 or 0.2..0.6:0.1 stands for each of its values.
+    The problems are folders and files, or a family of 'robochoc generate' with its parameters as NAME=VALUE. A range
+    such as 1..30 or 0.2..0.6:0.1 means each of its values.
 
     \b
     robochoc compare instances/queens3d-4 --protocols abt,afc-ng,dynabt
     robochoc compare random agents=15 domain=5 density=0.4 tightness=0.2..0.6:0.1 seed=1..30 \\
         --protocols abt,afc-ng,dynabt,awc --html compare.html
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     if html is not None:
-        from robochoc.cli.commands.experiment import need_figures
+        from robochoc.cli.commands.experiment import require_figures
 
-        need_figures()
-    from robochoc.cli.commands.experiment import carried_out, stored
+        require_figures()
+    from robochoc.cli.commands.experiment import carry_out, open_store
     from robochoc.cli.reports.experiment import print_tables
 
     study = _study(problem, over, runs)
-    with stored(save) as store:
-        carried_out(study, store, jobs)
+    with open_store(save) as store:
+        carry_out(study, store, jobs)
         results = store.results()
     print_tables(results, over, ())
     if html is not None:
@@ -81,7 +87,7 @@ def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> St
 
     protocols = [name for name in runs.pop("protocols").split(",") if name]
     if not protocols:
-        raise click.UsageError("--protocols names no protocol; write --protocols abt,afc-ng")
+        raise click.UsageError("--protocols is empty; give names, such as --protocols abt,afc-ng")
     settings = dict(_pair(word, "--set") for word in runs.pop("settings"))
     order = runs.pop("order")
     timeout = runs.pop("timeout")
@@ -119,19 +125,20 @@ def _problems(words: Sequence[str]) -> dict[str, Any]:
 
         near = difflib.get_close_matches(missing[0], FAMILIES, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"families are {', '.join(FAMILIES)}"
-        raise click.UsageError(f"{missing[0]!r} is no folder, no file and no family; {hint}")
+        raise click.UsageError(f"{missing[0]!r} is not a folder, a file or a family; {hint}")
     return {"path": [str(Path(word).absolute()) for word in words]}
 
 
-def _pair(word: str, of: str) -> tuple[str, Any]:
+def _pair(word: str, option: str) -> tuple[str, Any]:
+    """Parse NAME=VALUE of `option`, or of the family with that name, whose parameters may be written with hyphens."""
     name, equals, value = word.partition("=")
     if not equals or not name:
-        raise click.UsageError(f"{of} takes NAME=VALUE, not {word!r}")
-    return name.replace("-", "_") if of != "--set" else name, _value(value)
+        raise click.UsageError(f"{option} requires NAME=VALUE, not {word!r}")
+    return name.replace("-", "_") if option != "--set" else name, _value(value)
 
 
 def _value(text: str) -> Any:  # noqa: ANN401 - a number, a word, or a list
-    """Return the value that `text` stands for; with commas, several."""
+    """Parse a value; with commas, a list of values."""
     if "," in text:
         return [_value(part) for part in text.split(",") if part]
     if text in {"true", "false"}:

@@ -11,7 +11,7 @@ import click
 
 from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.paths import TeamFolder, teams_at
-from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
+from robochoc.cli.reports.failures import LIMIT, Failure, errors_as_failures, worst
 
 if TYPE_CHECKING:
     from robochoc.solver.cache import SolutionCache
@@ -37,18 +37,18 @@ def compile_team(
     """Compile the local problems of all robots of the teams in TEAM and below, and show their sizes.
 
     A robot's local solutions are the values of its variables that its private constraints allow. Local solutions that
-    neighbours cannot tell apart make one group. A protocol works on the groups.
+    neighbours cannot distinguish form one group. Protocols work on the groups.
 
     \b
     variables  number of the robot's variables
-    seen       those of them in shared constraints
+    seen       number of its variables in shared constraints
     private    number of constraints on its own variables only
     local      number of local solutions
     groups     number of groups
-    cost       minimum and maximum cost of a group (DisWCSP)
-    how        direct: no search; enumerated: without ACE; ACE: solved by ACE;
+    cost       minimum and maximum cost of a group (DCOP)
+    how        direct: without search; enumerated: without ACE; ACE: by ACE;
                cached: solved earlier; equal: same problem as a robot above
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.solver.cache import SolutionCache
 
     bounds = limits(local_solutions, local_timeout, always_ace=always_ace)
@@ -58,7 +58,7 @@ def compile_team(
 
 def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
     try:
-        with failures_told(folder):
+        with errors_as_failures(folder):
             return _compile(folder, bounds, cache, as_json=as_json)
     except Failure as failure:
         failure.show()
@@ -66,7 +66,7 @@ def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_jso
 
 
 def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
-    """Compile the team in `folder`, robots that reach a limit included, tell of it, and return the exit status."""
+    """Compile all robots of the team in `folder`, even if some reach a limit, and return the exit status."""
     from robochoc.cli.reports.compile import print_sizes, sizes_json
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.run_result import Progress

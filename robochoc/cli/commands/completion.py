@@ -1,4 +1,4 @@
-"""`robochoc completion`: the script with which a shell completes commands, options and names."""
+"""`robochoc completion`: the script by which a shell completes commands, options and names."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def completion(shell: str) -> None:
     bash   eval "$(robochoc completion bash)"         in ~/.bashrc
     zsh    eval "$(robochoc completion zsh)"          in ~/.zshrc, after compinit
     fish   robochoc completion fish | source          in ~/.config/fish/config.fish
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from click.shell_completion import get_completion_class
 
     from robochoc.cli.group import cli
 
     kind = get_completion_class(shell)
     if kind is None:
-        raise click.UsageError(f"there is no completion for {shell}")
+        raise click.UsageError(f"completion is not available for {shell}")
     click.echo(kind(cli, {}, "robochoc", VARIABLE).source())

@@ -7,9 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
-from robochoc.cli.options.numbers import WholeNumber
-from robochoc.cli.options.tokens import token_options
+from robochoc.cli.options.network import (
+    identity_option,
+    master_option,
+    network_errors_as_failures,
+    patience_option,
+    token_options,
+)
+from robochoc.cli.options.value_types import WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.run.networked.address import Address
@@ -18,9 +23,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @master_option
-@click.option(
-    "--as", "name", required=True, metavar="NAME", help="Your name, as it is enrolled (--role observer is enough)."
-)
+@click.option("--as", "name", required=True, metavar="NAME", help="Your enrolled name (--role observer is sufficient).")
 @token_options()
 @identity_option
 @click.option(
@@ -30,11 +33,11 @@ if TYPE_CHECKING:
     metavar="SLOT=VALUE",
     help=(
         "Only agents that match: protocol=abt, variable=V3.1, topic=..., name=Robot3.1, ontology=..., language=..."
-        " Repeatable: all have to match."
+        " Repeatable: all must match."
     ),
 )
-@patience_option("Time without contact after which the master is given up.", 10.0)
-@click.option("--at-most", type=WholeNumber(1), metavar="N", help="At most N agents.")
+@patience_option("Time without contact after which the master counts as lost.", 10.0)
+@click.option("--at-most", type=WholeNumber(1), metavar="N", help="List at most N agents.")
 @click.option("--watch", "watching", is_flag=True, help="Print agents that register and leave, until Ctrl-C.")
 @click.option("--sl", is_flag=True, help="Print the answer in FIPA-SL0, as it is received.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per agent.")
@@ -47,16 +50,16 @@ def directory(
     sl: bool,
     as_json: bool,
     watching: bool,
-    **given: Any,  # noqa: ANN401 - what to ask for, and how long to wait
+    **given: Any,  # noqa: ANN401 - the query, and how long to wait
 ) -> None:
     """List the agents in a running master's Directory Facilitator, with their protocols, variables and topics.
 
     \b
     robochoc directory --master 192.168.1.14:7447 --as Scout --search protocol=abt
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     if sl and as_json:
-        raise click.UsageError("--sl and --json are two forms of one answer; drop one")
-    with network_failures_told(place):
+        raise click.UsageError("--sl cannot be used with --json; remove one")
+    with network_errors_as_failures(place):
         from robochoc.run.networked.directory_query import agents_in, query_directory, search_request, watch_directory
         from robochoc.run.networked.join import identity_of
 
@@ -65,17 +68,17 @@ def directory(
         proof = identity_of(name, place, identity, token, patience_s)
         if watching:
             for answer in watch_directory(place, proof, words, patience_s):
-                _tell(answer, sl=sl, as_json=as_json)
+                _print_answer(answer, sl=sl, as_json=as_json)
             return
         answer = query_directory(place, proof, words, patience_s)
         if sl or as_json:
-            _tell(answer, sl=sl, as_json=as_json)
+            _print_answer(answer, sl=sl, as_json=as_json)
         else:
             _print_table(agents_in(answer))
 
 
-def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
-    """Print one answer line by line. For an agent that has gone, only its name is left."""
+def _print_answer(answer: str, *, sl: bool, as_json: bool) -> None:
+    """Print one answer line by line; of an agent that has left, only the name."""
     import msgspec
 
     from robochoc.run.networked.directory_query import agents_in, subject_of
@@ -86,12 +89,12 @@ def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
         return
     agents = agents_in(answer)
     for agent in agents:
-        kinds = ", ".join(f"{one.type} {one.name}" for one in agent.services)
+        kinds = ", ".join(f"{service.type} {service.name}" for service in agent.services)
         click.echo(msgspec.json.encode(agent).decode() if as_json else on_one_line(f"{agent.name}: {kinds}"))
     gone = "" if agents else subject_of(answer)
     if gone:
-        told = msgspec.json.encode({"name": gone, "gone": True}).decode()
-        click.echo(told if as_json else on_one_line(f"{gone} has gone"))
+        fields = msgspec.json.encode({"name": gone, "gone": True}).decode()
+        click.echo(fields if as_json else on_one_line(f"{gone} has left"))
 
 
 def _print_table(agents: tuple[AgentDescription, ...]) -> None:
@@ -102,6 +105,8 @@ def _print_table(agents: tuple[AgentDescription, ...]) -> None:
         return
     rows = []
     for agent in agents:
-        kinds = {kind: [one.name for one in agent.services if one.type == kind] for kind in ("variable", "topic")}
+        kinds = {
+            kind: [service.name for service in agent.services if service.type == kind] for kind in ("variable", "topic")
+        }
         rows.append((agent.name, *map(", ".join, (agent.protocols, kinds["variable"], kinds["topic"]))))
     print_table(("agent", "protocols", "variables", "topics"), rows)

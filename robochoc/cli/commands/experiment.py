@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile
+from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -30,23 +30,27 @@ PAGES = (".html", ".htm", ".md")
 
 @click.group()
 def experiment() -> None:
-    """Carry out studies: which protocols, on which problems, and what came out. docs/guides/experiments.md.
+    """Run studies of protocols on problems, and report their results (docs/guides/experiments.md).
 
     \b
     robochoc experiment run study.toml
     robochoc experiment show study.sqlite
     robochoc experiment report study.sqlite -o report.html
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
 
 
-@experiment.command(short_help="Carry out a study, or go on with it.")
+@experiment.command(short_help="Run a study, or continue it.")
 @click.argument("study", type=InputPath(), metavar="STUDY.toml")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
-@click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
-@click.option("--again", type=click.Choice(AGAIN), multiple=True, help="Run again also what has ended so. Repeatable.")
-@click.option("--dry-run", is_flag=True, help="Show how many runs there are, and run none.")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster there, such as tcp://10.0.0.1:8786.")
-@click.option("--dask", type=InputPath(), metavar="FILE", help="Run on a Dask cluster, by its scheduler's JSON file.")
+@click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Number of workers.  [default: one per processor]")
+@click.option(
+    "--again", type=click.Choice(AGAIN), multiple=True, help="Also repeat the runs with this status. Repeatable."
+)
+@click.option("--dry-run", is_flag=True, help="Show the number of runs without running any.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on the Dask cluster at this address, such as tcp://10.0.0.1:8786."
+)
+@click.option("--dask", type=InputPath(), metavar="FILE", help="Run on the Dask cluster of this scheduler file (JSON).")
 @invalid_input_fails
 def run(
     study: Path,
@@ -58,15 +62,15 @@ def run(
     *,
     dry_run: bool,
 ) -> None:
-    """Carry out the study in the file STUDY.toml, and write one row for each run into an SQLite file.
+    """Run the study in the file STUDY.toml, and write one row for each run to an SQLite file.
 
-    What is there already is not run again: after Ctrl-C, a crash or a change of the study say the same once more.
-    Answers are checked and compared; the study stops at two that contradict each other, with exit status 4.
+    Existing results are not computed again: after Ctrl-C, a crash or a change of the study, repeat the command. Answers
+    are checked and compared; the study stops if two answers contradict each other, with exit status 4.
 
     \b
     robochoc experiment run study.toml --dry-run
     robochoc experiment run study.toml --jobs 8
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.experiment import ended_line
     from robochoc.experiments.study import read_study
 
@@ -77,25 +81,27 @@ def run(
         return
     workers = _workers(scheduler, dask)
     if workers and any(setup.runtime not in {"simulator", "arrays"} for setup, *_ in read.setups):
-        click.echo(f"{read.name}: robots that have processes run here, not on the cluster", err=True)
-    with stored(path) as store, _cluster_told(workers):
-        ended = carried_out(read, store, jobs, workers, again)
+        click.echo(f"{read.name}: runs with one process per robot run here, not on the cluster", err=True)
+    with open_store(path) as store, _cluster_loss_as_failure(workers):
+        ended = carry_out(read, store, jobs, workers, again)
     click.echo(ended_line(read.name, ended), err=True)
     click.echo(f"{path}: next: {shlex.join(['robochoc', 'experiment', 'show', str(path)])}", err=True)
 
 
-@experiment.command(short_help="Show what came of a study.")
+@experiment.command(short_help="Show the results of a study.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
-@click.option("--over", metavar="PARAMETER", help="A row for each value of it.  [default: the first with several]")
+@click.option(
+    "--over", metavar="PARAMETER", help="Parameter whose values are the rows.  [default: the first with several values]"
+)
 @click.option("--metric", "metrics", multiple=True, metavar="NAME", help="Metric to show. Repeatable.")
 @invalid_input_fails
 def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
-    """Show medians of what came of a study, and how its runs ended; it may still be running.
+    """Show medians of the results of a study, and the statuses of its runs. The study may still be running.
 
     \b
     robochoc experiment show study.sqlite
     robochoc experiment show study.sqlite --over tightness --metric ncccs
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.experiment import print_summary
     from robochoc.experiments.results import read_results
 
@@ -108,19 +114,19 @@ def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
     "-o", "--output", type=InputPath(), metavar="FILE", help="File, or folder, to write.  [default: standard output]"
 )
 @click.option(
-    "--format", "form", type=click.Choice([*FORMATS, JOURNALS]), help="csv, json (a line each), latex (medians),"
-    " parquet; journals: a folder of those that the study records.  [default: by the file's ending, else csv]",
+    "--format", "form", type=click.Choice([*FORMATS, JOURNALS]), help="csv, json (one line per run), latex (medians),"
+    " parquet; journals: a folder with the recorded journals.  [default: by the file's ending, else csv]",
 )  # fmt: skip
 @invalid_input_fails
 def export(results: Path, output: Path | None, form: str | None) -> None:
-    """Write the results as CSV, JSON lines or Parquet, a row a run, or as a LaTeX table of medians.
+    """Write the results as CSV, JSON lines or Parquet with one row per run, or as a LaTeX table of medians.
 
     \b
     robochoc experiment export study.sqlite -o study.csv
     robochoc experiment export study.sqlite --format latex > table.tex
     robochoc experiment export study.sqlite --format journals -o journals/
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.failures import failures_told
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.cli.reports.failures import errors_as_failures
     from robochoc.experiments.export import exported
     from robochoc.experiments.results import read_results
     from robochoc.system.files import write_atomically
@@ -128,11 +134,11 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
     endings = {".jsonl": "json", ".tex": "latex", ".pq": "parquet", **{f".{name}": name for name in FORMATS}}
     form = form or (endings.get(output.suffix) if output else None) or "csv"
     if form == "parquet" and output is None:
-        raise click.UsageError("Parquet is binary: name a file with -o.")
+        raise click.UsageError("Parquet is a binary format: name a file with -o.")
     if form == JOURNALS:
         _write_journals(results, output)
         return
-    with failures_told(results):
+    with errors_as_failures(results):
         content = exported(read_results(results), form)
     if output is None:
         click.echo(content, nl=False)
@@ -141,55 +147,60 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
 
 
 def _write_journals(results: Path, folder: Path | None) -> None:
-    """Write each journal to a file of the folder, called by the run's key."""
+    """Write each journal to a file of the folder, with the run's key as name."""
     from robochoc.experiments.results import journals
     from robochoc.system.files import write_atomically
 
     if folder is None:
-        raise click.UsageError("Journals are files: name a folder with -o.")
+        raise click.UsageError("Journals are written to a folder: name it with -o.")
     written = 0
     for key, content in journals(results):
         folder.mkdir(parents=True, exist_ok=True)
         write_atomically(folder / f"{key}.journal", content)
         written += 1
     if not written:
-        raise Failure(USAGE, f'{results} has no journals; say record = ["journal"] in the study')
+        raise Failure(USAGE, f'{results} has no journals; write record = ["journal"] in the study')
     click.echo(f"{folder}: {written:,} journals", err=True)
 
 
 @experiment.command(short_help="Report on the results: a page, or figures for a paper.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
 @click.option(
-    "-o", "--output", type=InputPath(), required=True, metavar="PAGE.html|PAGE.md|FOLDER", help="What to write."
+    "-o",
+    "--output",
+    type=InputPath(),
+    required=True,
+    metavar="PAGE.html|PAGE.md|FOLDER",
+    help="Page or folder to write.",
 )
-@click.option("--over", metavar="PARAMETER", help="Draw over this one.  [default: the first with several values]")
+@click.option("--over", metavar="PARAMETER", help="Parameter on the x axis.  [default: the first with several values]")
 @click.option("--force", is_flag=True, help="Replace figures that exist in the folder.")
 @invalid_input_fails
 def report(results: Path, output: Path, over: str | None, *, force: bool) -> None:
-    """Report on a study: one page that needs nothing else, or a folder with the figures in SVG and PDF.
+    """Report on a study: one self-contained page, or a folder with the figures in SVG and PDF.
 
-    Medians with intervals over a parameter, profiles, cost over time, pairs of protocols, tests. Markdown has the
-    tables without the figures.
+    The report has medians with intervals over a parameter, profiles, cost over time, pairs of protocols, and tests.
+    Markdown has the tables without the figures.
 
     \b
     robochoc experiment report study.sqlite -o report.html
     robochoc experiment report study.sqlite -o report.md
     robochoc experiment report study.sqlite -o figures/
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.experiments.results import read_results
 
     if output.suffix.lower() not in PAGES and output.suffix[1:].isalpha() and not output.is_dir():
         raise click.UsageError(
-            f"-o {output}: pages end in .html or .md; figures in SVG and PDF go to a folder, whose name has no ending."
+            f"-o {output}: name a page (.html or .md), or a folder for figures in SVG and PDF (without an ending)."
         )
     if output.suffix.lower() == ".md":
-        need("tests of pairs", "scipy")
+        require_modules("tests of pairs", "scipy")
         from robochoc.experiments.markdown import write_markdown
 
         write_markdown(read_results(results), output, over)
         click.echo(f"{output}: written", err=True)
         return
-    need_figures()
+    require_figures()
     from robochoc.experiments.report import write_folder, write_page
 
     if output.suffix.lower() in {".html", ".htm"}:
@@ -199,32 +210,32 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
     click.echo(f"{output}: written", err=True)
 
 
-def need_figures() -> None:
-    """Fail unless what draws figures is installed."""
-    need("figures", "matplotlib", "scipy")
+def require_figures() -> None:
+    """Raise `Failure` unless the modules that draw figures are installed."""
+    require_modules("figures", "matplotlib", "scipy")
 
 
-def need(what: str, *modules: str) -> None:
-    """Fail unless the modules are installed, which `what` needs: those of the extra `experiments`."""
+def require_modules(user: str, *modules: str) -> None:
+    """Raise `Failure` unless the modules, which `user` requires, are installed. The extra is `experiments`."""
     from importlib.util import find_spec
 
     for name in modules:
         if find_spec(name) is None:
-            raise Failure(USAGE, f"{what} need {name}, which is not installed: pip install 'robochoc[experiments]'")
+            raise Failure(USAGE, f"{user} require {name}, which is not installed: pip install 'robochoc[experiments]'")
 
 
 def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None], Workers] | None:
-    """Return what makes the workers of a cluster. None: this machine's."""
+    """Return the factory of a cluster's workers; None for workers on this machine."""
     if scheduler is None and dask is None:
         return None
     if scheduler is not None and dask is not None:
-        raise click.UsageError("--scheduler and --dask both name a cluster; leave one out.")
+        raise click.UsageError("--scheduler and --dask both name a cluster; remove one.")
     from importlib.util import find_spec
 
     if find_spec("distributed") is None:
-        raise Failure(USAGE, "a cluster needs Dask, which is not installed: pip install 'robochoc[cluster]'")
+        raise Failure(USAGE, "a cluster requires Dask, which is not installed: pip install 'robochoc[cluster]'")
     if dask is not None and not dask.is_file():
-        raise Failure(INVALID, f"{dask} is no file; name the one that 'dask scheduler --scheduler-file' writes")
+        raise Failure(INVALID, f"{dask} is not a file; name the file of 'dask scheduler --scheduler-file'")
     from functools import partial
 
     from robochoc.experiments.cluster import ClusterWorkers
@@ -240,8 +251,8 @@ def _show_plan(study: Study, path: Path, again: Sequence[str]) -> None:
 
 
 @contextmanager
-def _cluster_told(workers: object) -> Iterator[None]:
-    """Turn the loss of a cluster, if there is one, into a failure."""
+def _cluster_loss_as_failure(workers: object) -> Iterator[None]:
+    """Turn the loss of a cluster, if one is used, into a `Failure`."""
     if workers is None:
         yield
         return
@@ -257,8 +268,8 @@ def _cluster_told(workers: object) -> Iterator[None]:
 
 
 @contextmanager
-def stored(path: Path | None) -> Iterator[Store]:
-    """Open the file of a study's results; None: memory."""
+def open_store(path: Path | None) -> Iterator[Store]:
+    """Open the file of a study's results; None for results in memory."""
     from robochoc.experiments.store import Store, StudyInUseError
 
     try:
@@ -269,14 +280,14 @@ def stored(path: Path | None) -> Iterator[Store]:
         yield store
 
 
-def carried_out(
+def carry_out(
     study: Study,
     store: Store,
     jobs: int | None,
     workers: Callable[[int | None], Workers] | None = None,
     again: Sequence[str] = (),
 ) -> Counter[str]:
-    """Carry out a study, with its progress on a terminal; each foreseen error is a failure."""
+    """Run a study, with its progress on a terminal. Each foreseen error becomes a `Failure`."""
     from robochoc.cli.reports.experiment import progress_of
     from robochoc.experiments.agreement import DisagreementError
     from robochoc.experiments.plan import TooManyRunsError
@@ -288,10 +299,10 @@ def carried_out(
             once_more = [Status(one) for one in again]
             return run_study(study, store, jobs, progress=progress, workers=workers, again=once_more)
     except KeyboardInterrupt:
-        there = len(store.results().rows)
-        click.echo(f"\n{study.name}: {there:,} runs are kept; the same command goes on with the others", err=True)
+        saved = len(store.results().rows)
+        click.echo(f"\n{study.name}: {saved:,} runs are saved; the same command continues with the others", err=True)
         raise
-    except DisagreementError as wrong:
-        raise Failure(LOST, f"{study.name}: stopped: {wrong}") from None
+    except DisagreementError as error:
+        raise Failure(LOST, f"{study.name}: stopped: {error}") from None
     except TooManyRunsError as refused:
         raise Failure(INVALID, f"{study.name}: {refused}") from None

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import OutputFile, refuse_same_places
-from robochoc.cli.options.problems import WRITTEN, Problem, reading_options
-from robochoc.cli.reports.failures import USAGE, Failure, failures_told
+from robochoc.cli.options.problems import WRITTEN, ProblemPath, reading_options
+from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures
 
 if TYPE_CHECKING:
     from robochoc.formats.dialects.dialect import ExportOptions, Written
@@ -17,37 +17,37 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("folder", type=Problem(), metavar="TEAM")
+@click.argument("folder", type=ProblemPath(), metavar="TEAM")
 @click.option(
-    "--format", "kind", type=click.Choice(WRITTEN), default="xcsp3", show_default=True, help="What is written."
+    "--format", "kind", type=click.Choice(WRITTEN), default="xcsp3", show_default=True, help="Format of the file."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
 @click.option("--intension", is_flag=True, help="Keep predicates and functions (frodo only, for its JaCoP parser).")
 @reading_options
 def export(folder: Path, kind: str, output: Path | None, intension: bool, **reading: Any) -> None:  # noqa: ANN401, FBT001 - `read_problem`, click's
-    """Write the problem of the team in the folder TEAM for other tools, all files merged.
+    """Write the problem of the team in the folder TEAM, all files merged, for other tools.
 
     \b
-    xcsp3       one XCSP3-core file (tables, allDifferent; for a DisWCSP, a
-                sum of costs to minimise), for ACE, Choco and others
+    xcsp3       one XCSP3-core file (tables, allDifferent; for a DCOP, a sum
+                of costs to minimise), for ACE, Choco and others
     frodo       FRODO's XCSP 2.1 (relations, integer costs)
     xdiscsp     XDisCSP 1.0, for DisChoco
     dcopsolver  the part of XDisCSP 1.0 that DCOPSolver reads
-    pydcop      pyDCOP's YAML, a distribution file as well
+    pydcop      pyDCOP's YAML, and a distribution file
     cfn         a cost function network, for toulbar2
     wcsp        toulbar2's older format
     dot         the constraint graph over a pseudo-tree, for Graphviz
     graphml     the constraint graph of the variables, for Gephi and networkx
 
-    TEAM may also be a problem in a file of another tool. A team that a
-    format cannot express is refused.
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    TEAM may also be a problem file of another tool. A team that the format
+    cannot express is an error.
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.system.files import write_atomically
 
     refuse_same_places({"-o": output}, teams=[folder])
     if intension and kind != "frodo":
         raise click.UsageError("--intension requires --format frodo")
-    with failures_told(folder):
+    with errors_as_failures(folder):
         from robochoc.formats.dialects.dialect import ExportOptions
         from robochoc.formats.problems import read_problem
 
@@ -55,15 +55,15 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
         written = _written(team, kind, ExportOptions(intension=intension))
     if output is None:
         if len(written.files) > 1:
-            raise Failure(USAGE, f"{folder}: the scenario is a file of its own; name the first one: -o FILE")
+            raise Failure(USAGE, f"{folder}: problem and scenario are two files; name the first one: -o FILE")
         (content,) = written.files.values()
         click.echo(content, nl=not content.endswith(b"\n"))
     else:
         for place, (name, content) in enumerate(written.files.items()):
             path = output if place == 0 else output.with_name(f"{output.stem}{_ending(team, name)}")
             write_atomically(path, content)
-            of_it = f", {len(team.variables)} variables" if place == 0 else ""
-            click.echo(f"{path}: {len(content):,} bytes{of_it}")
+            variables = f", {len(team.variables)} variables" if place == 0 else ""
+            click.echo(f"{path}: {len(content):,} bytes{variables}")
     for kind_of_note, text in written.notes:
         click.echo(f"  {kind_of_note}: {text}", err=output is None)
 
@@ -75,11 +75,11 @@ def _written(team: Team, kind: str, options: ExportOptions) -> Written:
 
     dialect = dialect_called(kind)
     if dialect is None or dialect.write is None:
-        raise Failure(USAGE, f"this version does not write {kind}")
+        raise Failure(USAGE, f"this version cannot write {kind}")
     written = dialect.write(team, options)
     return written._replace(notes=(*written.notes, *notes_on_absence(team)))
 
 
 def _ending(team: Team, name: str) -> str:
-    """Return what a further file's name has after that of the team: `_dist.yaml`."""
+    """Return the part of a further file's name after the team's name: `_dist.yaml`."""
     return name.removeprefix(team.name)

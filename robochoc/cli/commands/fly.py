@@ -1,4 +1,4 @@
-"""`robochoc fly`: a result that was saved, flown by simulated quadrotors."""
+"""`robochoc fly`: a saved result, flown by simulated quadrotors."""
 
 from __future__ import annotations
 
@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.ground import ground_map, map_option
-from robochoc.cli.options.numbers import WholeNumber
-from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import FRAME, flight_options, ros_options
 from robochoc.cli.options.ros_setup import (
     conditions_of,
     open_sinks,
     publish_options,
-    ros_errors_fail,
+    ros_errors_as_failures,
     scale_usage,
     sink_places,
 )
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
+from robochoc.cli.options.scene import ground_map, html_option, map_option, serve_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
+from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -48,19 +47,19 @@ _SECTIONS: Sections = {
 @serve_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @invalid_input_fails
-def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_json: bool, **given: Any) -> None:  # noqa: ANN401 - how it is flown and published
-    """Simulate the flight of a saved result: what 'robochoc solve' wrote with --json or --journal.
+def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_json: bool, **given: Any) -> None:  # noqa: ANN401 - options of the flight and of ROS
+    """Simulate the flight of a result that 'robochoc solve' saved with --json or --journal.
 
-    In each epoch the drones fly to their positions and keep their distance; drones of withdrawn robots land at the
-    edge. Of a team that 'generate formation', 'coverage' or 'patrol' made on a map, they fly around its walls. --ros
-    publishes the waypoints of each epoch, and all poses 20 times a second of simulated time. The exit
-    status is 4 if a drone did not arrive, fell, or came too close to another.
+    In each epoch the drones fly to their positions at a safe distance from each other; drones of withdrawn robots land
+    at the edge. Teams of 'generate formation', 'coverage' and 'patrol' fly around the walls of their map. --ros
+    publishes the waypoints of each epoch, and all poses 20 times a second of simulated time. The exit status is 4 if a
+    drone did not arrive, fell, or came too close to another drone or a wall.
 
     \b
     robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
     robochoc fly out/result.json --html out/flight.html --wind 3
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.flight import as_planned, flight_json, flight_report, too_late
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.cli.reports.flight import as_planned, flight_json, flight_report, late_failures
 
     refuse_same_places(
         {"--html": html},
@@ -71,7 +70,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     outcome, team = saved_outcome(saved)
     team, folder = saved_team(outcome, team, saved, folder)
     if given["sinks"] and team is None:
-        raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
+        raise click.UsageError("--ros requires the robots' files, which name the topics: give their folder with --team")
     from robochoc.flight.mission import mission_of
 
     ground = ground_map(given["ground"], folder)
@@ -80,7 +79,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     flown, published = _flown(saved, mission, given)
     click.echo(flight_json(mission, flown) if as_json else flight_report(mission, flown))
     if not as_json:
-        for line in (*published, *too_late(given["failures"], flown)):
+        for line in (*published, *late_failures(given["failures"], flown)):
             click.echo(line, err=True)
     if html or serve:
         from robochoc.cli.reports.scene import scene_for, show_scene
@@ -90,14 +89,14 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
 
 
 def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
-    """Fly the mission. Return the log, and the lines on what was published where."""
+    """Fly the mission. Return the log, and a line for each sink."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line
     from robochoc.ros.sink_publisher import SinkPublisher, publish_flight
 
     conditions = conditions_of(given, mission)
-    with ros_errors_fail(), ExitStack() as stack:
+    with ros_errors_as_failures(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
         options = publish_options(given)
@@ -105,7 +104,7 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flight
         try:
             with stages(mission.team) as progress:
                 flown = flight(mission, conditions, progress)
-        except ValueError as refused:
-            raise Failure(INVALID, on_one_line(f"{saved}: it cannot be flown: {refused}")) from refused
+        except ValueError as error:
+            raise Failure(INVALID, on_one_line(f"{saved}: the result cannot be flown: {error}")) from error
         publish_flight(mission, flown, publishers)
     return flown, [f"{publisher.place}: {publisher.summary}" for publisher in publishers]

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.saved import saved_journal
+from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 from robochoc.system.errors import TransferableError
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
 MOST_IN_PAGE = 100_000
-"""Messages: with more, the page would be too large for browsers to open at once."""
+"""Messages. With more, the page would be too large for browsers."""
 
 
 @click.group()
@@ -44,12 +44,12 @@ def show(file: Path) -> None:
 
 @journal.command(short_help="Write messages for other programs, or as a page.")
 @click.argument("file", type=InputPath(), metavar="FILE")
-@click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="Format, see above.")
+@click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="Format (see above).")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
 @click.option("--robots", default="", metavar="PATTERNS", help="Only messages between these robots: Robot3.1,Robot2.*")
-@click.option("--types", default="", metavar="PATTERNS", help="Only these types of messages: Ok,Nogood")
+@click.option("--types", default="", metavar="PATTERNS", help="Only messages of these types: Ok,Nogood")
 @click.option(
-    "--from", "first", type=WholeNumber(0), default=0, metavar="N", help="First message; they are numbered from 0."
+    "--from", "first", type=WholeNumber(0), default=0, metavar="N", help="First message. Messages are numbered from 0."
 )
 @click.option("--to", "last", type=WholeNumber(0), metavar="N", help="Last message.")
 @click.option("--conversation", type=WholeNumber(1), metavar="N", help="Only run (or epoch) N, numbered from 1.")
@@ -63,17 +63,17 @@ def export(
     last: int | None,
     conversation: int | None,
 ) -> None:
-    """Export the messages in the journal FILE, all or a selection.
+    """Export all or selected messages of the journal FILE.
 
     \b
-    jsonl    the journal as text, one JSON object per line; robochoc reads it too
+    jsonl    the journal as text, one JSON object per line; robochoc reads it
     acl      FIPA ACL messages as text (FIPA00070), one per line
     csv      a table with one row per message: cause, explanation, content
     mermaid  a sequence diagram for Markdown pages
     html     the sniffer's page in one file, without a server
 
-    In PATTERNS, * matches anything and ? one character. Messages have the numbers of the sniffer's page.
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    In PATTERNS, * matches any characters and ? one character. Messages have the same numbers as in the sniffer.
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.sniffer.patterns import patterns_in
     from robochoc.sniffer.selection import NothingSelectedError, Selection
 
@@ -86,12 +86,12 @@ def export(
     except NothingSelectedError as nothing:
         raise click.UsageError(_one_line(str(nothing))) from nothing
     if trace.damage:
-        click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
+        click.echo(_one_line(f"{file}: only a part of the journal can be read: {trace.damage}"), err=True)
     options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
     try:
         pieces = _pieces(form, read, trace, selection, messages)
     except _TooManyError as many:
-        again = f"; the first of them: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
+        again = f"; for the first messages: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
         raise Failure(USAGE, f"{many}{again}") from many
     if output is None:
         for piece in pieces:
@@ -112,17 +112,19 @@ def _write(output: Path, content: bytes, *, count: int) -> None:
     click.echo(f"{output}: {count:,} message{'s' * (count != 1)}, {len(content):,} bytes")
 
 
-def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:
-    """The export, piece by piece."""
+def _pieces(
+    form: str, read: Journal, trace: Trace, selection: Selection, messages: range | list[int]
+) -> Iterable[bytes]:
+    """Return the export, piece by piece."""
     from robochoc.journal.journal import lines_of
     from robochoc.sniffer.excerpt import excerpt_of
     from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, mermaid, table
     from robochoc.sniffer.page_data import PageData
 
-    whole = len(messages) == len(trace.messages.t)
+    is_complete = len(messages) == len(trace.messages.t)
     match form:
         case "jsonl":
-            return lines_of(read if whole else excerpt_of(read, trace, messages))
+            return lines_of(read if is_complete else excerpt_of(read, trace, messages))
         case "acl":
             return acl_texts(PageData(trace), messages)
         case "csv":
@@ -132,14 +134,14 @@ def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: 
             try:
                 return [mermaid(data, messages)]
             except TooMuchToDrawError as much:
-                why = f"{much} (choose some, by --robots, --types, --from and --to)"
+                why = f"{much} (select fewer with --robots, --types, --from and --to)"
                 raise _TooManyError(why, drawable(data, messages)) from much
         case _:
-            return [_page(read, trace, meant)]
+            return [_page(read, trace, selection)]
 
 
 class _TooManyError(TransferableError):
-    """Too many messages for the form; `last` is the last one of those that are not (None: there are none)."""
+    """Too many messages for the format; `last` is the number of the last message that fits, or None."""
 
     def __init__(self, why: str, fitting: Sequence[int]) -> None:
         super().__init__(why)
@@ -147,30 +149,30 @@ class _TooManyError(TransferableError):
 
 
 def _command(file: Path, form: str, options: Mapping[str, object]) -> str:
-    """The command to be entered for the same, with `options` as far as they say something."""
+    """Return the same command with other `options`, without those that have no value."""
     given = [str(part) for name, value in options.items() if value not in (None, "", 0) for part in (name, value)]
     return shlex.join(["robochoc", "journal", "export", str(file), "--format", form, *given])
 
 
-def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
-    """The whole run: what some messages were said for, and what came of them, stands in others."""
+def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
+    """Return a page of the complete run: causes and effects of messages are in other messages."""
     from robochoc.sniffer.selection import Selection
 
-    if meant != replace(Selection(), robots=meant.robots):
-        raise click.UsageError("a page holds the whole run; filter on the page (--robots: those shown first)")
+    if selection != replace(Selection(), robots=selection.robots):
+        raise click.UsageError("--format html exports all messages: filter on the page (--robots: those shown first)")
     count = len(trace.messages.t)
     if count > MOST_IN_PAGE:
         raise Failure(
             USAGE,
             f"{count:,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
-            " (look at them with 'robochoc sniff', or export another format)",
+            " (use 'robochoc sniff', or export another format)",
         )
     from robochoc.sniffer.embedded import embedded_answers
     from robochoc.sniffer.page import sniffer_page
     from robochoc.sniffer.page_data import PageData
     from robochoc.sniffer.scene import whole_scene
 
-    data = PageData(trace, chosen=meant.robots)
+    data = PageData(trace, chosen=selection.robots)
     answers = {**embedded_answers(data, read), "scene": zlib.compress(whole_scene(trace))}
     return sniffer_page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
 

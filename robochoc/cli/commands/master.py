@@ -1,4 +1,4 @@
-"""`robochoc master`: it registers robots, starts the search, and collects the result (Figure 3)."""
+"""`robochoc master`: register robots, start the search, and collect the result (Figure 3)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.network import PlaceType, authority_option, network_failures_told, patience_option
-from robochoc.cli.options.numbers import Number, WholeNumber
+from robochoc.cli.options.network import AddressType, authority_option, network_errors_as_failures, patience_option
 from robochoc.cli.options.paths import TeamFolder
-from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
+from robochoc.cli.options.recording import flushing_progress, journal_option, recording
 from robochoc.cli.options.ros import improve_option
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
@@ -27,8 +26,9 @@ from robochoc.cli.options.solve import (
     settings_option,
     withdraw_option,
 )
+from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import LIMIT
-from robochoc.cli.reports.improvements import ImprovementsTold
+from robochoc.cli.reports.improvements import ImprovementReporter
 from robochoc.cli.reports.progress import print_above, progress_line
 from robochoc.system.stopping import stop_heard
 
@@ -57,18 +57,18 @@ _SECTIONS: Sections = {
 @click.option(
     "--listen",
     "place",
-    type=PlaceType(),
+    type=AddressType(),
     default="127.0.0.1:7447",
     show_default=True,
     metavar="HOST:PORT",
-    help="Address at which robots reach this machine. Robots enrol one port higher.",
+    help="Address at which robots reach this machine. Robots enrol at the next higher port.",
 )
 @click.option(
     "--host",
     "hosts",
     multiple=True,
     metavar="NAME",
-    help="Another name or address of this machine; needed with --listen 0.0.0.0. Repeatable.",
+    help="Another name or address of this machine; required with --listen 0.0.0.0. Repeatable.",
 )
 @click.option("--robots", "number", type=WholeNumber(1), metavar="N", help="Start when N robots have registered.")
 @click.option(
@@ -80,12 +80,14 @@ _SECTIONS: Sections = {
 @protocol_option(central=False)
 @settings_option
 @click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of protocols that draw."
+    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of randomised protocols."
 )
 @withdraw_option
-@click.option("--private", is_flag=True, help="Robots do not report their values, only that they have one.")
+@click.option("--private", is_flag=True, help="Robots report that they have values, but not the values.")
 @filter_option
-@click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Stop if the team is not complete by then.")
+@click.option(
+    "--gather", "gather_s", type=float, metavar="SECONDS", help="Stop if the team is not complete after this time."
+)
 @click.option("--timeout", type=float, metavar="SECONDS", help="Stop this long after the team is complete (status 3).")
 @deadline_option
 @improve_option
@@ -95,16 +97,16 @@ _SECTIONS: Sections = {
     type=Number(0, 0.9),
     default=0.0,
     metavar="P",
-    help="Robots drop what they receive with this probability.",
+    help="Robots drop received messages with this probability.",
 )
-@patience_option("Time without contact after which a robot is lost.", 10.0)
+@patience_option("Time without contact after which a robot counts as lost.", 10.0)
 @click.option(
     "--on-loss",
     type=click.Choice(["fail", "withdraw"]),
     default="fail",
     show_default=True,
     metavar="fail|withdraw",
-    help="If a robot is lost, end the run (status 4), or let the robot leave.",
+    help="If a robot is lost, end the run (status 4), or continue without the robot.",
 )
 @authority_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -126,34 +128,34 @@ def master(
     team: Path | None,
     **given: Any,  # noqa: ANN401 - the fields of `MasterPlan` and `NetworkSettings`, by their names
 ) -> None:
-    """Register robots of other machines, and let them solve their problem together.
+    """Register robots of other machines, and lead the run in which they solve their problem together.
 
     The master never reads a robot's file. It accepts only robots that its Authority has enrolled. It prints
-    registrations and refusals on standard error. Without --robots and --team, the team is complete when all neighbours
-    of all robots have registered.
+    registrations and rejections on standard error. Without --robots and --team, the team is complete when all
+    neighbours of all robots have registered.
 
     \b
     robochoc master --listen 192.168.1.14:7447 --robots 16
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     if given["number"] and team:
-        raise click.UsageError("--robots and --team both define the team; drop one")
+        raise click.UsageError("--robots and --team both define the team; remove one")
     if team and (team / "scenario.xml").exists():
         from robochoc.run.compatibility.team_rules import scenario_refusal
 
         raise click.UsageError(scenario_refusal(team, "robochoc master"))
     for option in ("gather_s", "timeout", "deadline"):
         if given[option] is not None and not given[option] > 0:
-            raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
-    with network_failures_told("master"), stop_heard():
+            raise click.UsageError(f"--{option.removesuffix('_s')} requires a number of seconds greater than 0")
+    with network_errors_as_failures("master"), stop_heard():
         plan = _plan(folder, team, given)
         with (
             _publication(sniffable=sniffable) as publication,
             recording(journal, lambda: _header(plan), None, [publication.write] if publication else []) as recorder,
         ):
-            audience = ImprovementsTold(None, quiet=as_json)
-            led = _led(plan, recorder, publication, audience)
-            _tell(led, as_json=as_json)
-    context.exit(LIMIT if led.outcome.verdict == "unknown" else 0)
+            audience = ImprovementReporter(None, quiet=as_json)
+            result = _run(plan, recorder, publication, audience)
+            _print_result(result, as_json=as_json)
+    context.exit(LIMIT if result.outcome.verdict == "unknown" else 0)
 
 
 def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> MasterPlan:
@@ -189,7 +191,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
 
 @contextmanager
 def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
-    """Yield the publication of the journal for sniffers, in an unnamed file. None if the run is not `sniffable`."""
+    """Yield the publication of the journal for sniffers, in an unnamed file; None unless the run is `sniffable`."""
     if not sniffable:
         yield None
         return
@@ -200,21 +202,21 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
         yield publication
 
 
-def _led(
+def _run(
     plan: MasterPlan, recorder: JournalRecorder | None, publication: Publication | None, audience: Audience
 ) -> MasterResult:
-    """Open the run with its observers."""
+    """Run the master with its observers."""
     from robochoc.run.networked.master_run import run_master
 
     if recorder and publication:
         publication.fresh = recorder.flush_if_due
     with progress_line(plan.name) as show:
-        progress = shown_and_flushed(recorder, show)
+        progress = flushing_progress(recorder, show)
 
-        teller = _Teller(plan.place)
+        printer = _EventPrinter(plan.place)
 
         def observe(event: AnyEvent) -> None:
-            teller.tell(event)
+            printer.print_event(event)
             if recorder:
                 recorder(event)
 
@@ -224,7 +226,7 @@ def _led(
             audience=audience,
             watched=recorder is not None,
             progress=progress,
-            listening=teller.listening,
+            listening=printer.print_listening,
             publication=publication,
             concluded=partial(_close_journal, recorder, publication),
         )
@@ -239,15 +241,15 @@ def _close_journal(recorder: JournalRecorder | None, publication: Publication | 
         publication.end()
 
 
-def _tell(led: MasterResult, *, as_json: bool) -> None:
+def _print_result(result: MasterResult, *, as_json: bool) -> None:
     if as_json:
         from robochoc.formats.result import result_json
 
-        click.echo(result_json(led.outcome))
+        click.echo(result_json(result.outcome))
     else:
         from robochoc.cli.reports.outcome import outcome_report
 
-        click.echo(outcome_report(led.team, led.outcome))
+        click.echo(outcome_report(result.team, result.outcome))
 
 
 def _header(plan: MasterPlan) -> Header:
@@ -259,41 +261,41 @@ def _header(plan: MasterPlan) -> Header:
     return Header(team=plan.name, protocol=name, runtime="network", seed=plan.seed)
 
 
-class _Teller:
-    """Tells the master's operator first that robots can come to `place`, and then who does: some are quicker."""
+class _EventPrinter:
+    """Prints that the master listens at `place`, and then its events; events before that are printed afterwards."""
 
     def __init__(self, place: Address) -> None:
         self._place = place
         self._early: list[AnyEvent] | None = []
         self._lock = threading.Lock()
 
-    def listening(self) -> None:
-        """Print that robots can come, and what has happened so far."""
+    def print_listening(self) -> None:
+        """Print that the master listens, and the events so far."""
         with self._lock:
             print_above(f"listening at {self._place}; start robots with --master {_address(self._place)}")
             for event in self._early or ():
-                _tell_event(event)
+                _print_event(event)
             self._early = None
 
-    def tell(self, event: AnyEvent) -> None:
-        """Print an event, now or as soon as robots can come. Events come from several threads."""
+    def print_event(self, event: AnyEvent) -> None:
+        """Print an event, now or as soon as the master listens. Events come from several threads."""
         with self._lock:
             if self._early is None:
-                _tell_event(event)
+                _print_event(event)
             else:
                 self._early.append(event)
 
 
-def _tell_event(event: AnyEvent) -> None:
-    """Print one line for each event that the master's operator needs at once."""
+def _print_event(event: AnyEvent) -> None:
+    """Print one line for each event that the master's operator needs to know at once."""
     from robochoc.formats import on_one_line
     from robochoc.journal.events import DroppedOut, Granted, Lost, Refused, Registered
 
     match event:
         case Registered(robot=name):
-            line = f"{name} is there"
+            line = f"{name} has registered"
         case DroppedOut(robot=name, why=why):
-            line = f"{name} has dropped out: {why}; waiting for it again"
+            line = f"{name} has disconnected: {why}; waiting for its return"
         case Lost(robot=name, why=why):
             line = f"{name} is lost: {why}"
         case Granted(who=who, what=what):

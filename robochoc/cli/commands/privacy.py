@@ -1,4 +1,4 @@
-"""`robochoc privacy`: what robots have learnt of each other in a recorded run."""
+"""`robochoc privacy`: how much robots learned about each other in a recorded run."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.saved import journal_team_option, saved_journal
-from robochoc.cli.reports.failures import INVALID, USAGE, Failure, failures_told, invalid_input_fails
+from robochoc.cli.options.value_types import WholeNumber
+from robochoc.cli.reports.failures import INVALID, USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.privacy import Measure, PrivacyReport
@@ -26,7 +26,9 @@ MEASURES = ("linear", "entropy", "known")
 @click.option(
     "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure of the table."
 )
-@click.option("--html", type=OutputFile(), metavar="FILE", help="Write a page: who has learnt how much of whom.")
+@click.option(
+    "--html", type=OutputFile(), metavar="FILE", help="Write a page with the loss of each robot to each other robot."
+)
 @journal_team_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, with all measures of all pairs.")
 @local_options
@@ -41,14 +43,14 @@ def privacy(
     as_json: bool,
     **local: Any,  # noqa: ANN401 - the options of local problems
 ) -> None:
-    """Measure how much robots have learnt of each other's problems in the run that JOURNAL records.
+    """Measure how much robots learned about each other's problems in the run that JOURNAL records.
 
-    For each robot, the mean loss to all other robots: 0 where they have excluded nothing, 1 where they know all. There
-    are three kinds of secrets: the value in the answer (decision), what the robot's own values cost and which it can
-    take (domain), and the entries of constraints that it shares with third robots (constraints).
+    The table has the mean loss of each robot to all other robots: 0 if they can exclude nothing, 1 if they know
+    everything. There are three kinds of secrets: the value in the answer (decision), the possible values of the robot
+    and their costs (domain), and the entries of constraints that it shares with third robots (constraints).
 
-    Losses are lower bounds: what the messages' rules prove, and no more. Where a message without a rule was heard, the
-    loss is not known. See docs/guides/privacy.md.
+    Losses are lower bounds: they count only what the rules of the messages prove. If a robot received a message without
+    a rule, the loss is not known. See docs/guides/privacy.md.
     """
     from robochoc.formats import read_team
     from robochoc.privacy import Measure
@@ -80,14 +82,14 @@ def _measured(path: Path, number: int | None, options: ReplayOptions) -> Privacy
 
     recorded = saved_journal(path)
     if recorded.damage is not None and not recorded.truncated:
-        raise Failure(INVALID, f"{path}: it was altered: {recorded.damage}")
+        raise Failure(INVALID, f"{path}: the journal was altered: {recorded.damage}")
     try:
-        with failures_told(path):
+        with errors_as_failures(path):
             report = privacy_of(recorded, options, number)
     except PrivacyError as why:
         raise Failure(INVALID if why.broken else USAGE, f"{path}: {why}") from why
     if options.team is not None and not reads_files(recorded.events):
-        click.echo("--team is not used: the journal says what the robots were given", err=True)
+        click.echo("--team is not used: the journal contains the robots' problems", err=True)
     return report
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from robochoc.cli.options.names import ProtocolName
+from robochoc.cli.options.value_types import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
 from robochoc.run.defaults import AUTO
 
@@ -13,32 +13,32 @@ PURPOSES = ("satisfaction", "costs", "asymmetric")
 
 @click.command()
 @click.argument("name", required=False, type=ProtocolName())
-@click.option("--for", "purpose", type=click.Choice(PURPOSES), help="List only those for one kind of problem.")
+@click.option("--for", "purpose", type=click.Choice(PURPOSES), help="List only protocols for one kind of problem.")
 @click.option("--long", is_flag=True, help="List more traits: constraints, privacy, paper.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
 def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: bool) -> None:
-    """List the installed protocols, or explain the protocol NAME; auto: how one is chosen.
+    """List the installed protocols, or explain the protocol NAME; auto: the rules of the choice.
 
     \b
     for           satisfaction: any solution; optimisation: minimum cost
     complete      ends on every problem, with a solution or a proof
-    use when      when to choose it
+    use when      when to use the protocol
     synchronous   one robot acts at a time (--long)
     constraints   binary, n-ary; PKC: also partially known (--long)
     dynamic       continues when the problem changes (--long)
-    privacy       what neighbours do not learn (--long)
+    privacy       information hidden from neighbours (--long)
 
     \b
     robochoc protocols --for satisfaction    any solution, no costs
-    robochoc protocols --for costs           the least cost, or a low one; without costs any solution
-    robochoc protocols --for asymmetric      of these, with costs of each side
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.protocols import Row, print_protocols, protocol_text, protocols_json, rows
+    robochoc protocols --for costs           minimum or low cost; without costs any solution
+    robochoc protocols --for asymmetric      as costs, with a cost for each robot of a constraint
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.cli.reports.protocols import ProtocolRow, print_protocols, protocol_text, protocols_json, rows
     from robochoc.formats import on_one_line
     from robochoc.run.registry import unknown_protocol
 
     if name is not None and purpose is not None:
-        raise Failure(USAGE, "--for is for the list, and not for one protocol: leave out one of the two")
+        raise Failure(USAGE, "--for selects rows of the list and cannot be used with NAME: remove one")
     found = [row for row in rows() if purpose is None or row.is_for(purpose)]
     if name == AUTO:
         from robochoc.cli.reports.choice import rules_text
@@ -48,7 +48,7 @@ def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: boo
     if name is None:
         click.echo(protocols_json(found), nl=False) if as_json else print_protocols(found, long=long)
         return
-    row: Row | None = next((row for row in found if row.name == name), None)
+    row: ProtocolRow | None = next((row for row in found if row.name == name), None)
     if row is None:
         raise Failure(USAGE, on_one_line(unknown_protocol(name)))
     if as_json:

@@ -1,4 +1,4 @@
-"""`robochoc replay`: compare a recorded run with the protocol of today."""
+"""`robochoc replay`: compare a recorded run with the installed protocol."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.saved import journal_team_option, saved_journal
 from robochoc.cli.options.solve import protocol_settings
-from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, failures_told, invalid_input_fails
+from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.journal.journal import Journal
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     "settings",
     multiple=True,
     metavar="NAME=VALUE",
-    help="A parameter of the protocol in that run, for such a journal. Repeatable.",
+    help="A parameter of the protocol in that run, for a journal without the robots' problems. Repeatable.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @local_options
@@ -45,9 +45,9 @@ def replay(
     """Replay the messages in JOURNAL through the protocol, and compare all results with the recorded ones.
 
     The exit status is 0 if they are the same, and 4 if not: then the protocol or the journal has changed. The first
-    difference is printed, and every claim of the header or the outcome that the steps contradict. A journal that ends
-    early is replayed to its end. A journal that was altered is replayed up to that place, and is invalid (status 1), as
-    is one without steps, unless a robot without a solution by itself had decided the run before any began.
+    difference is printed, and each claim of the header or the outcome that the steps contradict. An incomplete journal
+    is replayed to its end. An altered journal is replayed up to the alteration and is invalid (status 1). A journal
+    without steps is invalid, too, unless a robot without a local solution decided the run before it began.
     """
     from robochoc.formats import read_team
     from robochoc.replay import ReplayOptions
@@ -60,7 +60,7 @@ def replay(
         limits=limits(local_solutions, local_timeout, always_ace=always_ace),
         cache=None if no_cache else SolutionCache(),
     )
-    with failures_told(journal):
+    with errors_as_failures(journal):
         replayed = _replayed(journal, recorded, options)
     if as_json:
         from robochoc.cli.reports.replay import replay_json
@@ -91,5 +91,5 @@ def _replayed(path: Path, journal: Journal, options: ReplayOptions) -> ReplayRes
             return play(journal, options, progress=progress)
     except CannotReplayError as why:
         status = INVALID if why.broken or _altered(journal) else USAGE
-        damage = f"it was altered: {journal.damage}; " if _altered(journal) else ""
-        raise Failure(status, on_one_line(f"{path}: {damage}it cannot be played again: {why}")) from why
+        damage = f"the journal was altered: {journal.damage}; " if _altered(journal) else ""
+        raise Failure(status, on_one_line(f"{path}: {damage}the run cannot be replayed: {why}")) from why

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
+from robochoc.cli.options.network import (
+    identity_option,
+    master_option,
+    network_errors_as_failures,
+    patience_option,
+    token_options,
+)
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.ros import ros_options
-from robochoc.cli.options.ros_setup import robot_publisher, ros_errors_fail
+from robochoc.cli.options.ros_setup import robot_publisher, ros_errors_as_failures
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
-from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
 from robochoc.cli.reports.progress import print_above, progress_line
 
@@ -37,7 +42,7 @@ _SECTIONS: Sections = {
 @master_option
 @token_options()
 @identity_option
-@patience_option("Time without contact after which the master is given up.", 30.0, "patience")
+@patience_option("Time without contact after which the master counts as lost.", 30.0, "patience")
 @click.option("--sniff", is_flag=True, help="Report all messages of this robot to the master's journal.")
 @local_options
 @ros_options
@@ -52,17 +57,17 @@ def robot(
     token: str | None,
     identity: Path | None,
     as_json: bool,
-    **given: Any,  # noqa: ANN401 - how it takes part and compiles
+    **given: Any,  # noqa: ANN401 - options of the run and of compilation
 ) -> None:
     """Run the robot of FILE on this machine, in the next run of a master.
 
-    The robot reads its own file and nothing else. The first time it needs a token (robochoc authority enrol), for which
-    it gets a certificate. Later runs use the certificate, and renew it.
+    The robot reads only its own file. Its first run requires a token (robochoc authority enrol), which it exchanges for
+    a certificate. Later runs use the certificate, and renew it.
 
     \b
     robochoc robot Robot3.1.xml --master 192.168.1.14:7447 --token-file token
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    with network_failures_told(file):
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    with network_errors_as_failures(file):
         with _stages(file.stem) as show_stage:
             ending, values, published = _run(file, place, (identity, token), given, show_stage)
         _print_ending(file.stem, ending, values, published, as_json=as_json)
@@ -103,8 +108,7 @@ def _run(
         show_stage: Shows the stage of the run.
 
     Returns:
-        How the run ended for the robot, its values with symbols by their names, and a line for each place where its
-        decision was published.
+        The end of the run for the robot, its values with symbols by their names, and a line for each sink.
 
     Raises:
         Failure: when the run could not be completed.
@@ -115,50 +119,50 @@ def _run(
     from robochoc.solver.cache import SolutionCache
     from robochoc.solver.compile import Compiler
 
-    itself = read_robot(file)  # before its token is spent
-    with robot_publisher(itself, given) as publish:
+    own = read_robot(file)  # before its token is used
+    with robot_publisher(own, given) as publish:
         show_stage(f"looking for the master at {place}")
         identity = identity_of(file.stem, place, *credentials, given["patience"])
         settings = RobotSettings(
-            given["patience"], sniffed=given["sniff"], stage=show_stage, decided=_Decisions(itself, publish).tell
+            given["patience"], sniffed=given["sniff"], stage=show_stage, decided=_DecisionReporter(own, publish).report
         )
         cache = None if given["no_cache"] else SolutionCache()
         bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
         with Compiler(bounds, cache) as compiler:
-            ending = join(itself, place, identity, settings, compiler)
+            ending = join(own, place, identity, settings, compiler)
         if ending.failed:
             raise Failure(LOST, f"{file.stem}: {ending.why}")
-        return ending, _labelled(itself, ending.assignment), publish(ending.why, ending.assignment)
+        return ending, _labelled(own, ending.assignment), publish(ending.why, ending.assignment)
 
 
-def _labelled(itself: Robot, assignment: Assignment) -> dict[str, int | str]:
+def _labelled(own: Robot, assignment: Assignment) -> dict[str, int | str]:
     """Return the robot's values, with symbols by their names."""
-    domains = {variable.name: variable.domain for variable in itself.variables}
+    domains = {variable.name: variable.domain for variable in own.variables}
     return {name: domains[name].label(value) for name, value in assignment.items()}
 
 
-class _Decisions:
-    """Tells, and publishes, what the robot has decided on while its team searches on; the same only once."""
+class _DecisionReporter:
+    """Prints and publishes the robot's decisions while its team continues the search; equal ones only once."""
 
-    def __init__(self, itself: Robot, publish: Callable[[str, Assignment], list[str]]) -> None:
-        self._robot = itself
+    def __init__(self, own: Robot, publish: Callable[[str, Assignment], list[str]]) -> None:
+        self._robot = own
         self._publish = publish
         self._last: Assignment | None = None
 
-    def tell(self, why: str, assignment: Assignment) -> None:
-        """Print a decision on standard error, and publish it. That it cannot be published ends no search."""
+    def report(self, why: str, assignment: Assignment) -> None:
+        """Print a decision on standard error, and publish it. An error of the publication does not end the search."""
         if assignment == self._last:
             return
         self._last = dict(assignment)
-        print_above(_in_words(self._robot.name, f"{why} so far", _labelled(self._robot, assignment)))
+        print_above(_decision_line(self._robot.name, f"{why} so far", _labelled(self._robot, assignment)))
         try:
-            with ros_errors_fail():
+            with ros_errors_as_failures():
                 self._publish(why, assignment)
         except Failure as failure:
             failure.show()
 
 
-def _in_words(name: str, why: str, values: Mapping[str, int | str]) -> str:
+def _decision_line(name: str, why: str, values: Mapping[str, int | str]) -> str:
     from robochoc.system.plain_text import on_one_line
 
     decision = ", ".join(f"{variable} = {value}" for variable, value in values.items())
@@ -174,6 +178,6 @@ def _print_ending(
         result = {"robot": name, "outcome": ending.why, "assignment": values}
         click.echo(msgspec.json.encode(result).decode())
         return
-    click.echo(_in_words(name, ending.why, values))
+    click.echo(_decision_line(name, ending.why, values))
     for line in published:
         click.echo(line, err=True)

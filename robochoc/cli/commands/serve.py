@@ -1,4 +1,4 @@
-"""`robochoc serve`: decides for others on request, as a service of ROS 2."""
+"""`robochoc serve`: solve teams on request, as a ROS 2 service."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath, teams_at
-from robochoc.cli.options.ros_setup import ros_errors_fail
-from robochoc.cli.reports.failures import USAGE, Failure, failures_told, invalid_input_fails
+from robochoc.cli.options.ros_setup import ros_errors_as_failures
+from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _SERVICE, _CANCEL, _FEEDBACK = "/robochoc/decide", "/robochoc/cancel", "/robochoc/feedback"
 _TEXT = "std_msgs/String"
-_OFFERED: Mapping[str, tuple[str, str]] = MappingProxyType(
+_MIDDLEWARES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "dds": ("dds_service", "DdsServices"),
         "rclpy": ("rclpy_service", "RclpyServices"),
@@ -30,9 +30,9 @@ _OFFERED: Mapping[str, tuple[str, str]] = MappingProxyType(
         "rosbridge": ("rosbridge_service", "RosbridgeServices"),
     }
 )
-"""The modules in `robochoc.ros.live`, and the classes there."""
+"""Each kind of middleware: its module in `robochoc.ros.live`, and the class there."""
 _SLICE_S = 0.2
-"""The interval at which signals are heard, in seconds."""
+"""The interval at which signals are handled, in seconds."""
 
 
 @click.command()
@@ -45,7 +45,7 @@ _SLICE_S = 0.2
     help="dds, dds:DOMAIN?partition=NAME, rclpy, rmw_zenoh://HOST:PORT or rosbridge://HOST:PORT.  "
     "[default: dds, in the domain of ROS_DOMAIN_ID]",
 )
-@click.option("--protocol", default="auto", show_default=True, metavar="NAME", help="As for robochoc solve.")
+@click.option("--protocol", default="auto", show_default=True, metavar="NAME", help="As for 'robochoc solve'.")
 @click.option(
     "--runtime",
     type=click.Choice(["processes", "simulator"]),
@@ -59,10 +59,10 @@ _SLICE_S = 0.2
     default=60.0,
     show_default=True,
     metavar="SECONDS",
-    help="The longest time for one request; a request may ask for less.",
+    help="Time limit of a request; a request may set a lower one.",
 )
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of all chance.")
-@click.option("--feedback", is_flag=True, help="While a team decides, tell on /robochoc/feedback how far it is.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Random seed.")
+@click.option("--feedback", is_flag=True, help="Publish the progress of each decision on /robochoc/feedback.")
 @click.option("--requests", type=WholeNumber(1), metavar="N", help="End after N answers.  [default: at Ctrl-C]")
 @invalid_input_fails
 def serve(
@@ -71,21 +71,21 @@ def serve(
     requests: int | None,
     *,
     feedback: bool,
-    **given: Any,  # noqa: ANN401 - how teams decide
+    **given: Any,  # noqa: ANN401 - options of the run
 ) -> None:
-    """Decide for others: a service of ROS, for a behaviour tree or another node. Only rclpy needs a ROS here.
+    """Solve teams on request: a ROS 2 service, for behaviour trees and other nodes. Only rclpy requires ROS here.
 
-    /robochoc/decide (robochoc_msgs/srv/Decide) takes a team's name and changes of its problem. For each team there is
-    also /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other; /robochoc/cancel
-    (std_srvs/srv/Trigger) ends the decision that is being made.
+    A request of /robochoc/decide (robochoc_msgs/srv/Decide) has a team's name and changes of its problem. Each team
+    also has /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other; /robochoc/cancel
+    (std_srvs/srv/Trigger) ends the current decision.
 
     \b
     robochoc serve docs/examples/hangar
     ros2 service call /robochoc/hangar/decide std_srvs/srv/Trigger
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     kind, _, where = place.partition(":")
-    if kind not in _OFFERED:
-        raise click.UsageError(f"--ros {place}: services are offered by {', '.join(_OFFERED)}; as in dds:5")
+    if kind not in _MIDDLEWARES:
+        raise click.UsageError(f"--ros {place}: unknown middleware; use {', '.join(_MIDDLEWARES)}, such as dds:5")
     teams = _teams(paths)
     from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
     from robochoc.ros.decision import FollowedDecision
@@ -99,33 +99,33 @@ def serve(
     options = Options(given["protocol"], given["runtime"], given["seed"], given["timeout"])
     triggers = {f"/robochoc{ros_name(team.name)}/decide": team.name for team in teams}
     if len(triggers) < len(teams):
-        raise Failure(USAGE, "two teams would have the same service in ROS: give one's folder another name")
+        raise Failure(USAGE, "two teams would have the same ROS service: rename the folder of one of them")
     services = {_SERVICE: DECIDE, **dict.fromkeys((*triggers, _CANCEL), TRIGGER)}
 
-    def tell(text: str) -> None:
-        with suppress(Exception):  # no decision fails because nobody hears of it
+    def publish_feedback(text: str) -> None:
+        with suppress(Exception):  # an error of the feedback must not end the decision
             offered.publish(_FEEDBACK, _TEXT, {"data": text})
 
-    decision = FollowedDecision(tell if feedback else None)
+    decision = FollowedDecision(publish_feedback if feedback else None)
     decider = DecideService(teams, decision, options)
-    with ros_errors_fail(), _opened(kind, where, services, refusal, {_CANCEL: decision.cancel}) as offered:
+    with ros_errors_as_failures(), _opened(kind, where, services, refusal, {_CANCEL: decision.cancel}) as offered:
         if feedback:
             offered.announce(_FEEDBACK, _TEXT)
-        for name, what in services.items():
-            is_here = name not in offered.lacking
-            told = SERVICES[what] if is_here else f"not offered: {SERVICES[what]} is not built here"
-            click.echo(f"{offered.where}: {name} ({told})", err=True)
+        for name, service in services.items():
+            is_offered = name not in offered.lacking
+            text = SERVICES[service] if is_offered else f"not offered: {SERVICES[service]} is not installed here"
+            click.echo(f"{offered.where}: {name} ({text})", err=True)
         if feedback:
             click.echo(f"{offered.where}: {_FEEDBACK} (a topic, {_TEXT})", err=True)
         for request in _requests(offered, requests):
-            named = triggers.get(request.name)
-            answer = decider.decide(request.fields) if named is None else decider.trigger(named)
+            team = triggers.get(request.name)
+            answer = decider.decide(request.fields) if team is None else decider.trigger(team)
             offered.reply(request, answer)
             click.echo(f"{request.name}: {answer['message']}", err=True)
 
 
 def _requests(offered: Services, most: int | None) -> Iterator[Request]:
-    """Yield requests as they come, at most so many."""
+    """Yield requests as they arrive, up to `most` of them."""
     yielded = 0
     while yielded != most:
         request = offered.next(_SLICE_S)
@@ -136,11 +136,11 @@ def _requests(offered: Services, most: int | None) -> Iterator[Request]:
 
 def _opened(kind: str, place: str, services: Mapping[str, str], refuse: Refuse, at_once: AtOnce) -> Services:
     """Return the services, offered by the middleware `kind`. Raises `SinkError`."""
-    module, name = _OFFERED[kind]
-    made: Callable[[str, Mapping[str, str], Refuse, AtOnce], Services] = getattr(
+    module, name = _MIDDLEWARES[kind]
+    factory: Callable[[str, Mapping[str, str], Refuse, AtOnce], Services] = getattr(
         import_module(f"robochoc.ros.live.{module}"), name
     )
-    return made(place, services, refuse, at_once)
+    return factory(place, services, refuse, at_once)
 
 
 def _teams(paths: Sequence[Path]) -> list[Team]:
@@ -149,9 +149,9 @@ def _teams(paths: Sequence[Path]) -> list[Team]:
 
     teams: dict[str, Team] = {}
     for folder in teams_at(paths, foreign=True):
-        with failures_told(folder):
+        with errors_as_failures(folder):
             team = read_problem(folder).team
         if team.name in teams:
-            raise Failure(USAGE, f"two teams have the name {team.name!r}: give one's folder another name")
+            raise Failure(USAGE, f"two teams have the name {team.name!r}: rename the folder of one of them")
         teams[team.name] = team
     return [*teams.values()]

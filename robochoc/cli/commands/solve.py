@@ -1,4 +1,4 @@
-"""`robochoc solve`: teams in, verdicts out."""
+"""`robochoc solve`: solve teams and print their outcomes."""
 
 from __future__ import annotations
 
@@ -8,30 +8,29 @@ from typing import Any
 import click
 
 from robochoc.cli.commands.solve_team import solve_team
-from robochoc.cli.options.channel import CHANNEL_NAME
-from robochoc.cli.options.channel import NAMES as CHANNELS
 from robochoc.cli.options.local_problems import local_options
-from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.order import ORDER_NAME
-from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import refuse_same_places, teams_at
-from robochoc.cli.options.problems import Problem, format_option, reading_options
+from robochoc.cli.options.problems import ProblemPath, format_option, reading_options
 from robochoc.cli.options.recording import bounds_option, journal_option
 from robochoc.cli.options.ros import (
     arm_option,
     flight_options,
+    pop_ros_options,
     ros_options,
     situation_options,
-    take_ros_options,
 )
 from robochoc.cli.options.ros_setup import sink_places, source_places
+from robochoc.cli.options.scene import html_option, serve_option
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
-    Products,
+    CHANNEL_NAMES,
+    CHANNEL_TYPE,
+    Outputs,
     SolveCommand,
-    Wanted,
-    check_products,
+    TeamRequest,
+    check_outputs,
     deadline_option,
     filter_option,
     kill_option,
@@ -42,8 +41,9 @@ from robochoc.cli.options.solve import (
     settings_option,
     withdraw_option,
 )
+from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import worst
-from robochoc.cli.reports.live_sniffer import watching
+from robochoc.cli.reports.live_sniffer import sniffer_request
 from robochoc.system.stopping import stop_heard
 
 _SECTIONS: Sections = {
@@ -53,7 +53,7 @@ _SECTIONS: Sections = {
     ),
     "Search": ("--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
-    "Messages on their way": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
+    "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Files of other tools (docs/guides/import.md)": ("--format", "--infinity", "--owner"),
     "Output": ("--explain", "--bounds", "--serve", "--open"),
@@ -68,7 +68,7 @@ _SECTIONS: Sections = {
 
 
 @click.command(cls=SolveCommand, sections=_SECTIONS)
-@click.argument("paths", nargs=-1, required=True, type=Problem(), metavar="PATH ...")
+@click.argument("paths", nargs=-1, required=True, type=ProblemPath(), metavar="PATH ...")
 @protocol_option(central=True)
 @settings_option
 @click.option(
@@ -76,7 +76,7 @@ _SECTIONS: Sections = {
     type=ORDER_NAME,
     metavar="NAME|FILE",
     help=(
-        f"Priority order of the robots: {', '.join(ORDERS)}, or a file with a name a line."
+        f"Priority order of the robots: {', '.join(ORDERS)}, or a file with one name per line."
         "  [default: given; auto chooses]"
     ),
 )
@@ -94,7 +94,7 @@ _SECTIONS: Sections = {
     default=0,
     show_default=True,
     metavar="N",
-    help="Seed of everything that is random.",
+    help="Random seed.",
 )
 @click.option(
     "--schedule",
@@ -109,20 +109,20 @@ _SECTIONS: Sections = {
     default=0,
     show_default=True,
     metavar="CHECKS",
-    help="Simulator: largest delay of a message.",
+    help="Simulator: longest delay of a message.",
 )
 @click.option(
     "--channel",
-    type=CHANNEL_NAME,
+    type=CHANNEL_TYPE,
     metavar="NAME|FILE",
-    help=f"Simulator: seconds of computing and radio, by a channel model: {', '.join(CHANNELS)} or a TOML file.",
+    help=f"Simulator: model of radio and computing time: {', '.join(CHANNEL_NAMES)} or a TOML file.",
 )
 @click.option(
     "--message-loss",
     type=Number(0, 0.9),
     default=0.0,
     metavar="P",
-    help="Lose each message with this probability, for good.",
+    help="Lose each message for good with this probability.",
 )
 @click.option(
     "--timeout",
@@ -150,7 +150,7 @@ _SECTIONS: Sections = {
     "--on-loss",
     type=click.Choice(["fail", "withdraw"]),
     metavar="fail|withdraw",
-    help="If a robot's process dies, end the run (status 4), or let the robot leave.  [default: fail]",
+    help="If a robot's process dies, end the run (status 4), or continue without the robot.  [default: fail]",
 )
 @click.option(
     "--spare",
@@ -162,7 +162,7 @@ _SECTIONS: Sections = {
 )
 @kill_option
 @filter_option
-@click.option("--explain", is_flag=True, help="Print why the protocol was chosen, and the pseudo-tree.")
+@click.option("--explain", is_flag=True, help="Print the reasons for the chosen protocol, and the pseudo-tree.")
 @click.option("--count", is_flag=True, help="With --protocol central, count-dpop: count solutions.")
 @click.option(
     "--with",
@@ -188,9 +188,9 @@ _SECTIONS: Sections = {
 @click.option(
     "--sniff",
     metavar="[=ROBOTS]",
-    help="Show all messages live on a page of this machine; ROBOTS: those shown first, such as Robot3.1,Robot2.*.",
+    help="Show all messages live on a page of this machine; ROBOTS: robots shown first, such as Robot3.1,Robot2.*.",
 )
-@click.option("--open", "open_browser", is_flag=True, help="With --sniff: open the page in a browser, then start.")
+@click.option("--open", "open_browser", is_flag=True, help="With --sniff: open the page in a browser before the run.")
 @click.pass_context
 def solve(
     context: click.Context,
@@ -204,22 +204,23 @@ def solve(
     explain: bool,
     **settings: Any,  # noqa: ANN401 - the other options
 ) -> None:
-    """Solve all teams in the folders PATH and below, or files that 'robochoc import' reads; solutions are checked.
+    """Solve all teams in the folders PATH and below, or files that 'robochoc import' reads, and check the solutions.
 
     \b
     robochoc solve instances/queens3d-4 --withdraw --html out/page.html
     robochoc solve instances/ --runtime simulator --protocol dpop --json
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    ros = take_ros_options(settings)
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    ros = pop_ros_options(settings)
     named = {"--order": settings["order"], "--channel": settings["channel"]}
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
     options = options_of(settings, environment=bool(ros.situation))
-    wanted = Wanted(
+    request = TeamRequest(
         settings["order"], settings.pop("dialect"), settings.pop("infinity"), settings.pop("owner"),
         as_json=as_json, explain=explain, ros=ros,
     )  # fmt: skip
-    products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
-    folders = teams_at(paths, foreign=True, dialect=wanted.dialect)
+    sniffer = sniffer_request(settings["sniff"], open_browser=settings["open_browser"])
+    outputs = Outputs(html, journal, serve, sniffer)
+    folders = teams_at(paths, foreign=True, dialect=request.dialect)
     refuse_same_places(
         {"--html": html, "--journal": journal},
         given,
@@ -227,7 +228,7 @@ def solve(
         more_outputs=sink_places(ros.sinks),
         more_inputs=source_places(ros.situation),
     )
-    check_products(products, wanted, options, teams=len(folders))
+    check_outputs(outputs, request, options, teams=len(folders))
     with stop_heard():
-        statuses = [solve_team(folder, options, products, wanted) for folder in folders]
+        statuses = [solve_team(folder, options, outputs, request) for folder in folders]
     context.exit(worst(statuses))

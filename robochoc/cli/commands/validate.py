@@ -1,4 +1,4 @@
-"""`robochoc validate`: all errors of all files at once."""
+"""`robochoc validate`: check teams, and print all errors of all files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.paths import InputPath, foreign_files_told
+from robochoc.cli.options.paths import InputPath, import_hints
 from robochoc.cli.options.problems import format_option, reading_options
 from robochoc.cli.reports.failures import INVALID
 
@@ -30,13 +30,13 @@ def validate(
     paths: tuple[Path, ...],
     *,
     as_json: bool,
-    **reading: Any,  # noqa: ANN401 - those of `read_problem`
+    **reading: Any,  # noqa: ANN401 - arguments of `read_problem`
 ) -> None:
     """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
-    Checked are the XML, the schema, the meaning of each file, and the team as a whole. All errors of all files are
-    printed at once, with file and line. The exit status is 1 if there are any. A file of another tool is read as
-    'robochoc import' reads it.
+    The command checks the XML, the schema, the meaning of each file, and the team as a whole, and prints all errors of
+    all files, with file and line. The exit status is 1 if there are errors. Files of other tools are read as by
+    'robochoc import'.
     """
     from robochoc.formats import InvalidInputError, find_teams
 
@@ -45,7 +45,7 @@ def validate(
         try:
             found = [path] if path.is_file() else find_teams(path)
         except InvalidInputError as invalid:
-            reports.append(_invalid(path, invalid, foreign_files_told(path)))
+            reports.append(_invalid(path, invalid, import_hints(path)))
         else:
             reports.extend(_report(place, reading) for place in found)
     for report in reports:
@@ -55,7 +55,7 @@ def validate(
 
 
 def _report(place: Path, reading: Mapping[str, Any]) -> dict[str, Any]:
-    """The validation of one team, or of one robot's file."""
+    """Return the report on one team, or on one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
     from robochoc.formats.dialects.registry import dialect_called, recognised
     from robochoc.formats.problems import read_problem
@@ -95,15 +95,15 @@ def _invalid(place: Path, invalid: InvalidInputError, more: Sequence[str] = ()) 
 
     errors = [
         {
-            "file": encodable(one.file),
-            "line": one.line,
-            "message": one.message,
-            "hint": one.hint,
-            "text": str(one),
+            "file": encodable(error.file),
+            "line": error.line,
+            "message": error.message,
+            "hint": error.hint,
+            "text": str(error),
         }
-        for one in invalid.diagnostics
+        for error in invalid.diagnostics
     ]
-    errors += [{"file": encodable(str(place)), "line": 0, "message": told, "hint": "", "text": told} for told in more]
+    errors += [{"file": encodable(str(place)), "line": 0, "message": line, "hint": "", "text": line} for line in more]
     return {"path": encodable(str(place)), "valid": False, "errors": errors}
 
 
@@ -114,7 +114,7 @@ def _print_json(report: dict[str, Any]) -> None:
 
 
 def _print(report: dict[str, Any]) -> None:
-    from robochoc.cli.reports.notes import differences_told
+    from robochoc.cli.reports.notes import difference_lines
     from robochoc.formats import on_one_line
     from robochoc.formats.dialects.dialect import Note
 
@@ -128,8 +128,10 @@ def _print(report: dict[str, Any]) -> None:
         alone = "" if Path(report["path"]).is_dir() or "format" in report else " by itself"
         click.echo(f"{path}: {counts}: ok{alone}")
         if "format" in report:
-            click.echo(f"  it is {report['title']}: 'robochoc solve' takes it, 'robochoc import' makes a team of it")
-            for line in differences_told([Note(**note) for note in report["notes"]]):
+            click.echo(
+                f"  this is {report['title']}: 'robochoc solve' reads it, 'robochoc import' converts it to a team"
+            )
+            for line in difference_lines([Note(**note) for note in report["notes"]]):
                 click.echo(line)
         return
     errors = report["errors"]

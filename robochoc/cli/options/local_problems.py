@@ -1,4 +1,4 @@
-"""Options of every command that compiles robots' local problems."""
+"""Options of all commands that compile robots' local problems."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from robochoc.cli.options.numbers import Number, WholeNumber
+from robochoc.cli.options.value_types import Number, WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.solver.compile import Limits
@@ -35,7 +35,7 @@ _LOCAL_OPTIONS = (
         "--ace",
         "always_ace",
         is_flag=True,
-        help="Have ACE solve small local problems, too.",
+        help="Use ACE for small local problems, too.",
     ),
     click.option(
         "--no-cache",
@@ -46,16 +46,16 @@ _LOCAL_OPTIONS = (
 
 
 def local_options(command: Command) -> Command:
-    """`--local-solutions`, `--local-timeout`, `--ace` and `--no-cache`."""
+    """Add `--local-solutions`, `--local-timeout`, `--ace` and `--no-cache`."""
     for option in reversed(_LOCAL_OPTIONS):
         command = option(command)
     return command
 
 
 def limits(local_solutions: int, local_timeout: float, *, always_ace: bool) -> Limits:
-    """The limits that the options ask for."""
+    """Return the limits that the options set."""
     from robochoc.solver.compile import Limits
 
     if not local_timeout > 0:
-        raise click.UsageError("--local-timeout takes a number of seconds")
+        raise click.UsageError("--local-timeout requires a number of seconds greater than 0")
     return Limits(local_solutions, local_timeout, always_ace)

@@ -1,31 +1,39 @@
-"""Options, addresses and failures that `robochoc master`, `robot`, `sniff` and `directory` share."""
+"""Addresses, tokens, other options and errors that `robochoc master`, `robot`, `sniff` and `directory` share."""
 
 from __future__ import annotations
 
+import os
+import stat
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 import click
+from click.core import ParameterSource
 
-from robochoc.cli.options.numbers import Number
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.reports.failures import INVALID, LIMIT, LOST, USAGE, Failure, failures_told
+from robochoc.cli.options.value_types import Number
+from robochoc.cli.reports.failures import INVALID, LIMIT, LOST, USAGE, Failure, errors_as_failures
 
 if TYPE_CHECKING:
     from robochoc.run.networked.address import Address
 
 Command = TypeVar("Command", bound=Callable[..., object])
 _EXTRA = {"cryptography", "zenoh"}
+STDIN = "-"
+LONGEST = 4096
+"""Bytes. A token has about a hundred."""
+_FILE = "robochoc.token_file"
 
 
-class PlaceType(click.ParamType["Address"]):
+class AddressType(click.ParamType["Address"]):
     """`HOST:PORT` of a master."""
 
-    name = "place"
+    name = "address"
 
     def convert(self, value: str | Address, param: click.Parameter | None, ctx: click.Context | None) -> Address:
-        """The place. Fails, as wrong usage, where it is none."""
+        """Return the address."""
         from robochoc.run.networked.address import Address, AddressError
 
         if isinstance(value, Address):
@@ -37,7 +45,7 @@ class PlaceType(click.ParamType["Address"]):
 
 
 master_option = click.option(
-    "--master", "place", type=PlaceType(), required=True, metavar="HOST:PORT", help="Address of the master."
+    "--master", "place", type=AddressType(), required=True, metavar="HOST:PORT", help="Address of the master."
 )
 authority_option = click.option(
     "--authority",
@@ -50,12 +58,12 @@ identity_option = click.option(
     "--identity",
     type=InputPath(),
     metavar="DIR",
-    help="Folder of the key and the certificate.  [default: robochoc/identities/NAME in your data folder]",
+    help="Folder with your key and certificate.  [default: robochoc/identities/NAME in your data folder]",
 )
 
 
 def patience_option(text: str, default_s: float, name: str = "patience_s") -> Callable[[Command], Command]:
-    """Return the option `--patience SECONDS`, as the argument `name`, explained by `text`."""
+    """Return the option `--patience SECONDS`, as the argument `name`, with the help `text`."""
     return click.option(
         "--patience",
         name,
@@ -67,13 +75,86 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
     )
 
 
+def token_options() -> Callable[[Command], Command]:
+    """Return the options `--token` and `--token-file`, both as the argument `token`.
+
+    While the command runs, a token on the command line can be read by every user of the machine, in the list of
+    processes.
+    """
+    options = (
+        click.option(
+            "--token-file",
+            is_eager=True,
+            expose_value=False,
+            callback=_note_file,
+            metavar="FILE",
+            help="Enrol with the token in FILE, which others must not be able to read; -: standard input.",
+        ),
+        click.option(
+            "--token",
+            envvar="ROBOCHOC_TOKEN",
+            callback=_token,
+            metavar="TOKEN",
+            help="Enrol with this token. Other users see it in the list of processes.",
+        ),
+    )
+
+    def with_options(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return with_options
+
+
+def _note_file(context: click.Context, _param: click.Parameter, value: str | None) -> None:
+    context.meta[_FILE] = value
+
+
+def _token(context: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    file = context.meta.get(_FILE)
+    if file is None:
+        return _from_standard_input() if value == STDIN else value
+    if param.name and context.get_parameter_source(param.name) is ParameterSource.COMMANDLINE:
+        raise click.UsageError("--token and --token-file both give the token; remove one")
+    return _from_standard_input() if file == STDIN else _from_file(file)
+
+
+def _from_standard_input() -> str:
+    if sys.stdin.isatty():
+        return str(click.prompt("Token", hide_input=True, err=True))
+    return _only_word(sys.stdin.buffer.readline(LONGEST + 1), "standard input")
+
+
+def _from_file(path: str) -> str:
+    """Return the token in the file. Reject a file that others may read, as ssh does with keys."""
+    try:
+        with open(path, "rb") as file:  # noqa: PTH123 - the file that is checked is the file that is read
+            status = os.fstat(file.fileno())
+            if stat.S_ISREG(status.st_mode) and status.st_uid == os.getuid() and status.st_mode & 0o077:
+                others = f"others may read it (mode {stat.S_IMODE(status.st_mode):03o})"
+                raise Failure(INVALID, f"{path}: {others} and use the token; run: chmod 600 {path}")
+            return _only_word(file.read(LONGEST + 1), path)
+    except OSError as error:
+        raise Failure(INVALID, f"{path}: {error.strerror or error} (give the file with the token)") from error
+
+
+def _only_word(content: bytes, place: str) -> str:
+    """Return the token of a line, with or without a name before it, as `robochoc authority enrol` prints it."""
+    words = content.decode(errors="replace").split()
+    if len(content) > LONGEST or len(words) not in {1, 2}:
+        found = "no token" if not words else "more than one token"
+        raise Failure(INVALID, f"{place}: {found} (expected one line of 'robochoc authority enrol')")
+    return words[-1]
+
+
 @contextmanager
-def network_failures_told(place: object) -> Iterator[None]:
-    """Turn each failure of a run across machines into a message of one line and an exit status."""
+def network_errors_as_failures(place: object) -> Iterator[None]:
+    """Turn each foreseen error of a run on several machines into a `Failure`: one line and an exit status."""
     statuses = _statuses()
     from robochoc.formats import on_one_line
 
-    with failures_told(place):
+    with errors_as_failures(place):
         try:
             yield
         except tuple(kind for kinds in statuses.values() for kind in kinds) as error:
@@ -82,7 +163,7 @@ def network_failures_told(place: object) -> Iterator[None]:
 
 
 def _statuses() -> dict[int, tuple[type[Exception], ...]]:
-    """Return the exceptions of each exit status. Raise `Failure` where a package of the extra is missing."""
+    """Return the exceptions of each exit status. Raise `Failure` if a package of the extra is missing."""
     try:
         from robochoc.authority.certificates import HostNameError
         from robochoc.authority.enrolment import EnrolmentError
@@ -98,7 +179,7 @@ def _statuses() -> dict[int, tuple[type[Exception], ...]]:
         package = (missing.name or "").partition(".")[0]
         if package not in _EXTRA:
             raise
-        message = f"this needs {package}, which is an extra; say: pip install 'robochoc[network]'"
+        message = f"this command requires {package}, which is an extra; run: pip install 'robochoc[network]'"
         raise Failure(USAGE, message) from missing
     return {
         INVALID: (IdentityError, AuthorityError, TokenError),

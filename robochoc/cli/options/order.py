@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robochoc.cli.options.names import NameOrFile
+from robochoc.cli.options.value_types import NameOrFile
 
 if TYPE_CHECKING:
     from robochoc.model.orders import Order
@@ -18,7 +18,7 @@ ORDER_NAME = NameOrFile("order", NAMES, {"dom/deg": "dom-deg"})
 
 
 def order_for(team: Team, order: str | Path | None, names: Mapping[str, str] = {}) -> Order | tuple[str, ...] | None:
-    """Return the order for `team`, or None where none was asked for.
+    """Return the order for `team`, or None if none was given.
 
     Args:
         team: The team.

@@ -1,4 +1,4 @@
-"""Paths on the command line: what cannot be read or written is said before the work, not after it."""
+"""Paths on the command line, which are checked before the work starts."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ if TYPE_CHECKING:
 
 PathLike = str | os.PathLike[str]
 
-_LOOKED_AT = 20
-"""The maximum number of files of a folder that are looked at, when no team is found there."""
+_MOST_RECOGNISED = 20
+"""The maximum number of files of a folder without a team whose format is recognised."""
 
 
 class InputPath(click.Path):
-    """A path to read. Not the empty one, which an unset shell variable leaves: it would mean everything here."""
+    """A path to read. An empty path is an error: an unset shell variable would otherwise mean the current folder."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
 
     def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """The path. Fails, as wrong usage, where it is empty."""
+        """Return the path."""
         if not os.fspath(value):
-            self.fail("a path is empty; write '.' for this folder", param, ctx)
+            self.fail("the path is empty; write '.' for this folder", param, ctx)
         return Path(os.fsdecode(super().convert(value, param, ctx)))
 
 
 class TeamFolder(InputPath):
-    """A path to read at which a team is expected: the shell completes folders."""
+    """The path of a team's folder: the shell completes folders."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002 - click's
         """Return the shell's own completion of folders."""
@@ -46,13 +46,13 @@ class TeamFolder(InputPath):
 
 
 class OutputFile(click.Path):
-    """A file to write, in a folder that is there and may be written to."""
+    """A file to write, in an existing, writable folder."""
 
     def __init__(self) -> None:
         super().__init__(dir_okay=False, path_type=Path)
 
     def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """The path. Fails, as wrong usage, where no file could come into being."""
+        """Return the path."""
         from robochoc.system.files import resolved
 
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
@@ -65,14 +65,14 @@ class OutputFile(click.Path):
         except OSError as error:
             self.fail(f"{path}: {error.strerror}; name another file", param, ctx)
         if not folder.is_dir():
-            self.fail(f"there is no folder {folder}; make it first", param, ctx)
+            self.fail(f"the folder {folder} does not exist; create it first", param, ctx)
         if not os.access(folder, os.W_OK | os.X_OK):
-            self.fail(f"nothing may be written in {folder}; choose another folder", param, ctx)
+            self.fail(f"the folder {folder} is not writable; choose another folder", param, ctx)
         return path
 
 
-Place = tuple[Path | str, str]
-"""A place, the same however it is spelled, and what the command line calls it."""
+NamedPlace = tuple[Path | str, str]
+"""A file or topic in one canonical spelling, and its name on the command line."""
 
 
 def refuse_same_places(
@@ -80,13 +80,19 @@ def refuse_same_places(
     inputs: Mapping[str, Path | None] = MappingProxyType({}),
     *,
     teams: Iterable[Path] = (),
-    more_outputs: Iterable[Place] = (),
-    more_inputs: Iterable[Place] = (),
+    more_outputs: Iterable[NamedPlace] = (),
+    more_inputs: Iterable[NamedPlace] = (),
 ) -> None:
-    """Raise `click.UsageError` where a command would write over what it reads, or two things to one place.
+    """Raise `click.UsageError` if a command would overwrite one of its inputs, or write two outputs to one place.
 
-    `outputs` and `inputs` are files, by what they are called on the command line; `teams` are folders whose files are
-    read; `more_outputs` and `more_inputs` are places that need not be files. Devices and pipes may be shared.
+    Args:
+        outputs: Files to write, by their names on the command line.
+        inputs: Files to read, by their names on the command line.
+        teams: Folders whose files are read.
+        more_outputs: Outputs that need not be files.
+        more_inputs: Inputs that need not be files.
+
+    Devices and pipes may be shared.
     """
     from robochoc.system.files import resolved
 
@@ -96,50 +102,54 @@ def refuse_same_places(
     for place, option in written:
         other = taken.setdefault(place, option)
         if other is not option:
-            told = f"{option} is given twice" if other == option else f"{other} and {option} are one place"
-            raise click.UsageError(told)
+            same = f"{option} is given twice" if other == option else f"{other} and {option} are the same place"
+            raise click.UsageError(same)
         if isinstance(place, Path) and place.suffix == ".xml":
             for folder in folders:
                 if place.is_relative_to(folder):
-                    raise click.UsageError(f"{option} would be a file of the team in {folder}; name another")
+                    raise click.UsageError(f"{option} would be a file of the team in {folder}; name another file")
 
 
-def _named(files: Mapping[str, Path | None]) -> Iterator[Place]:
+def _named(files: Mapping[str, Path | None]) -> Iterator[NamedPlace]:
     """Yield the path and the name of each given file, which need not exist yet. Devices are left out."""
     from robochoc.system.files import resolved
 
-    for what, path in files.items():
+    for name, path in files.items():
         with suppress(OSError):  # its reader or writer reports the error
             if path and (path.is_file() or not path.exists()):
-                yield resolved(path), f"{what} {path}"
+                yield resolved(path), f"{name} {path}"
 
 
-def foreign_files_told(path: Path) -> list[str]:
-    """Return a line that says which command imports what is at `path`; none where no tool's file is there."""
+def import_hints(path: Path) -> list[str]:
+    """Return a line with the command that imports the problem at `path`; none if no file there has a known format."""
     from robochoc.formats.dialects.registry import recognise
 
     try:
-        files = [path] if path.is_file() else sorted(entry for entry in path.iterdir() if entry.is_file())[:_LOOKED_AT]
+        files = (
+            [path]
+            if path.is_file()
+            else sorted(entry for entry in path.iterdir() if entry.is_file())[:_MOST_RECOGNISED]
+        )
     except OSError:
         return []
     for file in files:
         if dialect := recognise(file):
-            return [f"{file}: is {dialect.title}; 'robochoc import {path} -o FOLDER' makes a team of it"]
+            return [f"{file}: is {dialect.title}; convert it to a team: robochoc import {path} -o FOLDER"]
     return []
 
 
 def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | None = None) -> list[Path]:
-    """Return the folders of all teams at `paths` or below, each once.
+    """Return the folders of all teams at `paths` or below, without duplicates.
 
     With `foreign`, files of other tools are teams, too; with `dialect`, all files have this format.
 
-    Raises `Failure`, which names every path without a team: nothing is done by half.
+    Raises `Failure`, which names every path without a team.
     """
     from robochoc.formats import InvalidInputError, find_teams
     from robochoc.formats.dialects.registry import recognised
 
     folders: dict[Path, None] = {}
-    wrong = []
+    errors = []
     for path in paths:
         try:
             if foreign and ((dialect and path.is_file()) or recognised(path)):
@@ -147,7 +157,7 @@ def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | Non
             else:
                 folders.update(dict.fromkeys(find_teams(path)))
         except InvalidInputError as invalid:
-            wrong += [str(invalid), *foreign_files_told(path)]
-    if wrong:
-        raise Failure(INVALID, "\n".join(wrong))
+            errors += [str(invalid), *import_hints(path)]
+    if errors:
+        raise Failure(INVALID, "\n".join(errors))
     return list(folders)

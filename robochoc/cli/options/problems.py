@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import TeamFolder
+from robochoc.cli.options.value_types import WholeNumber
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
 READ = ("frodo", "xdiscsp", "pydcop", "tasks", "xcsp3", "cfn", "wcsp")
-"""The dialects that are imported."""
+"""The formats that can be imported."""
 WRITTEN = ("xcsp3", "frodo", "xdiscsp", "dcopsolver", "pydcop", "cfn", "wcsp", "dot", "graphml")
-"""The formats that are exported."""
+"""The formats that can be exported."""
 
 
-class Problem(TeamFolder):
-    """A path to read at which a team, or a file of another tool, is expected."""
+class ProblemPath(TeamFolder):
+    """The path of a team's folder or of another tool's file."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002 - click's
         """Return the shell's own completion of files."""
@@ -37,31 +37,34 @@ class Pattern(click.ParamType[str]):
     name = "regex"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return it as it is. Fail, as wrong usage, where it is none."""
+        """Return the expression unchanged, after a check."""
         import re
 
         try:
             re.compile(value)
         except (re.error, OverflowError, RecursionError) as error:
-            self.fail(f"{value!r} is no regular expression: {error}", param, ctx)
+            self.fail(f"{value!r} is not a regular expression: {error}", param, ctx)
         return value
 
 
 def format_option(command: _Command) -> _Command:
     """Add `--format`, the format of the input files."""
-    told = "Format of the files, as 'robochoc import --help' lists them."
-    return click.option("--format", "dialect", type=click.Choice(READ), metavar="NAME", help=told)(command)
+    text = "Format of the files ('robochoc import --help' lists them)."
+    return click.option("--format", "dialect", type=click.Choice(READ), metavar="NAME", help=text)(command)
 
 
 def reading_options(command: _Command) -> _Command:
-    """Add `--infinity` and `--owner`: how a file of another tool is read."""
+    """Add `--infinity` and `--owner`, which control how a file of another tool is read."""
     owner = click.option(
         "--owner",
         type=Pattern(),
         metavar="REGEX",
-        help="One robot for variables with the same match (or first group).",
+        help="Variables with the same match (or group) have one robot.",
     )
     infinity = click.option(
-        "--infinity", type=WholeNumber(1), metavar="N", help="Costs of N or more forbid (maximising: of -N or less)."
+        "--infinity",
+        type=WholeNumber(1),
+        metavar="N",
+        help="Costs of N or more are forbidden (maximising: -N or less).",
     )
     return infinity(owner(command))

@@ -1,4 +1,4 @@
-"""`--journal`: the journal that a command is asked to write."""
+"""`--journal`: the journal that a command writes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ journal_option = click.option(
     "--journal",
     type=OutputFile(),
     metavar="FILE",
-    help="Write all messages and decisions to a compact file, during the run ('robochoc journal', 'replay', 'sniff').",
+    help="Write all messages and decisions to a file during the run ('robochoc journal', 'replay', 'sniff').",
 )
 
 bounds_option = click.option(
     "--bounds",
     is_flag=True,
-    help="With --journal: also when a least cost is proven.",
+    help="With --journal: also record proven lower bounds of the cost.",
 )
 
 
@@ -39,10 +39,10 @@ def recording(
     objective: Callable[[], Objective] | None = None,
     sinks: Sequence[BlockSink] = (),
 ) -> Iterator[JournalRecorder | None]:
-    """A recorder that writes to `path`, and to other `sinks`, while the run goes on; None if there is neither.
+    """Give a recorder that writes to `path` and to other `sinks` during the run; None if there is neither.
 
-    When the file cannot be written, the run goes on. That is told at the end, and then it is what the command fails
-    for; a run that has failed itself keeps its own status. Other sinks tell of their failures themselves.
+    If the file cannot be written, the run continues; the error is reported at the end as the failure of the command,
+    unless the run itself failed. Other sinks report their own failures.
     """
     if path is None and not sinks:
         yield None
@@ -54,7 +54,7 @@ def recording(
     try:
         yield recorder
     except BaseException:
-        if not recorder.is_empty:  # a run that was refused leaves the journal of another one alone
+        if not recorder.is_empty:  # a rejected run does not overwrite the journal of an earlier one
             recorder.close()
         for failure in _failures(recorder):
             failure.show()
@@ -71,19 +71,19 @@ def recording(
             file.close()
 
 
-def shown_and_flushed(
+def flushing_progress(
     recorder: JournalRecorder | None, show: Callable[[Progress], None] | None
 ) -> Callable[[Progress], None] | None:
-    """Return the function that receives a run's progress. It flushes the recorder if due, and calls `show`."""
+    """Return a function that receives a run's progress: it flushes the recorder when due, and calls `show`."""
     if recorder is None:
         return show
 
-    def told(progress: Progress) -> None:
+    def flush_and_show(progress: Progress) -> None:
         recorder.flush_if_due()
         if show:
             show(progress)
 
-    return told
+    return flush_and_show
 
 
 def _failures(recorder: JournalRecorder) -> list[Failure]:
@@ -92,8 +92,8 @@ def _failures(recorder: JournalRecorder) -> list[Failure]:
     return [
         Failure(
             INVALID,
-            on_one_line(f"{error.filename}: the journal could not be written to its end: {error.strerror}")
-            + " (what is there can be read; free some space, or name another file)",
+            on_one_line(f"{error.filename}: the journal could not be written completely: {error.strerror}")
+            + " (its beginning can be read; free some space, or name another file)",
         )
         for error in recorder.failures
         if error.filename

@@ -1,23 +1,102 @@
-"""Options of the commands that publish decisions, fly them, and receive what robots report."""
+"""Options of the commands that publish decisions, simulate flights, and receive reports of robots."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import click
 
-from robochoc.cli.options.ros_types import FailureType, Finite, FrameType, PointType, WindType
+from robochoc.cli.options.value_types import Number
 
 Command = TypeVar("Command", bound=Callable[..., object])
 
 FLIGHT = "flight"
 """The value of `--situation` for the simulation."""
 FRAME = "map"
+AXES = 3
 
 
-def _optional(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+class FrameType(click.ParamType[str]):
+    """The name of a frame."""
+
+    name = "frame"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name, which must not contain blanks."""
+        if not value or not value.isprintable() or " " in value:
+            self.fail(f"{value!r} is not the name of a frame, such as map", param, ctx)
+        return value
+
+
+class PointType(click.ParamType["tuple[float, ...]"]):
+    """Three numbers, separated by commas."""
+
+    name = "point"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
+        """Return the numbers of `1,2,0.5`."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            point = tuple(map(float, value.split(",")))
+        except ValueError:
+            point = ()
+        if len(point) != AXES or not all(map(math.isfinite, point)):
+            self.fail(f"{value!r} is not three numbers such as 1,2,3", param, ctx)
+        return point
+
+
+class WindType(PointType):
+    """The velocity of wind; a single number is its speed along x."""
+
+    name = "wind"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
+        """Return the numbers of `1,2,0.5`, and for `3` those of `3,0,0`."""
+        if not isinstance(value, str) or "," in value:
+            return super().convert(value, param, ctx)
+        try:
+            return super().convert(f"{value},0,0", param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is neither a speed such as 3 nor three numbers such as 1,2,3", param, ctx)
+
+
+class FailureType(click.ParamType["tuple[str, float]"]):
+    """A robot or a drone, and the time of its failure."""
+
+    name = "failure"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:  # noqa: ANN401 - click's signature
+        """Return the name and the seconds of `Robot3.1@5`."""
+        from robochoc.ros.simulated_feedback import FAILS_S
+
+        if isinstance(value, tuple):
+            return value
+        name, at, seconds = value.rpartition("@")
+        if not at:
+            return value, FAILS_S
+        try:
+            at_s = float(seconds)
+        except ValueError:
+            at_s = math.nan
+        if not name or not 0 <= at_s < math.inf:
+            self.fail(f"{value!r} is not of the form ROBOT or ROBOT@SECONDS", param, ctx)
+        return name, at_s
+
+
+class Finite(Number):
+    """A finite number in a range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
+        """Return the number."""
+        number = super().convert(value, param, ctx)
+        return number if math.isfinite(number) else self.fail(f"{value} is not a finite number", param, ctx)
+
+
+def _all_of(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
     def decorated(command: Command) -> Command:
         for option in reversed(options):
             command = option(command)
@@ -26,7 +105,7 @@ def _optional(*options: Callable[[Command], Command]) -> Callable[[Command], Com
     return decorated
 
 
-ros_options = _optional(
+ros_options = _all_of(
     click.option(
         "--ros",
         "sinks",
@@ -42,34 +121,34 @@ ros_options = _optional(
         "--scale",
         type=Finite(1e-6, 1e6),
         metavar="METRES",
-        help="Metres a unit.  [default: 1 or less]",
+        help="Metres per unit.  [default: 1 or less]",
     ),
     click.option("--ros-type", "ros_type", metavar="TYPE", help="ROS type of all waypoints, such as nav_msgs/Path."),
-    click.option("--tf", is_flag=True, help="Goals become frames on /tf_static, flights on /tf."),
+    click.option("--tf", is_flag=True, help="Publish goals on /tf_static and flights on /tf."),
     click.option("--diagnostics", is_flag=True, help="Publish verdict, epoch and cost on /diagnostics."),
 )
 """`--ros`, `--frame`, `--scale`, `--ros-type`, `--tf`, `--diagnostics`."""
 
-flight_options = _optional(
+flight_options = _all_of(
     click.option(
         "--fail",
         "failures",
         multiple=True,
         type=FailureType(),
         metavar="ROBOT[@SECONDS]",
-        help="Stop a motor of its drone (after 2 s). Repeatable.",
+        help="Stop a motor of a drone (after 2 s). Repeatable.",
     ),
     click.option(
         "--distance",
         type=Finite(0, min_open=True),
         metavar="METRES",
-        help="Distance that drones keep.  [default: 0.5 or less]",
+        help="Minimum between drones.  [default: 0.5 or less]",
     ),
     click.option(
         "--downwash",
         type=Finite(1),
         metavar="FACTOR",
-        help="Distances kept right above each other.  [default: 1]",
+        help="Factor of --distance for heights.  [default: 1]",
     ),
     click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
     click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),
@@ -86,34 +165,34 @@ improve_option = click.option(
     "--improve",
     type=Finite(0, min_open=True),
     metavar="SECONDS",
-    help="After --deadline: search on, publish better.",
+    help="After --deadline: publish better solutions.",
 )
-situation_options = _optional(
+situation_options = _all_of(
     click.option(
         "--situation",
         metavar="SOURCE",
-        help=("Solve again when robots report a change: flight (a simulated one), or as for --ros, or rosbag2:FILE."),
+        help="Solve again when robots report changes: flight (simulated), rosbag2:FILE, or as for --ros.",
     ),
     click.option(
         "--patience",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help=("A robot out of reach, or stopped, for so long is lost.  [default: no limit; on a network 10]"),
+        help="Time after which a silent robot counts as lost.  [default: no limit; on a network 10]",
     ),
     click.option(
         "--report-timeout",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="With --situation: wait so long.  [default: 10]",
+        help="Longest wait for a report.  [default: 10]",
     ),
     click.option(
         "--battery",
         type=Finite(0, 1),
         metavar="LEVEL",
-        help="A robot leaves below this charge.  [default: 0.2]",
+        help="Robots leave below this charge.  [default: 0.2]",
     ),
     improve_option,
-    click.option("--use-sim-time", is_flag=True, help="Stamps are the time on /clock of --situation."),
+    click.option("--use-sim-time", is_flag=True, help="Use the time on /clock of --situation for stamps."),
     click.option(
         "--obstacle",
         "obstacles",
@@ -136,14 +215,14 @@ _SIMULATED = {**CONDITIONS, "obstacles": "--obstacle"}
 _FROM_REPORTS = {"battery": "--battery", "report_timeout": "--report-timeout", "use_sim_time": "--use-sim-time"}
 IN_FRAME = {"frame": "--frame", "scale": "--scale"}
 PUBLISHED = {"ros_type": "--ros-type", "tf": "--tf", "diagnostics": "--diagnostics"}
-NOT_PUBLISHED = "is for what is published: add --ros SINK"
+NOT_PUBLISHED = "requires --ros SINK"
 
 
 @dataclass(frozen=True)
 class RosOptions:
-    """The options of this file: where decisions go, and where the robots' situation comes from.
+    """The options of this module: sinks of decisions, and the source of the robots' situation.
 
-    `flight` holds those of `FlightSettings` that were given, and `published` those of `PUBLISHED`.
+    `flight` has the given options of `FlightSettings`, and `published` those in `PUBLISHED`.
     """
 
     sinks: tuple[str, ...]
@@ -160,22 +239,27 @@ class RosOptions:
     def __bool__(self) -> bool:
         return bool(self.sinks or self.situation)
 
+    @property
+    def simulates_flight(self) -> bool:
+        """Whether the robots' situation comes from a simulated flight."""
+        return self.situation == FLIGHT
 
-def take_ros_options(settings: dict[str, Any]) -> RosOptions:
-    """Take the options of this file out of `settings`. Raises `click.UsageError` for one that would be ignored."""
+
+def pop_ros_options(settings: dict[str, Any]) -> RosOptions:
+    """Remove the options of this module from `settings`. Raises `click.UsageError` for an option without effect."""
     sinks, situation, arm = settings.pop("sinks"), settings.pop("situation"), settings.pop("arm")
     given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME, *PUBLISHED)}
     asked = given_names(given)
     if situation != FLIGHT:
-        refuse(_SIMULATED, asked, "is for the simulated flight: add --situation flight")
+        refuse_given(_SIMULATED, asked, "applies to the simulated flight: add --situation flight")
     if situation in {None, FLIGHT}:
-        refuse(_FROM_REPORTS, asked, "is for robots that report: add --situation mcap:FILE, or another source")
+        refuse_given(_FROM_REPORTS, asked, "applies to reports of robots: add --situation mcap:FILE or another source")
     if not (sinks or situation):
-        refuse(IN_FRAME, asked, NOT_PUBLISHED)
+        refuse_given(IN_FRAME, asked, NOT_PUBLISHED)
     if not sinks:
-        refuse(PUBLISHED, asked, NOT_PUBLISHED)
+        refuse_given(PUBLISHED, asked, NOT_PUBLISHED)
     if arm and not sinks:
-        raise click.UsageError("--arm is for robots that are commanded: add --ros mavlink:FILE, or crazyflie:FILE")
+        raise click.UsageError("--arm requires --ros mavlink:FILE or --ros crazyflie:FILE")
     flight = {name: given[name] for name in _SIMULATED if name in asked}
     frame = given["frame"] or FRAME
     return RosOptions(
@@ -197,8 +281,8 @@ def given_names(options: Mapping[str, Any]) -> set[str]:
     return {name for name, value in options.items() if value not in (None, (), False)}
 
 
-def refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:
-    """Raise `click.UsageError` for the first of `options` that was `asked` for."""
+def refuse_given(options: Mapping[str, str], asked: set[str], why: str) -> None:
+    """Raise `click.UsageError`, with the reason `why`, for the first of `options` that was given."""
     for name, option in options.items():
         if name in asked:
             raise click.UsageError(f"{option} {why}")

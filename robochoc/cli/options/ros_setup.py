@@ -1,4 +1,4 @@
-"""The setup for the options of ROS and flights: sinks, feedback, the closed loop. Errors become one line."""
+"""The setup for the options of ROS and flights: sinks, feedback, the closed loop. Errors become `Failure`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.ground import ground_map
-from robochoc.cli.options.paths import Place, refuse_same_places
+from robochoc.cli.options.paths import NamedPlace, refuse_same_places
 from robochoc.cli.options.ros import (
     CONDITIONS,
     FLIGHT,
@@ -20,8 +19,9 @@ from robochoc.cli.options.ros import (
     PUBLISHED,
     RosOptions,
     given_names,
-    refuse,
+    refuse_given,
 )
+from robochoc.cli.options.scene import ground_map
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def ros_errors_fail() -> Iterator[None]:
+def ros_errors_as_failures() -> Iterator[None]:
     """Turn errors of sinks, sources and names into `Failure`, with one line."""
     from robochoc.ros.mappings import NoMappingError
     from robochoc.ros.names import NameClashError
@@ -53,7 +53,7 @@ def ros_errors_fail() -> Iterator[None]:
 
 
 @contextmanager
-def flight_errors_fail() -> Iterator[None]:
+def flight_errors_as_failures() -> Iterator[None]:
     """Turn a decision that cannot be flown into `Failure`, with one line."""
     from robochoc.ros.simulated_feedback import CannotFlyError
 
@@ -71,23 +71,25 @@ def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
 
 
 def publish_options(given: Mapping[str, Any]) -> PublishOptions:
-    """Return what `--ros-type`, `--tf` and `--diagnostics` ask for."""
+    """Return the options that `--ros-type`, `--tf` and `--diagnostics` set."""
     from robochoc.ros.team_topics import PublishOptions
 
     return PublishOptions(kind=given["ros_type"] or "", frames=given["tf"], diagnostics=given["diagnostics"])
 
 
 def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
-    """Let those of `sinks` arm that can. Raises `click.UsageError` if none can, and `SinkError`."""
+    """Allow arming in all `sinks` that support it. Raises `click.UsageError` if none does, and `SinkError`."""
     able = [sink for sink in sinks if sink.arms]
     if not able:
-        raise click.UsageError(f"--arm is for --ros mavlink:FILE or crazyflie:FILE; {', '.join(texts)} arms nothing")
+        raise click.UsageError(
+            f"--arm requires --ros mavlink:FILE or --ros crazyflie:FILE; {', '.join(texts)} cannot arm vehicles"
+        )
     for sink in able:
         sink.allow_arming()
 
 
 def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
-    """Return the settings of a simulated flight, of options that were `given`."""
+    """Return the settings of a simulated flight from the `given` options."""
     from robochoc.ros.simulated_feedback import FlightSettings
 
     return FlightSettings(seed=seed, **given)
@@ -95,7 +97,7 @@ def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
 
 @contextmanager
 def _flight_usage() -> Iterator[None]:
-    """Turn an unknown drone, or impossible weather, into `click.UsageError`."""
+    """Turn an unknown drone or invalid weather into `click.UsageError`."""
     from robochoc.ros.simulated_feedback import UnknownDroneError
 
     try:
@@ -107,7 +109,7 @@ def _flight_usage() -> Iterator[None]:
 
 
 def conditions_of(given: Mapping[str, Any], mission: Mission) -> FlightConditions:
-    """Return the conditions that the options of `robochoc fly` ask for. Raises `click.UsageError`."""
+    """Return the flight conditions from the options of `robochoc fly`. Raises `click.UsageError`."""
     asked = {name: given[name] for name in CONDITIONS if given[name] not in (None, ())}
     with _flight_usage():
         return flight_settings(asked, given["seed"]).conditions(mission.drones, mission.scale)
@@ -115,7 +117,7 @@ def conditions_of(given: Mapping[str, Any], mission: Mission) -> FlightCondition
 
 @contextmanager
 def scale_usage() -> Iterator[None]:
-    """Turn a scale that is not that of the map into `click.UsageError`."""
+    """Turn a scale other than that of the map into `click.UsageError`."""
     try:
         yield
     except ValueError as wrong:
@@ -124,13 +126,13 @@ def scale_usage() -> Iterator[None]:
 
 @contextmanager
 def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = None) -> Iterator[ClosedLoop | None]:
-    """Give the closed loop of `team`, or None if no option asks for one. At the end, what was published is complete.
+    """Give the closed loop of `team`, or None if no option requires one. On exit, everything published is complete.
 
-    A map in the `folder` of the team says where robots stand, how long a unit is, and what is in the way.
+    A map in the `folder` of the team has the positions of robots, the length of a unit, and the obstacles.
 
     Raises:
         Failure: A sink or a source fails, or a decision cannot be flown.
-        click.UsageError: An option does not go with the team, or with the source.
+        click.UsageError: An option does not apply to the team or to the source.
     """
     if not ros:
         yield None
@@ -138,7 +140,11 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
     from robochoc.ros.closed_loop import ClosedLoop, drones_of
     from robochoc.ros.situation import BATTERY
 
-    with flight_errors_fail() if ros.situation == FLIGHT else nullcontext(), ros_errors_fail(), ExitStack() as stack:
+    with (
+        flight_errors_as_failures() if ros.situation == FLIGHT else nullcontext(),
+        ros_errors_as_failures(),
+        ExitStack() as stack,
+    ):
         feedback = _feedback(ros, drones_of(team), seed, stack) if ros.situation else None
         battery = BATTERY if ros.battery is None else ros.battery
         sinks = open_sinks(ros.sinks, stack)
@@ -159,7 +165,7 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
 
 
 def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
-    """Return the feedback that `--situation` asks for."""
+    """Return the feedback of the source in `--situation`."""
     if ros.situation == FLIGHT:
         from robochoc.ros.simulated_feedback import SimulatedFeedback
 
@@ -173,7 +179,7 @@ def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitSt
 
     source = stack.enter_context(open_source(ros.situation or ""))
     if ros.report_timeout is not None and not source.live:
-        raise click.UsageError(f"--report-timeout is for a live source; {ros.situation} is a recording")
+        raise click.UsageError(f"--report-timeout requires a live source; {ros.situation} is a recording")
     return SourceFeedback(
         source, ReportDecoder(drones, ros.frame), ros.report_timeout or PATIENCE_S, sim_time=ros.use_sim_time
     )
@@ -181,17 +187,17 @@ def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitSt
 
 @contextmanager
 def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
-    """Give a function that publishes the decision of `robot` alone, and returns what was published where.
+    """Give a function that publishes the decision of `robot` alone, and returns a line for each sink.
 
-    The function takes the master's word for how the run ended, or for what it has come to, and the robot's own
-    decision. What was published last is not published again. All options of `ros_options` are taken out of `given`.
-    Raises `Failure`.
+    The arguments of the function are the master's description of the run's end, or of its state, and the robot's
+    decision. A decision equal to the last published one is not published again. All options of `ros_options` are
+    removed from `given`. Raises `Failure`.
     """
     texts = given.pop("sinks")
     asked = {name: given.pop(name) for name in (*IN_FRAME, *PUBLISHED)}
     frame, scale, options = asked["frame"] or FRAME, asked["scale"], publish_options(asked)
     if not texts:
-        refuse({**IN_FRAME, **PUBLISHED}, given_names(asked), NOT_PUBLISHED)
+        refuse_given({**IN_FRAME, **PUBLISHED}, given_names(asked), NOT_PUBLISHED)
         yield lambda _why, _assignment: []
         return
     import time
@@ -200,34 +206,34 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
     from robochoc.ros.sink_publisher import SinkPublisher
 
     refuse_same_places({}, more_outputs=sink_places(texts))
-    with ros_errors_fail(), ExitStack() as stack:
+    with ros_errors_as_failures(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
-        found = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame, options) for sink in opened]
+        publishers = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame, options) for sink in opened]
         last: Leg | None = None
 
         def publish(why: str, assignment: Assignment) -> list[str]:
             nonlocal last
             leg = leg_of_robot(robot, why, assignment, scale)
-            for publisher in found if leg != last else ():
+            for publisher in publishers if leg != last else ():
                 publisher.decide(leg, time.time_ns())
             last = leg
-            return [f"{publisher.place}: {publisher.summary}" for publisher in found]
+            return [f"{publisher.place}: {publisher.summary}" for publisher in publishers]
 
         yield publish
 
 
-def sink_places(sinks: Sequence[str]) -> list[Place]:
-    """Return where `--ros` publishes. Raises `click.UsageError`."""
+def sink_places(sinks: Sequence[str]) -> list[NamedPlace]:
+    """Return the targets of `--ros`. Raises `click.UsageError`."""
     return [_place_of("--ros", text) for text in sinks]
 
 
-def source_places(situation: str | None) -> list[Place]:
-    """Return the file that `--situation` reads; what is live may be published to as well. Raises `click.UsageError`."""
+def source_places(situation: str | None) -> list[NamedPlace]:
+    """Return the file that `--situation` reads; a live source may also be a sink. Raises `click.UsageError`."""
     places = [_place_of("--situation", situation)] if situation else []
     return [(place, named) for place, named in places if isinstance(place, Path)]
 
 
-def _place_of(option: str, text: str) -> Place:
+def _place_of(option: str, text: str) -> NamedPlace:
     from robochoc.ros.sinks import place_of
 
     try:

@@ -1,4 +1,4 @@
-"""Input files that robochoc has written: journals and results, and the teams that belong to them."""
+"""Input files that robochoc has written: journals and results, and their teams."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 LARGEST_FILE = 1 << 30
 """1 GiB: a journal of hundreds of millions of messages, or one of millions as text."""
-JOURNAL_STEP = "give what 'robochoc solve --journal' wrote"
-_OUTCOME_STEP = "give what 'robochoc solve --json' or '--journal' wrote"
+JOURNAL_STEP = "give a file of 'robochoc solve --journal'"
+_OUTCOME_STEP = "give a result of 'robochoc solve --json' or a journal of '--journal'"
 
 team_option = click.option(
     "--team",
     "folder",
     type=TeamFolder(),
     metavar="DIR",
-    help="The team's folder, for names and topics.  [default: the journal's own data, or instances/TEAM]",
+    help="The team's folder, for names and topics.  [default: the team in the journal, or instances/TEAM]",
 )
 
 journal_team_option = click.option(
@@ -33,7 +33,7 @@ journal_team_option = click.option(
     "folder",
     type=TeamFolder(),
     metavar="DIR",
-    help="The team's folder, for a journal without the robots' problems (from several machines).",
+    help="The team's folder, for a journal without the robots' problems (a run on several machines).",
 )
 
 
@@ -43,25 +43,25 @@ def saved_content(file: Path, next_step: str) -> bytes:
         with file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
-        raise _refused(file, str(error.strerror or error), next_step) from error
+        raise _failure(file, str(error.strerror or error), next_step) from error
     if len(content) > LARGEST_FILE:
-        raise _refused(file, f"it has more than {LARGEST_FILE:,} bytes", next_step)
+        raise _failure(file, f"the file has more than {LARGEST_FILE:,} bytes", next_step)
     return content
 
 
 def saved_journal(file: Path) -> Journal:
-    """The journal in `file`. Raises `Failure`."""
+    """Return the journal in `file`. Raises `Failure`."""
     from robochoc.journal.journal import JournalError, read_journal
 
     content = saved_content(file, JOURNAL_STEP)
     try:
         return read_journal(content)
-    except JournalError as wrong:
-        raise _refused(file, str(wrong), JOURNAL_STEP) from wrong
+    except JournalError as error:
+        raise _failure(file, str(error), JOURNAL_STEP) from error
 
 
 def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
-    """Return the outcome in a file, a JSON result or a journal; and the team, if a journal has it.
+    """Return the outcome in a JSON result or a journal, and the team if the journal contains it.
 
     Raises `Failure`.
     """
@@ -73,16 +73,16 @@ def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
         if not is_journal(content):
             return read_result(content), None
         journal = read_journal(content)
-    except (JournalError, ResultError) as wrong:
-        raise Failure(INVALID, f"{saved}: {wrong} ({_OUTCOME_STEP})") from wrong
+    except (JournalError, ResultError) as error:
+        raise Failure(INVALID, f"{saved}: {error} ({_OUTCOME_STEP})") from error
     if journal.outcome is None:
-        why = journal.damage or "the run broke off"
-        raise Failure(INVALID, f"{saved}: {why}, so there is no outcome to show ({_OUTCOME_STEP})")
+        why = journal.damage or "the run was interrupted"
+        raise Failure(INVALID, f"{saved}: {why}, so the journal has no outcome ({_OUTCOME_STEP})")
     return journal.outcome, _given_team(journal)
 
 
 def _given_team(journal: Journal) -> Team | None:
-    """Return the team of a journal, with all robots in their first state; None if the journal does not contain it."""
+    """Return the team of a journal, with all robots in their initial state; None if the journal does not contain it."""
     from robochoc.journal.events import Given
     from robochoc.journal.given import GivenProblemError, TeamReader
     from robochoc.model.problem import Team
@@ -93,7 +93,7 @@ def _given_team(journal: Journal) -> Team | None:
         for event in journal.events:
             if isinstance(event, Given):
                 robots = {robot.name: robot for robot in reader.team(event).robots} | robots
-    except GivenProblemError:  # robots on other machines keep their problems to themselves, say
+    except GivenProblemError:  # for example, robots on other machines do not report their problems
         return None
     return Team(journal.header.team, tuple(robots.values())) if robots else None
 
@@ -101,27 +101,28 @@ def _given_team(journal: Journal) -> Team | None:
 def saved_team(
     outcome: Outcome, given: Team | None, saved: Path, folder: Path | None
 ) -> tuple[Team | None, Path | None]:
-    """Return the team of a saved outcome, and its folder. None if there is none.
+    """Return the team of a saved outcome, and its folder; None if not found.
 
-    The team is read from `folder`; without one, it is that of the journal (`given`), or read from the default folder.
+    The team is read from `folder`; without a folder, it is the journal's team (`given`), or read from the default
+    folder.
 
-    Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
+    Raises `InvalidInputError`, and `Failure` if the team is not that of `outcome`, which is from the file `saved`.
     """
     from robochoc.formats import read_team, robot_names
 
     if folder is None and given is not None and _is_team_of(outcome, given):
-        usual = _usual_folder(outcome)
-        is_there = usual is not None and set(robot_names(usual)) <= {robot.name for robot in given.robots}
-        return given, usual if is_there else None  # for its map
-    folder = folder or _usual_folder(outcome)
+        default = _default_folder(outcome)
+        is_same = default is not None and set(robot_names(default)) <= {robot.name for robot in given.robots}
+        return given, default if is_same else None  # for its map
+    folder = folder or _default_folder(outcome)
     if folder is None:
         missing = Path("instances") / Path(outcome.team).name
         click.echo(
-            f"{missing} is not there: drones are named for variables, without topics (give --team DIR)", err=True
+            f"{missing} does not exist: drones are named after variables, without topics (give --team DIR)", err=True
         )
     team = read_team(folder) if folder else None
     if team and not _is_team_of(outcome, team):
-        why = f"this is not the team of {saved}, {outcome.team} (give its folder with --team)"
+        why = f"the team here is not {outcome.team}, the team of {saved} (give its folder with --team)"
         raise Failure(INVALID, f"{folder}: {why}")
     return team, folder
 
@@ -134,19 +135,19 @@ def _is_team_of(outcome: Outcome, team: Team) -> bool:
     names = {robot.name for robot in robots}
     variables = {variable.name for robot in robots for variable in robot.variables}
     epochs = outcome.epochs
-    there = {*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)}
+    mentioned = {*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)}
     decided = {*outcome.assignment, *(name for epoch in epochs for name in epoch.assignment)}
-    return there <= names and decided <= variables
+    return mentioned <= names and decided <= variables
 
 
-def _usual_folder(outcome: Outcome) -> Path | None:
-    """Return the folder in which `generate` puts teams of that name. None: there is no such folder."""
+def _default_folder(outcome: Outcome) -> Path | None:
+    """Return the folder to which `generate` writes teams of that name; None if it does not exist."""
     name = Path(outcome.team).name
     folder = Path("instances") / name
     return folder if name not in {"", ".."} and folder.is_dir() else None
 
 
-def _refused(file: Path, why: str, next_step: str) -> Failure:
+def _failure(file: Path, why: str, next_step: str) -> Failure:
     from robochoc.formats import on_one_line
 
     return Failure(INVALID, on_one_line(f"{file}: {why} ({next_step})"))

@@ -1,4 +1,4 @@
-"""Commands with many options: their help has named sections, and the options that most runs need stand first."""
+"""Commands whose help has named sections, with the most used options first."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ COMMON = "Common options"
 """The title of the first section."""
 REST = "Other options"
 _COLUMN = 26
-"""Characters. A longer option has a line of its own before its text."""
+"""Characters. The text of a longer option starts on the next line."""
 _OBVIOUS = re.compile(r"; x>=?[01](?=\])|\s*\[(x>=?[01]|[\d.e-]+<=x<=[\d.e-]+)\]")
-"""The parts of click's texts on number ranges that every reader expects. They are left out."""
+"""Obvious number ranges in click's texts, which are left out."""
 
 
 class SectionedCommand(click.Command):
     """A command whose help shows its options in sections.
 
     Args:
-        sections: Each option by one of its spellings. An option that is in no section stands at the end.
+        sections: Each option by one of its spellings. Options without a section are listed last.
     """
 
     def __init__(self, *args: Any, sections: Sections, **kwargs: Any) -> None:  # noqa: ANN401 - click's own
@@ -33,10 +33,10 @@ class SectionedCommand(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, section by section."""
-        options = [one for one in self.get_params(ctx) if isinstance(one, click.Option)]
-        parameters = {spelling: one for one in options for spelling in one.opts}
+        options = [option for option in self.get_params(ctx) if isinstance(option, click.Option)]
+        parameters = {spelling: option for option in options for spelling in option.opts}
         placed = {spelling for spellings in self.sections.values() for spelling in spellings}
-        rest = [one.opts[0] for one in options if not placed.intersection(one.opts)]
+        rest = [option.opts[0] for option in options if not placed.intersection(option.opts)]
         for title, spellings in {**self.sections, REST: rest}.items():
             records = (parameters[spelling].get_help_record(ctx) for spelling in spellings)
             rows = [(names, _OBVIOUS.sub("", text)) for names, text in filter(None, records)]

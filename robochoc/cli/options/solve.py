@@ -1,4 +1,4 @@
-"""Options that `robochoc solve` and `robochoc master` share, and how those of `solve` are parsed."""
+"""Options that `robochoc solve` and `robochoc master` share, and the parsing of the options of `solve`."""
 
 from __future__ import annotations
 
@@ -12,42 +12,43 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from robochoc.cli.options.channel import channel_for
 from robochoc.cli.options.local_problems import limits
-from robochoc.cli.options.names import ProtocolName
-from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.order import GIVEN
 from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
-from robochoc.cli.reports.failures import failures_told
-from robochoc.cli.reports.live_sniffer import Watching
+from robochoc.cli.options.value_types import NameOrFile, Number, ProtocolName, WholeNumber
+from robochoc.cli.reports.failures import errors_as_failures
+from robochoc.cli.reports.live_sniffer import SnifferRequest
 from robochoc.communication.kill_schedule import Kill
 from robochoc.run.defaults import AUTO
 
 if TYPE_CHECKING:
+    from robochoc.communication.simulator.channel import ChannelModel
     from robochoc.run.options import Options
 
 Command = TypeVar("Command", bound=Callable[..., object])
 WITHDRAWALS = ("minimum", "maximal")
 _FORMER = {"fewest": "minimum"}
 """Spellings of earlier versions."""
+CHANNEL_NAMES = ("wlan", "wpan", "wman", "wwan")
+CHANNEL_TYPE = NameOrFile("channel", CHANNEL_NAMES)
 
 
 class WithdrawalName(click.Choice[str]):
-    """A name in `WITHDRAWALS`, or what an earlier version called it."""
+    """A name in `WITHDRAWALS`, or its spelling in an earlier version."""
 
     def __init__(self) -> None:
         super().__init__(WITHDRAWALS)
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the name. Fail, as wrong usage, where it is none."""
+        """Return the name in today's spelling."""
         return super().convert(_FORMER.get(value, value), param, ctx)
 
 
 def protocol_option(*, central: bool) -> Callable[[Command], Command]:
-    """Return the option `--protocol NAME`; `central` says that there may also be no protocol, but one model."""
-    alone = "; central: no robots, one model of all files" if central else ""
-    words = f"The protocol, as 'robochoc protocols' lists them; auto: one that suits the team{alone}."
+    """Return the option `--protocol NAME`; with `central`, its help also explains the central solver."""
+    alone = "; central: one model, no robots" if central else ""
+    words = f"Protocol ('robochoc protocols' lists them); auto: chosen by the problem{alone}."
     return click.option("--protocol", type=ProtocolName(), default=AUTO, show_default=True, metavar="NAME", help=words)
 
 
@@ -63,21 +64,21 @@ withdraw_option = click.option(
     type=WithdrawalName(),
     metavar="[=KIND]",
     help=(
-        "If the team has no solution, withdraw robots. minimum (without a word): as few as possible, by weight, proven;"
-        " maximal: nobody can be added, found fast."
+        "If the team has no solution, withdraw robots. minimum (default): least total weight, proven; maximal: no"
+        " withdrawn robot can be added again, found fast."
     ),
 )
 deadline_option = click.option(
     "--deadline",
     type=Number(0, min_open=True),
     metavar="SECONDS",
-    help="Stop by then with the best solution so far.",
+    help="Stop after this time with the best solution found.",
 )
 preprocess_option = click.option(
     "--preprocess",
     type=click.Choice(["ac"]),
     metavar="ac",
-    help="First make domains arc consistent: ac.",
+    help="Before the search, make domains arc consistent: ac.",
 )
 messages_option = click.option(
     "--messages",
@@ -93,13 +94,13 @@ class KillType(click.ParamType[Kill]):
     name = "kill"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Kill:
-        """Return the robot and the time. Fail, as wrong usage, where they are none."""
+        """Return the robot and the time."""
         robot, _, seconds = value.rpartition("@")
         with suppress(ValueError):
             after_s = float(seconds)
             if robot and 0 <= after_s < math.inf:
                 return Kill(robot, after_s)
-        return self.fail(f"{value!r} is not ROBOT@SECONDS, such as Robot2.6@0.5", param, ctx)
+        return self.fail(f"{value!r} is not of the form ROBOT@SECONDS, such as Robot2.6@0.5", param, ctx)
 
 
 kill_option = click.option(
@@ -107,14 +108,14 @@ kill_option = click.option(
     type=KillType(),
     multiple=True,
     metavar="ROBOT@SECONDS",
-    help="Kill the robot's process after so long. Repeatable.",
+    help="Kill a robot's process at this time. Repeatable.",
 )
 filter_option = click.option(
     "--filter",
     "filters",
     multiple=True,
     metavar="NAME",
-    help="Network: filters: signed, sealed, others. Repeatable.",
+    help="Network: signed, sealed or another filter. Repeatable.",
 )
 
 
@@ -123,17 +124,17 @@ _SAME_NAMES = (
     "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
     "central_with",
 )  # fmt: skip
-"""Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
+"""Arguments of `robochoc solve` with the same name in `robochoc.run.Options`."""
 
 
 class SolveCommand(SectionedCommand):
-    """A command whose `--withdraw`, `--spare` and `--sniff` may stand alone.
+    """A command whose `--withdraw`, `--spare` and `--sniff` have an optional value.
 
-    The word after one of them is its value if it fits.
+    The word after one of them is its value if it is valid as such.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Give an option that stands alone its value."""
+        """Add the default value to each such option that has none."""
         plain = args.index("--") if "--" in args else len(args)
         for place, word in enumerate(args[:plain]):
             following = args[place + 1] if place + 1 < len(args) else ""
@@ -152,38 +153,38 @@ class SolveCommand(SectionedCommand):
 
 
 def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str]) -> None:
-    """Raise `click.UsageError` unless `word`, behind an option that may stand alone, is an option or a path.
+    """Raise `click.UsageError` unless `word`, after an option without its value, is an option or an existing path.
 
-    Else it is one of the option's `values`, misspelt, and the path that it would be taken for is not there. The shell
-    completes words that are not finished: then nothing is checked.
+    Any other word is one of the option's `values`, misspelt: it would be read as a path. Nothing is checked while the
+    shell completes an unfinished word.
     """
     if ctx.resilient_parsing or not word or word.startswith("-") or os.path.lexists(word):
         return
     hint = f": {' or '.join(values)}" if values else ""
-    raise click.UsageError(f"{word!r} is no {kind} and no folder{hint}")
+    raise click.UsageError(f"{word!r} is neither a {kind} nor a folder{hint}")
 
 
 def _names_robots(word: str) -> bool:
-    """Return whether `word` can be patterns of robots' names, and not the next option or a team's path."""
+    """Return whether `word` can be patterns of robots' names, rather than the next option or a team's path."""
     return bool(word) and not word.startswith("-") and "/" not in word and not Path(word).exists()
 
 
 @dataclass(frozen=True)
-class Products:
-    """The products of a run besides the printed result."""
+class Outputs:
+    """The outputs of a run besides the printed result."""
 
     html: Path | None
     journal: Path | None
     serve: bool
-    watching: Watching | None = None
+    sniffer: SnifferRequest | None = None
 
     def __bool__(self) -> bool:
-        return bool(self.html or self.journal or self.serve or self.watching)
+        return bool(self.html or self.journal or self.serve or self.sniffer)
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """The request for each team: the order (None: not asked for), how files are read, and what is told."""
+class TeamRequest:
+    """The options that apply to each team: order (None: not given), reading of its files, and printed output."""
 
     order: str | Path | None
     dialect: str | None
@@ -194,28 +195,41 @@ class Wanted:
     ros: RosOptions
 
 
+def channel_for(channel: str | Path | None) -> ChannelModel | None:
+    """Return the channel model of a name or a file.
+
+    Raises:
+        InvalidInputError: the file is not a valid channel model.
+    """
+    if channel is None:
+        return None
+    from robochoc.communication.simulator.channel import CHANNELS, read_channel
+
+    return read_channel(channel) if isinstance(channel, Path) else CHANNELS[channel]
+
+
 def protocol_settings(given: Iterable[str]) -> dict[str, str]:
-    """`NAME=VALUE`, parsed; the last one of a name counts."""
+    """Parse words `NAME=VALUE`; of several values for a name, the last counts."""
     found = {}
     for word in given:
         name, equals, value = word.partition("=")
         if not equals or not name:
             raise click.UsageError(
-                f"--set takes NAME=VALUE, not {word!r}; robochoc protocols NAME shows what can be set"
+                f"--set requires NAME=VALUE, not {word!r}; 'robochoc protocols NAME' lists the parameters"
             )
         found[name] = value
     return found
 
 
 def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
-    """Take the options of a run out of the arguments of `robochoc solve`.
+    """Make the options of a run from the arguments of `robochoc solve`.
 
     Args:
-        arguments: the command's arguments; those that are used are taken out, but for protocol and order.
+        arguments: the command's arguments; those that are used are removed, except protocol and order.
         environment: whether the robots' situation changes the problem.
 
     Raises:
-        click.UsageError: for options that do not go together (`robochoc.run.compatibility.option_rules`).
+        click.UsageError: for options that cannot be combined (`robochoc.run.compatibility.option_rules`).
         Failure: for a channel that cannot be read.
     """
     from robochoc.run.compatibility.option_rules import refuse_options
@@ -223,8 +237,8 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
 
     for name in ("timeout", "deadline"):
         if arguments[name] is not None and not arguments[name] > 0:
-            raise click.UsageError(f"--{name} takes a number of seconds")
-    options = _take_options(arguments)
+            raise click.UsageError(f"--{name} requires a number of seconds greater than 0")
+    options = _pop_options(arguments)
     try:
         refuse_options(options, environment=environment)
     except UnsupportedError as refused:
@@ -232,14 +246,14 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
     return options
 
 
-def _take_options(arguments: dict[str, Any]) -> Options:
+def _pop_options(arguments: dict[str, Any]) -> Options:
     from robochoc.run.options import Options
 
-    with failures_told("--channel"):
+    with errors_as_failures("--channel"):
         channel = channel_for(arguments.pop("channel"))
     return Options(
         protocol=arguments["protocol"],
-        order=() if arguments["order"] not in {None, GIVEN} else None,  # which one, each team's robots say
+        order=() if arguments["order"] not in {None, GIVEN} else None,  # made for each team later
         local=limits(
             arguments.pop("local_solutions"), arguments.pop("local_timeout"), always_ace=arguments.pop("always_ace")
         ),
@@ -250,22 +264,22 @@ def _take_options(arguments: dict[str, Any]) -> Options:
     )
 
 
-def check_products(products: Products, wanted: Wanted, options: Options, *, teams: int) -> None:
-    """Raise `click.UsageError` for products that would be empty, or that are for one team only."""
-    if wanted.explain and wanted.as_json:
+def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, teams: int) -> None:
+    """Raise `click.UsageError` for outputs that would be empty, or that are possible for one team only."""
+    if request.explain and request.as_json:
         raise click.UsageError(
-            "--explain goes without --json: the JSON result always has what was chosen, and the tree"
+            "--explain cannot be used with --json: the JSON result always includes the choice and the tree"
         )
-    if options.count and options.protocol == "central" and (products or wanted.ros):
-        nothing = "--ros" if wanted.ros else "--html, --journal, --serve or --sniff"
-        raise click.UsageError(f"--count gives only a number: drop {nothing}")
-    if options.bounds and not products.journal:
-        raise click.UsageError("--bounds is of the journal: add --journal FILE")
-    if options.runtime == "arrays" and (products.journal or products.watching):
-        raise click.UsageError("--journal and --sniff show messages, and --runtime arrays sends none: drop it")
-    if products.serve and products.watching:
-        raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
-    if wanted.ros and teams > 1:
-        raise click.UsageError(f"--ros and --situation are for one team; {teams} were found")
-    if products and teams > 1:
-        raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {teams} were found")
+    if options.count and options.protocol == "central" and (outputs or request.ros):
+        nothing = "--ros" if request.ros else "--html, --journal, --serve or --sniff"
+        raise click.UsageError(f"--count reports only a number: remove {nothing}")
+    if options.bounds and not outputs.journal:
+        raise click.UsageError("--bounds writes to the journal: add --journal FILE")
+    if options.runtime == "arrays" and (outputs.journal or outputs.sniffer):
+        raise click.UsageError("--journal and --sniff show messages, but --runtime arrays sends none: remove it")
+    if outputs.serve and outputs.sniffer:
+        raise click.UsageError("--serve cannot be used with --sniff, whose page shows the scene, too")
+    if request.ros and teams > 1:
+        raise click.UsageError(f"--ros and --situation accept one team; {teams} were found")
+    if outputs and teams > 1:
+        raise click.UsageError(f"--html, --journal, --serve and --sniff accept one team; {teams} were found")

@@ -1,4 +1,4 @@
-"""The choice of a protocol and an order, for people: `robochoc solve --explain`, and a note where a run takes long."""
+"""The reasons for a choice of protocol and order (`robochoc solve --explain`), and a note on order in slow runs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from robochoc.run.options import Options
 
 LONG_S = 5.0
-"""Seconds of a search after which it is said that another order is usually faster."""
+"""Seconds of a search after which the note on a faster order is printed."""
 
 
 def choice_lines(choice: Choice) -> Iterator[str]:
-    """Yield what is known of the team, and why other protocols were not chosen; nothing where one was asked for."""
+    """Yield the facts about the team and the reasons against other protocols; nothing if the user named a protocol."""
     if choice.facts:
         yield f"  the team: {'; '.join(choice.facts)}"
     for name, why in choice.rejected:
@@ -28,10 +28,10 @@ def choice_lines(choice: Choice) -> Iterator[str]:
 
 
 def rules_text() -> str:
-    """Return how a protocol and an order are chosen."""
-    head = "auto: no protocol of its own. It takes the first of these that suits the team and accepts all options"
+    """Return a text with the rules by which a protocol and an order are chosen."""
+    head = "auto: not a protocol, but the choice of the first one below that suits the team and supports all options"
     rules = [line for rule in RULES for line in _rule_lines(rule)]
-    return "\n".join([head, *rules, *ORDERS_TEXT, "next: robochoc solve --explain says it of a team"])
+    return "\n".join([head, *rules, *ORDERS_TEXT, "next: robochoc solve --explain shows the choice for a team"])
 
 
 def _rule_lines(rule: Rule) -> Iterator[str]:
@@ -40,32 +40,32 @@ def _rule_lines(rule: Rule) -> Iterator[str]:
 
 
 class OrderNote:
-    """Says once, on standard error, that another order is usually faster than the files', where a run takes long."""
+    """A note on standard error, printed once in a slow run: another order is usually faster than that of the files."""
 
     def __init__(self, team: Team, options: Options) -> None:
         self._team, self._options = team, options
-        self._told = False
+        self._printed = False
 
-    def watching(self, show: Callable[[Progress], None] | None) -> Callable[[Progress], None] | None:
-        """Return `show`, which shows the progress, and says it after a while."""
+    def observing(self, show: Callable[[Progress], None] | None) -> Callable[[Progress], None] | None:
+        """Return a function that calls `show` with the progress, and prints the note when the run is slow."""
         if show is None:
             return None
 
-        def shown(progress: Progress) -> None:
+        def observe(progress: Progress) -> None:
             if progress.messages:
-                self.tell_if_late(progress.elapsed_s)
+                self.print_if_slow(progress.elapsed_s)
             show(progress)
 
-        return shown
+        return observe
 
-    def tell_if_late(self, seconds: float) -> None:
-        """Say it if the search has taken so many `seconds`, and it was not said."""
-        if self._told or seconds < LONG_S:
+    def print_if_slow(self, elapsed_s: float) -> None:
+        """Print the note if the search has been slow and the note is not printed yet."""
+        if self._printed or elapsed_s < LONG_S:
             return
-        self._told = True
+        self._printed = True
         order = faster_order(self._team, self._options)
         if order:
             name = on_one_line(self._team.name)
             print_above(
-                f"{name}: --order {order} is usually faster than the files'; --protocol auto chooses one itself"
+                f"{name}: --order {order} is usually faster than the order of the files; --protocol auto chooses one"
             )

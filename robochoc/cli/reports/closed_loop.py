@@ -1,12 +1,12 @@
-"""The report of a closed loop: what was published, what could not be used, and the simulated flight."""
+"""The report of a closed loop: published decisions, unusable reports of robots, and the simulated flight."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from robochoc.cli.options.ros import FLIGHT, RosOptions
 from robochoc.cli.reports.failures import LOST
 
 if TYPE_CHECKING:
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from robochoc.ros.closed_loop import ClosedLoop
 
 
-def told_of(loop: ClosedLoop) -> list[str]:
-    """Return the lines on what was published where, and on reports that could not be used."""
+def publication_lines(loop: ClosedLoop) -> list[str]:
+    """Return a line for each sink, and the notes on reports that could not be used."""
     return [*(f"{publisher.place}: {publisher.summary}" for publisher in loop.publishers), *loop.notes]
 
 
@@ -28,25 +28,30 @@ class FlownMission(NamedTuple):
     flown: FlightLog | None = None
 
 
-def flight_told(loop: ClosedLoop | None, ros: RosOptions, *, quiet: bool) -> FlownMission:
-    """Report the simulated flight and return it. A drone that fell has left the team: that alone is no failure."""
-    if loop is None or ros.situation != FLIGHT:
-        return FlownMission()
-    from robochoc.cli.reports.flight import as_planned, how_it_went, too_late
+def report_flight(loop: ClosedLoop, failures: Sequence[tuple[str, float]], *, quiet: bool) -> FlownMission:
+    """Print and return the simulated flight.
 
-    flight = _flown_by(loop)
+    Args:
+        loop: The closed loop of a simulated flight.
+        failures: The drones of --fail, with the seconds at which they fail.
+        quiet: Whether to print nothing.
+    """
+    from robochoc.cli.reports.flight import as_planned, flight_summary, late_failures
+
+    flight = _simulated_flight(loop)
     if flight is None:
         return FlownMission()
     mission, flown = flight
     if not quiet:
-        click.echo(how_it_went(flown))
-        for line in too_late(ros.flight.get("failures", ()), flown):
+        click.echo(flight_summary(flown))
+        for line in late_failures(failures, flown):
             click.echo(line, err=True)
+    # A drone that fell has left the team: that alone is not a failure.
     return FlownMission(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
 
 
-def _flown_by(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
-    """Return the mission and the log of the simulated flight. None if nothing was flown."""
+def _simulated_flight(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
+    """Return the mission and the log of the simulated flight; None if nothing was flown."""
     from robochoc.ros.simulated_feedback import SimulatedFeedback
 
     flown = loop.feedback.flown() if isinstance(loop.feedback, SimulatedFeedback) else None

@@ -1,4 +1,4 @@
-"""The sizes of compiled local problems, for people and for machines."""
+"""The report of `robochoc compile`: the sizes of compiled local problems, as a table and as JSON."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.compile import Compilation, CompileTimeoutError
 from robochoc.solver.domain import TooManySolutionsError
 
-Found = Compilation | TooManySolutionsError | CompileTimeoutError
-"""A robot's compilation, or the limit that it reached."""
+CompileResult = Compilation | TooManySolutionsError | CompileTimeoutError
+"""A robot's compilation, or the limit that was reached."""
 
 
-def sizes_json(team: Team, found: Sequence[Found], seconds: float) -> bytes:
-    """Return one JSON object. A robot that reached a limit has a `reason`, and null for all that is unknown."""
-    rows = [_row(team, one) for one in found]
+def sizes_json(team: Team, results: Sequence[CompileResult], seconds: float) -> bytes:
+    """Return one JSON object. A robot that reached a limit has a `reason`, and null for unknown values."""
+    rows = [_row(team, result) for result in results]
     return msgspec.json.encode({"team": encodable(team.name), "seconds": round(seconds, 6), "robots": rows})
 
 
-def print_sizes(team: Team, found: Sequence[Found], seconds: float, folder: Path) -> None:
-    """Print the table, the robots without local solution, and the next step."""
+def print_sizes(team: Team, results: Sequence[CompileResult], seconds: float, folder: Path) -> None:
+    """Print the table, the robots without local solutions, and the next step."""
     click.echo(on_one_line(team.name))
     costs = ("cost",) if team.kind == ProblemKind.DISWCSP else ()
     numbers = ("variables", "seen", "private", "local", "groups", *costs, "time")
-    print_table(("robot", *numbers, "how"), [_cells(_row(team, one), costs) for one in found], right=numbers)
-    empty = [one.robot for one in found if isinstance(one, Compilation) and not one.domain.values]
+    print_table(("robot", *numbers, "how"), [_cells(_row(team, result), costs) for result in results], right=numbers)
+    empty = [result.robot for result in results if isinstance(result, Compilation) and not result.domain.values]
     if empty:
         names = on_one_line(", ".join(empty))
-        click.echo(f"without local solution: {names}; so the team has no solution")
+        click.echo(f"without local solutions: {names}; so the team has no solution")
     next_step = "" if empty else f"; next: robochoc solve {on_one_line(encodable(str(folder)))}"
-    click.echo(f"{len(found)} robot{'s' * (len(found) != 1)}, {seconds:.2f} s{next_step}")
+    click.echo(f"{len(results)} robot{'s' * (len(results) != 1)}, {seconds:.2f} s{next_step}")
 
 
-def _row(team: Team, one: Found) -> dict[str, Any]:
-    """Return what is known of a robot. `seconds` includes the start of ACE for the first robot that needs it."""
-    robot = team[one.robot]
+def _row(team: Team, result: CompileResult) -> dict[str, Any]:
+    """Return a robot's entry. `seconds` includes the start of ACE for the first robot that needs it."""
+    robot = team[result.robot]
     row: dict[str, Any] = {
         "robot": encodable(robot.name),
         "variables": len(robot.variables),
@@ -49,12 +49,13 @@ def _row(team: Team, one: Found) -> dict[str, Any]:
         "private_constraints": len(robot.private),
         **dict.fromkeys(("local_solutions", "groups", "seconds", "source")),
     }
-    if not isinstance(one, Compilation):
-        return {**row, "reason": str(one)}
-    known = {"local_solutions": one.domain.total, "groups": len(one.domain.values)}
-    if one.domain.costs and team.kind == ProblemKind.DISWCSP:
-        known |= {"cheapest": int(min(one.domain.costs)), "dearest": int(max(one.domain.costs))}
-    return {**row, **known, "seconds": round(one.seconds, 6), "source": str(one.source)}
+    if not isinstance(result, Compilation):
+        return {**row, "reason": str(result)}
+    domain = result.domain
+    known = {"local_solutions": domain.total, "groups": len(domain.values)}
+    if domain.costs and team.kind == ProblemKind.DISWCSP:
+        known |= {"cheapest": int(min(domain.costs)), "dearest": int(max(domain.costs))}
+    return {**row, **known, "seconds": round(result.seconds, 6), "source": str(result.source)}
 
 
 def _cells(row: dict[str, Any], costs: Sequence[str]) -> list[str]:

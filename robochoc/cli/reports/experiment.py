@@ -1,4 +1,4 @@
-"""Studies on the terminal: the plan, the progress, and what came of them."""
+"""Studies on the terminal: their plan, progress and results."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MINUTE_S, _HOUR_S = 60, 3600
 
 @contextmanager
 def progress_of(name: str) -> Iterator[Callable[[StudyProgress], None] | None]:
-    """Give a function that shows how far a study is, on the last line of a terminal; None elsewhere."""
+    """Give a function that shows the progress of a study on the last line of a terminal; None elsewhere."""
     from robochoc.communication.run_result import Progress
 
     with progress_line(name) as show:
@@ -35,15 +35,15 @@ def progress_of(name: str) -> Iterator[Callable[[StudyProgress], None] | None]:
             yield None
             return
 
-        def told(now: StudyProgress) -> None:
+        def show_progress(now: StudyProgress) -> None:
             left = f", about {duration(now.left_s)} left" if now.left_s else ""
             show(Progress(0, now.elapsed_s, f"{now.done:,} of {now.planned:,} runs{left}"))
 
-        yield told
+        yield show_progress
 
 
 def duration(seconds: float) -> str:
-    """Return a time as people say it."""
+    """Return a time in seconds, minutes or hours, depending on its length."""
     if seconds < _MINUTE_S:
         return f"{seconds:.0f} s"
     if seconds < _HOUR_S:
@@ -52,12 +52,12 @@ def duration(seconds: float) -> str:
 
 
 def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[str]:
-    """Yield what a study is going to run, how much of it is there, and about how long the rest takes.
+    """Yield the number of planned runs, of existing results, and the estimated time of the missing runs.
 
     Args:
         study: The study.
         path: The file of its results, which need not exist.
-        again: Runs that have ended so are run again, besides those that always are.
+        again: The statuses of ended runs that are to be repeated, besides those that always are.
     """
     from robochoc.experiments.plan import TooManyRunsError, plan_of
     from robochoc.experiments.results import keys_there, read
@@ -75,11 +75,11 @@ def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[
     ways = on_one_line(", ".join(labels))
     yield f"{on_one_line(study.title)}: {len(plan):,} runs: {problems:,} problems, {len(labels)} ways to run ({ways})"
     there = len(plan) - len(missing)
-    yield f"{on_one_line(str(path))}: {there:,} are there, {len(missing):,} are to be run{_about(missing, rows)}"
+    yield f"{on_one_line(str(path))}: {there:,} done, {len(missing):,} to be run{_estimate(missing, rows)}"
 
 
-def _about(missing: Sequence[Any], rows: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return how long the missing runs take, by what those that are there took; nothing where none is."""
+def _estimate(missing: Sequence[Any], rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the time of the missing runs, estimated from the times of existing ones; empty if there are none."""
     took: dict[str, list[float]] = {}
     for row in rows.values():
         took.setdefault(row["label"], []).append(row["total_s"])
@@ -88,17 +88,17 @@ def _about(missing: Sequence[Any], rows: Mapping[str, Mapping[str, Any]]) -> str
         return ""
     mean = sum(known) / len(known)
     total = sum(sum(times) / len(times) if (times := took.get(task.setup.label)) else mean for task in missing)
-    return f"; about {duration(total)} of one worker"
+    return f"; about {duration(total)} with one worker"
 
 
 def ended_line(name: str, ended: Counter[str]) -> str:
-    """Return how the runs of a study have ended."""
-    told = ", ".join(f"{count:,} {status}" for status, count in ended.most_common())
-    return f"{on_one_line(name)}: {sum(ended.values()):,} runs: {told}"
+    """Return the number of runs of a study with each status."""
+    counts = ", ".join(f"{count:,} {status}" for status, count in ended.most_common())
+    return f"{on_one_line(name)}: {sum(ended.values()):,} runs: {counts}"
 
 
 def print_summary(results: Results, over: str | None, metrics: Sequence[str]) -> None:
-    """Print how far a study is, medians of its metrics, and how its runs have ended."""
+    """Print the progress of a study, medians of its metrics, and the statuses of its runs."""
     rows, count = results.rows, results.planned
     there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
     click.echo(f"{on_one_line(results.title)}: {there}")
@@ -110,7 +110,7 @@ def print_summary(results: Results, over: str | None, metrics: Sequence[str]) ->
 
 
 def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> None:
-    """Print medians, how runs have ended, and who needs least, as the study wishes where nothing else is asked for."""
+    """Print medians, the statuses of runs, and the ranking. The defaults are those in the study's `[report]`."""
     from robochoc.experiments import summary
     from robochoc.experiments.study import study_wishes
 
@@ -132,13 +132,13 @@ def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> 
 
 
 def _print_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
-    """Print a table whose words may come from a file."""
+    """Print a table whose texts may come from a file."""
     heads = [on_one_line(head) for head in heads]
     print_table(heads, [[on_one_line(cell) for cell in line] for line in lines], right=heads[1:])
 
 
 def _print_answers(rows: Rows, metrics: Sequence[str]) -> None:
-    """Print who needs least of each metric, and who does the same as who."""
+    """Print the best way to run for each metric, and the ways to run with equal results."""
     from robochoc.experiments import ranking
 
     for line in ["", *ranking.answers(rows, metrics)]:
@@ -146,11 +146,11 @@ def _print_answers(rows: Rows, metrics: Sequence[str]) -> None:
 
 
 def _print_endings(rows: Rows) -> None:
-    """Print how runs have ended, and with which verdicts, for each way to run."""
+    """Print the statuses and verdicts of runs, for each way to run."""
     from robochoc.experiments.summary import endings
 
     click.echo("\nhow runs ended")
     _print_table(*endings(rows))
-    told = next(((row["reason"], row["label"]) for row in rows if row["status"] not in {"done", "limit"}), None)
-    if told:
-        click.echo(on_one_line(f"{told[1]}: {told[0]}"))
+    failed = next((row for row in rows if row["status"] not in {"done", "limit"}), None)
+    if failed:
+        click.echo(on_one_line(f"{failed['label']}: {failed['reason']}"))

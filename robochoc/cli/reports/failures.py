@@ -1,4 +1,4 @@
-"""Failures as one clear message and an exit status (docs/reference/cli.md)."""
+"""`Failure`: an error that ends a command with a message and an exit status (docs/reference/cli.md)."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ R = TypeVar("R")
 
 
 class Failure(TransferableError, click.ClickException):  # noqa: N818 - it ends a command, as click's do
-    """The command ends with `status`, and its message goes to stderr as it is."""
+    """An error that ends the command with `status`; its message is printed on standard error without a prefix."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
         self.exit_code = status  # type: ignore[misc]  # click reads it off instances
 
     def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002 - click's signature
-        """Say it on stderr, line by line; there may be words of others in it."""
+        """Print the message, line by line. Unprintable characters are escaped: it may quote untrusted input."""
         from robochoc.system.plain_text import on_one_line
 
         click.echo("\n".join(map(on_one_line, self.message.split("\n"))), err=True)
 
 
 def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
-    """Let `command` end with its diagnostics, and status 1, when its input is invalid."""
+    """Make `command` end with the diagnostics and status 1 if its input is invalid."""
 
     @wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -49,14 +49,14 @@ def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
 
 
 def worst(statuses: Iterable[int]) -> int:
-    """The exit status of a command whose parts ended with `statuses`."""
+    """Return the exit status of a command whose parts ended with `statuses`."""
     found = set(statuses)
     return next((status for status in _WORST_FIRST if status in found), 0)
 
 
 @contextmanager
-def failures_told(place: object) -> Iterator[None]:
-    """Turn each foreseen error of the work at `place` into a `Failure` with a message of one line."""
+def errors_as_failures(place: object) -> Iterator[None]:
+    """Turn each foreseen error of the work on `place` into a `Failure` with a message of one line."""
     try:
         yield
     except Exception as error:
@@ -69,7 +69,7 @@ def failures_told(place: object) -> Iterator[None]:
 
 
 def _status(error: Exception) -> int | None:
-    """The exit status that stands for `error`; None for one that should not be. Imports only what may be wanted."""
+    """Return the exit status of `error`; None for an unforeseen error."""
     from robochoc.communication.run_result import RobotsLostError
     from robochoc.formats import InvalidInputError
     from robochoc.run.registry import UnknownProtocolError

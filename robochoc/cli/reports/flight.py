@@ -1,4 +1,4 @@
-"""The report of `robochoc fly` on a flight: a table for people, an object for machines."""
+"""The report of `robochoc fly` on a flight, as a table and as JSON."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 
 ARRIVED_M = 0.1
-"""So near to its place a drone has arrived: in calm air it ends within a millimetre, in gusts within centimetres."""
-_NAMES = 6
+"""A drone this near to its goal has arrived: in calm air it ends within a millimetre, in gusts within centimetres."""
+_MOST_NAMES = 6
 
 
 def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
@@ -27,23 +27,23 @@ def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
 
 
 def flight_report(mission: Mission, flown: FlightLog) -> str:
-    """Leg by leg what was flown, then how it went."""
+    """Return a table of the legs, followed by the summary of the flight."""
     return "\n".join(
-        [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown), how_it_went(flown)]
+        [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown), flight_summary(flown)]
     )
 
 
-def how_it_went(flown: FlightLog) -> str:
+def flight_summary(flown: FlightLog) -> str:
     """Return a text on the flight: events, arrivals, the smallest distance, and the speed of the simulation."""
     lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.events]
-    told = [*lines, _arrival(flown), _apart(flown), *_from_walls(flown), _speed(flown)]
-    return "\n".join(f"  {line}" for line in told)
+    lines += [_arrival(flown), _separation(flown), *_wall_distance(flown), _speed(flown)]
+    return "\n".join(f"  {line}" for line in lines)
 
 
-def too_late(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
-    """Return a line for each of the requested `failures` that came after the end of the flight."""
+def late_failures(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
+    """Return a line for each of the requested `failures` that would be after the end of the flight."""
     return [
-        f"--fail {on_one_line(name)}@{at_s:g}: the flight was over after {flown.simulated_s:.1f} s"
+        f"--fail {on_one_line(name)}@{at_s:g}: the flight ended earlier, after {flown.simulated_s:.1f} s"
         for name, at_s in failures
         if at_s > flown.simulated_s
     ]
@@ -54,10 +54,10 @@ def _verdict(mission: Mission, flown: FlightLog) -> str:
     fallen = [number for number, error in enumerate(flown.errors_m) if not isfinite(error)]
     landing = sum(goal.lands for number, goal in last.items() if number not in fallen)
     flying = sum(not goal.lands for number, goal in last.items() if number not in fallen)
-    counts = {"at their places": flying, "at the edge": landing, "fallen": len(fallen)}
-    told = ", ".join(f"{number} {words}" for words, number in counts.items() if number)
+    counts = {"at their goals": flying, "at the edge": landing, "fallen": len(fallen)}
+    text = ", ".join(f"{number} {words}" for words, number in counts.items() if number)
     plural = "s" * (len(flown.names) != 1)
-    return f"{len(flown.names)} drone{plural}: {told or 'nobody has anywhere to go'}"
+    return f"{len(flown.names)} drone{plural}: {text or 'no drone has a goal'}"
 
 
 def _legs(mission: Mission, flown: FlightLog) -> Iterator[str]:
@@ -85,34 +85,34 @@ def _movers(leg: Leg) -> tuple[str, str]:
 def _arrival(flown: FlightLog) -> str:
     away = [number for number, error in enumerate(flown.errors_m) if isfinite(error) and error > ARRIVED_M]
     fallen = [number for number, error in enumerate(flown.errors_m) if not isfinite(error)]
-    whole = max((error for error in flown.errors_m if isfinite(error)), default=0.0)
+    largest = max((error for error in flown.errors_m if isfinite(error)), default=0.0)
     parts = [f"{_names(flown, fallen)} fell"] if fallen else []
     if away:
-        parts.append(f"not at their places: {_names(flown, away)} (up to {_length(whole)} away)")
+        parts.append(f"not at their goals: {_names(flown, away)} (up to {_length(largest)} away)")
     else:
         others = "all others" if fallen else "all"
-        parts.append(f"{others} within {_length(whole)} of where they should be")
+        parts.append(f"{others} within {_length(largest)} of their goals")
     return "; ".join(parts)
 
 
-def _apart(flown: FlightLog) -> str:
+def _separation(flown: FlightLog) -> str:
     near = flown.nearest
-    word = "nearer than set" if near and near.distance_m < flown.distance else "nearest"
+    word = "too near" if near and near.distance_m < flown.distance else "nearest"
     word += f", heights divided by {flown.downwash:g}" * (flown.downwash != 1)
-    told = [f"{word}: {_pair(flown, near)}" if near else "nobody met anybody"]
+    parts = [f"{word}: {_pair(flown, near)}" if near else "no two drones flew at the same time"]
     above = f", {_length(flown.downwash * flown.distance)} above each other" * (flown.downwash != 1)
-    told.append(f"set: {_length(flown.distance)}{above}")
+    parts.append(f"minimum: {_length(flown.distance)}{above}")
     if flown.nearest_fallen:
-        told.append(f"with one that fell: {_pair(flown, flown.nearest_fallen)}")
-    return "; ".join(told)
+        parts.append(f"to a fallen drone: {_pair(flown, flown.nearest_fallen)}")
+    return "; ".join(parts)
 
 
-def _from_walls(flown: FlightLog) -> Iterator[str]:
+def _wall_distance(flown: FlightLog) -> Iterator[str]:
     wall = flown.nearest_wall
     if wall:
-        word = "nearer to a wall than set" if wall.distance_m < wall.set_m else "nearest to a wall"
-        told = f"{_length(wall.distance_m)} ({_name(flown, wall.drone)}, at {wall.at_s:.1f} s)"
-        yield f"{word}: {told}; set: {_length(wall.set_m)}"
+        word = "too near to a wall" if wall.distance_m < wall.set_m else "nearest to a wall"
+        distance = f"{_length(wall.distance_m)} ({_name(flown, wall.drone)}, at {wall.at_s:.1f} s)"
+        yield f"{word}: {distance}; minimum: {_length(wall.set_m)}"
 
 
 def _speed(flown: FlightLog) -> str:
@@ -121,7 +121,7 @@ def _speed(flown: FlightLog) -> str:
 
 
 def _rate(seconds: float, wall_s: float) -> str:
-    """Return how the simulation compares with real time; nothing where neither took any time."""
+    """Return the speed of the simulation relative to real time; empty if either took no time."""
     if seconds <= 0 or wall_s <= 0:
         return ""
     if seconds >= wall_s:
@@ -143,15 +143,15 @@ def _name(flown: FlightLog, number: int) -> str:
 
 
 def _names(flown: FlightLog, numbers: Sequence[int]) -> str:
-    more = f" and {len(numbers) - _NAMES} more" if len(numbers) > _NAMES else ""
-    return ", ".join(_name(flown, number) for number in numbers[:_NAMES]) + more
+    more = f" and {len(numbers) - _MOST_NAMES} more" if len(numbers) > _MOST_NAMES else ""
+    return ", ".join(_name(flown, number) for number in numbers[:_MOST_NAMES]) + more
 
 
 def flight_json(mission: Mission, flown: FlightLog) -> bytes:
-    """The same as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
+    """Return the report as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
     ends = flown.positions[-1] if len(flown.positions) else ()
     legs = zip(mission.legs, flown.legs, strict=True)
-    told = {
+    report = {
         "team": mission.team,
         "scale": mission.scale,
         "as_planned": as_planned(flown),
@@ -161,7 +161,7 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         "downwash": flown.downwash,
         "nearest": _approach(flown, flown.nearest),
         "nearest_fallen": _approach(flown, flown.nearest_fallen),
-        "nearest_wall": _from_wall(flown),
+        "nearest_wall": _wall_approach(flown),
         "drones": [
             {"name": name, "at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
             for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
@@ -174,7 +174,7 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
             {"at_s": event.at_s, "drone": flown.names[event.drone], "what": event.what} for event in flown.events
         ],
     }
-    return msgspec.json.encode(told)
+    return msgspec.json.encode(report)
 
 
 def _approach(flown: FlightLog, nearest: ClosestApproach | None) -> dict[str, object] | None:
@@ -184,7 +184,7 @@ def _approach(flown: FlightLog, nearest: ClosestApproach | None) -> dict[str, ob
     return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
 
 
-def _from_wall(flown: FlightLog) -> dict[str, object] | None:
+def _wall_approach(flown: FlightLog) -> dict[str, object] | None:
     wall = flown.nearest_wall
     if wall is None:
         return None

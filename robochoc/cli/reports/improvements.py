@@ -1,4 +1,4 @@
-"""`--improve`: each better answer is published, and told on standard error, while the search goes on."""
+"""`--improve`: publish each better answer, and print it on standard error, while the search continues."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from robochoc.ros.closed_loop import ClosedLoop
 
 
-class ImprovementsTold:
-    """The audience of a run (`robochoc.run.improvement.Audience`): prints a line for each answer unless `quiet`.
+class ImprovementReporter:
+    """The audience of a run (`robochoc.run.improvement.Audience`), which prints a line for each answer unless `quiet`.
 
-    What is better is published by the closed `loop`, if there is one.
+    Better answers are published by the closed `loop`, if there is one.
     """
 
     def __init__(self, loop: ClosedLoop | None, *, quiet: bool) -> None:
@@ -27,7 +27,7 @@ class ImprovementsTold:
         self._epochs: list[EpochOutcome] = []
 
     def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        """Publish an answer, and print when it came, and what it costs."""
+        """Publish an answer, and print its time and its cost."""
         if len(epoch.improvements) > 1:
             epoch = replace(epoch, opened_by="a better decision")
         self._epochs.append(epoch)
@@ -37,11 +37,11 @@ class ImprovementsTold:
             print_above(self._line(team, epoch))
 
     def has_news(self, team: Team) -> bool:
-        """Return whether robots have reported what changes the problem."""
+        """Return whether robots have reported a change of the problem."""
         return self._loop is not None and self._loop.has_news(team)
 
     def mission(self, outcome: Outcome, team: Team) -> Mission | None:
-        """Return what all answers, one after the other, ask of the drones; None if there was one, or several epochs."""
+        """Return the mission through all answers, one after the other; None for a single answer or several epochs."""
         if len(self._epochs) <= 1 or outcome.epochs:
             return None
         from robochoc.flight.mission import mission_of
@@ -54,9 +54,9 @@ class ImprovementsTold:
         from robochoc.model.problem import ProblemKind
 
         last = epoch.improvements[-1]
-        what = "an optimum" if last.verdict == "optimal" else "a solution"
+        answer = "an optimum" if last.verdict == "optimal" else "a solution"
         shown = "" if last.cost is None or team.kind == ProblemKind.DISCSP else cost_shown(last.cost)
         maximised = any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
         cost = shown and f" {'worth' if maximised else 'of cost'} {shown}"
         without = f", {len(last.withdrawn)} of {len(team.robots)} withdrawn" if last.withdrawn else ""
-        return on_one_line(f"{team.name}: {what}{cost}{without} after {last.at_s:.1f} s")
+        return on_one_line(f"{team.name}: {answer}{cost}{without} after {last.at_s:.1f} s")

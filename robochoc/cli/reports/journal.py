@@ -18,9 +18,9 @@ _WIDTH = 10
 
 
 def journal_report(trace: Trace) -> Iterator[str]:
-    """Lines of text; names in it are strangers', so none breaks its line."""
-    for heading, told in _facts(trace):
-        yield on_one_line(f"{heading:<{_WIDTH}} {told}")
+    """Yield lines of text. Unprintable characters are escaped: names in a journal are untrusted input."""
+    for heading, text in _facts(trace):
+        yield on_one_line(f"{heading:<{_WIDTH}} {text}")
 
 
 def _facts(trace: Trace) -> Iterator[tuple[str, str]]:
@@ -46,8 +46,8 @@ def _facts(trace: Trace) -> Iterator[tuple[str, str]]:
     cannot = data.cannot_replay()
     yield "replay", f"not possible: {cannot}" if cannot else "possible"
     if trace.unseen:
-        yield "unseen", f"{trace.unseen:,} messages were taken in that nobody was seen to send"
-    yield "whole", f"no: {trace.damage}" if trace.damage else "yes"
+        yield "unseen", f"{trace.unseen:,} messages were received whose sending is not recorded"
+    yield "complete", f"no: {trace.damage}" if trace.damage else "yes"
 
 
 def _run(run: RunRecord, messages: int) -> str:

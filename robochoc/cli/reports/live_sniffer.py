@@ -1,4 +1,4 @@
-"""`robochoc solve --sniff`: a viewer's process beside a run, on the journal that the run writes."""
+"""`robochoc solve --sniff`: a page that shows a run live, in its own process, from the run's journal."""
 
 from __future__ import annotations
 
@@ -14,51 +14,51 @@ if TYPE_CHECKING:
     from robochoc.sniffer.viewer import Viewer
 
 _BROWSER_S = 8.0
-"""The longest wait of a run for the page that --open requested, in seconds."""
+"""The longest time that a run waits for the browser of --open, in seconds."""
 
 
 @dataclass(frozen=True)
-class Watching:
-    """The values of --sniff: the robots to begin with (names and patterns), and whether to open a browser."""
+class SnifferRequest:
+    """The values of --sniff and --open: patterns of the robots shown first, and whether to open a browser."""
 
     chosen: tuple[str, ...]
     open_browser: bool
 
 
-def watching(chosen: str | None, *, open_browser: bool) -> Watching | None:
-    """Return what --sniff and --open ask for. Raises `click.UsageError` for --open alone."""
+def sniffer_request(chosen: str | None, *, open_browser: bool) -> SnifferRequest | None:
+    """Return the values of --sniff and --open. Raises `click.UsageError` for --open without --sniff."""
     if chosen is None:
         if open_browser:
-            raise click.UsageError("--open is for the page of --sniff")
+            raise click.UsageError("--open requires --sniff")
         return None
     from robochoc.sniffer.patterns import patterns_in
 
-    return Watching(patterns_in(chosen), open_browser)
+    return SnifferRequest(patterns_in(chosen), open_browser)
 
 
-def check_chosen(watching: Watching | None, team: Team) -> None:
-    """Raise `click.UsageError` where a pattern of --sniff fits no robot of `team`, nor any that is to come."""
-    if watching is None or not watching.chosen:
+def check_patterns(request: SnifferRequest | None, team: Team) -> None:
+    """Raise `click.UsageError` if a pattern of --sniff matches no robot of `team` or of its scenario."""
+    if request is None or not request.chosen:
         return
     from robochoc.flight.mission import all_robots
     from robochoc.formats.diagnostics import on_one_line, suggestion
     from robochoc.sniffer.patterns import unmatched
 
     names = [robot.name for robot in all_robots(team)]
-    for pattern in unmatched(names, watching.chosen):
+    for pattern in unmatched(names, request.chosen):
         hint = suggestion(pattern, names, "robots")
-        raise click.UsageError(on_one_line(f"--sniff: no robot of {team.name} is called {pattern!r} ({hint})"))
+        raise click.UsageError(on_one_line(f"--sniff: {team.name} has no robot called {pattern!r} ({hint})"))
 
 
-class Watch:
-    """The viewer of one run, if there is to be one; it is over when the `with` is."""
+class LiveSniffer:
+    """A context manager with the viewer of one run, if one is requested. On exit, the viewer ends."""
 
-    def __init__(self, watching: Watching | None) -> None:
-        self._watching = watching
+    def __init__(self, request: SnifferRequest | None) -> None:
+        self._request = request
         self._viewer: Viewer | None = None
         self._file: IO[bytes] | None = None
         self._stack = ExitStack()
-        self._cut = ""
+        self._write_error = ""
 
     def __enter__(self) -> Self:
         return self
@@ -66,50 +66,50 @@ class Watch:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def begun(self) -> list[Callable[[bytes], object]]:
-        """Start the viewer and return the functions that write the journal's blocks for it. Without a viewer: none.
+    def start(self) -> list[Callable[[bytes], object]]:
+        """Start the viewer, and return the functions that write the journal's blocks for it; none without a viewer.
 
-        The blocks go to an unnamed file, which disappears with the program. The viewer's URL is printed, and a browser
-        is opened if requested.
+        The blocks are written to an unnamed file, which disappears with the program. The viewer's URL is printed, and a
+        browser is opened if requested.
         """
-        if self._watching is None:
+        if self._request is None:
             return []
         from robochoc.sniffer.viewer import Viewer
         from robochoc.system.temporary_files import unnamed_file
 
         file = unnamed_file(buffered=False)
         self._file = self._stack.enter_context(file)
-        opens = self._watching.open_browser
-        viewer = self._stack.enter_context(Viewer(file.fileno(), self._watching.chosen, open_browser=opens))
+        opens = self._request.open_browser
+        viewer = self._stack.enter_context(Viewer(file.fileno(), self._request.chosen, open_browser=opens))
         self._viewer = viewer
         click.echo(f"{viewer.url} shows the run on this machine", err=True)
         if opens and not viewer.wait_until_seen(_BROWSER_S):
-            click.echo("no browser has shown the page yet; the run begins", err=True)
+            click.echo("no browser has shown the page yet; the run starts without it", err=True)
         return [self._write]
 
-    def stay(self) -> None:
-        """Keep the page until Ctrl-C, unless it is gone."""
+    def wait(self) -> None:
+        """Keep the page until Ctrl-C, or until its process ends."""
         viewer = self._viewer
         if viewer is None:
             return
-        if self._cut:
-            click.echo(f"the page lacks the end of the run: {self._cut}", err=True)
+        if self._write_error:
+            click.echo(f"the page lacks the end of the run: {self._write_error}", err=True)
         if viewer.is_gone:
-            click.echo("the page is gone: its process ended during the run, which went on without it", err=True)
+            click.echo("the page is gone: its process ended during the run, which continued without it", err=True)
             return
-        with suppress(KeyboardInterrupt):  # which may come as soon as it is asked for
+        with suppress(KeyboardInterrupt):  # Ctrl-C may come at any time from here
             viewer.finish()
             click.echo(f"{viewer.url} stays until Ctrl-C", err=True)
             viewer.wait()
             click.echo("the page is gone: its process has ended", err=True)
 
     def _write(self, block: bytes) -> None:
-        """Write a block. If that fails, only the page lacks it: the run goes on."""
-        if self._file is None or self._cut:
+        """Write a block. After an error the page lacks the rest, but the run continues."""
+        if self._file is None or self._write_error:
             return
         try:
             done = 0
             while done < len(block):
                 done += self._file.write(memoryview(block)[done:])
         except OSError as error:
-            self._cut = error.strerror or str(error)
+            self._write_error = error.strerror or str(error)

@@ -1,4 +1,4 @@
-"""What reading a file of another tool has changed, for people."""
+"""Notes on problems of other tools: changes made by the import, and a cost bound."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from robochoc.formats.problems import ReadProblem
 
 _SHOWN = 3
-"""The notes of one kind that are shown."""
+"""The maximum number of notes of one kind that are shown."""
 
 
-def notes_told(notes: Iterable[Note], more: str) -> Iterator[str]:
-    """Yield a line for each note.
+def note_lines(notes: Iterable[Note], more: str) -> Iterator[str]:
+    """Yield a line for each note, up to three of one kind.
 
     Args:
         notes: The notes.
-        more: Where all of them stand: of many of one kind, the first are told.
+        more: The hint where all notes can be found.
     """
     from robochoc.formats import on_one_line
 
@@ -34,19 +34,19 @@ def notes_told(notes: Iterable[Note], more: str) -> Iterator[str]:
             yield f"  {kind}: and {len(texts) - _SHOWN:,} more ({more})"
 
 
-def differences_told(notes: Iterable[Note]) -> Iterator[str]:
-    """Yield a line for each note on what the team says otherwise than the file."""
+def difference_lines(notes: Iterable[Note]) -> Iterator[str]:
+    """Yield a line for each note on a difference between the team and the file."""
     from robochoc.formats.dialects.dialect import OTHER_PROBLEM
 
-    return notes_told((note for note in notes if note.kind in OTHER_PROBLEM), "'robochoc import --report' lists them")
+    return note_lines((note for note in notes if note.kind in OTHER_PROBLEM), "'robochoc import --report' lists them")
 
 
-def bound_told(problem: ReadProblem, cost: Cost | None) -> str:
-    """Return what a cost means for the tool that the problem is from, if it reaches the bound there; or nothing."""
+def bound_warning(problem: ReadProblem, cost: Cost | None) -> str:
+    """Return a warning if a cost reaches the bound in the problem's file, where it is not a solution; else nothing."""
     if problem.bound is None or cost is None:
         return ""
     maximize = problem.team.robots[0].costs.maximize
     if cost > problem.bound if maximize else cost < problem.bound:
         return ""
     side = "above" if maximize else "below"
-    return f"bound: a cost of {cost_shown(cost)} is not {side} the file's bound: there this is no solution"
+    return f"bound: a cost of {cost_shown(cost)} is not {side} the file's bound: by the file this is not a solution"

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from decimal import Decimal
 
 from robochoc.cli.reports.table import table_lines
-from robochoc.cli.reports.tasks import task_table
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.ground_map import GroundMap
@@ -17,7 +16,7 @@ from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
-from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.model.wording import counted
 
 WIDTH = 100
@@ -26,12 +25,14 @@ _LARGE = 1 << 16
 _MOST_DROPPED = 3
 """The maximum number of dropped constraints in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
+_ONLY, _NONE = "task", "none"
+"""A robot with at most one task has one variable, whose first value is none (`formats/dialects/task_list`)."""
 
 
 def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None) -> str:
-    """Return a few lines: what happened and why, the values, the withdrawn and lost robots, and the metrics.
+    """Return the verdict and its reason, the values, the withdrawn and lost robots, and the metrics, as a few lines.
 
-    Beside values that stand for places on the map `ground` of the team are their metres.
+    Values that are places on the map `ground` of the team are followed by their position in metres.
     """
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = team_after_events(team, outcome.events)
@@ -67,14 +68,14 @@ def _dropped(outcome: Outcome) -> list[str]:
 
 
 def _chosen(outcome: Outcome) -> list[str]:
-    """Return a line on what was chosen, if something was, and why."""
-    told = {"protocol": outcome.protocol, "order": f"order {outcome.order}"}
-    words = [f"{told[what]}, as {why}" for what, why in outcome.chosen.items()]
+    """Return a line with the chosen protocol and order, and the reasons; empty if the user gave both."""
+    names = {"protocol": outcome.protocol, "order": f"order {outcome.order}"}
+    words = [f"{names[part]}, as {why}" for part, why in outcome.chosen.items()]
     return [f"  chosen: {'; '.join(words)}"] if words else []
 
 
 def _preprocessing(outcome: Outcome) -> list[str]:
-    """Return a line on what was done before the protocol, if something was."""
+    """Return a line on the preprocessing, if there was any."""
     done = outcome.preprocessing
     if done is None:
         return []
@@ -82,7 +83,7 @@ def _preprocessing(outcome: Outcome) -> list[str]:
 
 
 def _epochs(outcome: Outcome) -> list[str]:
-    """Return a table of the epochs: what opened each, and how it ended."""
+    """Return a table of the epochs, with the event that opened each, and its verdict."""
     if not outcome.epochs:
         return []
     counts = ("seconds",) if outcome.runtime == "central" else ("messages", "NCCCs")
@@ -90,13 +91,13 @@ def _epochs(outcome: Outcome) -> list[str]:
     for number, epoch in enumerate(outcome.epochs):
         verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict == Verdict.NO_SOLUTION)}"
         spent = epoch.metrics
-        told = {
+        cost = {
             "seconds": f"{spent.wall_s:.2f}",
             "messages": f"{sum(spent.messages.values()):,}",
             "NCCCs": f"{spent.ncccs:,}",
         }
         cells = (str(number), shortened(epoch.opened_by), str(len(epoch.robots)), verdict)
-        rows.append((*cells, *(told[count] for count in counts)))
+        rows.append((*cells, *(cost[count] for count in counts)))
     headings = ("epoch", "opened by", "robots", "verdict", *counts)
     return [f"  {line}" for line in table_lines(headings, rows, right=("epoch", "robots", *counts))]
 
@@ -114,7 +115,7 @@ def _place(team: Team, outcome: Outcome) -> str:
 
 
 def _verdict(team: Team, outcome: Outcome) -> str:
-    """Return what happened, in a few words, then why, and how it was checked."""
+    """Return the verdict, its reason, and how it was checked."""
     is_impossible = outcome.verdict == Verdict.NO_SOLUTION
     why = outcome.reason if outcome.reason and (is_impossible or not outcome.epochs) else outcome.ruled_out
     because = f" ({why})" if why else ""
@@ -135,16 +136,16 @@ def _verdict(team: Team, outcome: Outcome) -> str:
             return f"{headline}{proof}{unfinished}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             by = _by_the_deadline(outcome)
-            whole = (
-                f"{by.strip()}, nobody has proven more"
+            rest = (
+                f"{by.strip()}, not proven to be the minimum"
                 if by
                 else f"no solution{left or ' for the whole team'}{because}"
             )
-            return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
+            return f"{headline}; {rest}; {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
 
 
 def _is_unfinished(outcome: Outcome) -> bool:
-    """Return whether a solution, which holds, is what robots had when a lost message kept them from going on."""
+    """Return whether the run stopped at a solution, which was checked, because a message was lost."""
     return outcome.verified and outcome.reason is not None and outcome.metrics.lost_messages > 0
 
 
@@ -156,7 +157,7 @@ def _counted(count: int, outcome: Outcome) -> str:
 
 
 def _confirmed(outcome: Outcome) -> str:
-    """Return who has found the same, besides the robots."""
+    """Return the solvers that confirmed the verdict."""
     if not outcome.confirmed:
         return ""
     solvers = ["centrally" if name == CENTRAL_SOLVER else f"by {name}" for name in outcome.confirmed_by]
@@ -164,21 +165,21 @@ def _confirmed(outcome: Outcome) -> str:
 
 
 def _checked(outcome: Outcome) -> str:
-    """Return how the constraints were checked. On several machines that may be by their owners alone."""
+    """Return how the constraints were checked. On several machines, some may be checked by their owner only."""
     if not outcome.verified:
         return f"not checked: {outcome.reason}"
     if outcome.checked is None or not outcome.checked.by_owner:
         return f"checked against every constraint{' that remains' * (not outcome.is_complete)}"
     alone, total = outcome.checked.by_owner, sum(outcome.checked)
-    return f"checked; by their owner alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
+    return f"checked; by their owner only: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
 
 
 def _trusted(team: Team, outcome: Outcome) -> str:
-    """Return which claim could not be checked, and rests on what all robots reported."""
+    """Return the claim that could not be checked, and rests on the reports of all robots."""
     if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
     what = "the minimum withdrawal" if outcome.withdrawn_alive else f"the {_best(team)} cost"
-    return f"; {what} is what all robots report"
+    return f"; {what} is as reported by all robots"
 
 
 def _not_proven(team: Team, outcome: Outcome) -> str:
@@ -191,7 +192,7 @@ def _not_proven(team: Team, outcome: Outcome) -> str:
 
 
 def _by_the_deadline(outcome: Outcome) -> str:
-    """Return when the answer was found, if the time has ended the search."""
+    """Return the time of the answer, if the deadline ended the search."""
     if outcome.deadline is None:
         return ""
     by = f" by the deadline of {outcome.deadline:g} s"
@@ -200,7 +201,7 @@ def _by_the_deadline(outcome: Outcome) -> str:
 
 
 def _maximizes(team: Team) -> bool:
-    """Return whether the team's costs are utilities. Those of a normalised team were, if they are told as such."""
+    """Return whether the team's costs are utilities; of a normalised team, whether they were."""
     return any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
 
 
@@ -209,7 +210,7 @@ def _best(team: Team) -> str:
 
 
 def _side(team: Team) -> str:
-    """Return on which side of the costs of all assignments a bound lies."""
+    """Return whether bounds of the cost are upper or lower bounds."""
     return "upper" if _maximizes(team) else "lower"
 
 
@@ -235,7 +236,7 @@ def _so_far(team: Team, outcome: Outcome) -> str:
         return ""
     verb = "is worth" if _maximizes(team) else "costs"
     known = [f"the best so far {verb} {_number(outcome.cost)}"] if outcome.assignment else []
-    reported = ", as all robots report" if outcome.claimed_by else ""
+    reported = ", as reported by all robots" if outcome.claimed_by else ""
     known += [f"{_side(team)} bound {_number(bound)}{reported}"] if bound else []
     return "; " + ", and ".join(known) if known else ""
 
@@ -248,7 +249,7 @@ def _metrics(outcome: Outcome) -> str:
 
 
 def _spent(spent: Metrics) -> str:
-    """Return what robots have spent on a search."""
+    """Return the messages, NCCCs, checks and time of a search."""
     kinds = sorted(spent.messages.items(), key=lambda item: -item[1])
     types = ", ".join(f"{count:,} {kind}" for kind, count in kinds)
     total = sum(spent.messages.values())
@@ -290,19 +291,19 @@ def _simulated(outcome: Outcome) -> str:
 
 
 def _values(team: Team, assignment: Mapping[str, int | str], places: Mapping[str, Place]) -> list[str]:
-    """Return who does which task, a board, or a list of the values, with their places where these are known."""
+    """Return a table of tasks, a board, or a list of the values, with their places if these are known."""
     if places:
         return _list(team, {name: f"{value}{_at(places.get(name))}" for name, value in assignment.items()})
     return task_table(team, assignment) or _board(team, assignment) or _list(team, assignment)
 
 
 def _at(place: Place | None) -> str:
-    """Return a place in metres, as the options of maps take it, after a value."""
+    """Return the suffix of a value that is a place: its position in metres, in the form of the maps' options."""
     return f" ({','.join(f'{part:.10g}' for part in place)} m)" if place else ""
 
 
 def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
-    """Return a board, if variables are named for cells (`V3.1`) and it is not too wide."""
+    """Return a board, if variables are named after cells (`V3.1`) and it is not too wide."""
     cells = {}
     for name in team.variables:
         match = _CELL.fullmatch(name)
@@ -325,8 +326,42 @@ def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     return _wrapped([values[owner] if alike else f"{owner}: {values[owner]}" for owner in owners])
 
 
+def task_table(team: Team, values: Mapping[str, int | str]) -> list[str]:
+    """Return a table of robots and their tasks (`tasks.yaml`), and the unassigned tasks; empty for other problems."""
+    could = {robot.name: _tasks_of(robot) for robot in team.robots}
+    if not all(could.values()):
+        return []
+    done = {
+        robot: [task for task, (variable, value) in tasks.items() if values.get(variable) == value]
+        for robot, tasks in could.items()
+    }
+    rows = [
+        (robot, ", ".join(tasks) or "-") for robot, tasks in sorted(done.items(), key=lambda row: natural_key(row[0]))
+    ]
+    assigned = {task for tasks in done.values() for task in tasks}
+    left = sorted({task for tasks in could.values() for task in tasks} - assigned, key=natural_key)
+    return [
+        *(f"    {line}" for line in table_lines(("robot", "does"), rows)),
+        *([f"    not assigned: {', '.join(left)}"] if left else []),
+    ]
+
+
+def _tasks_of(robot: Robot) -> dict[str, tuple[str, int | str]]:
+    """Return the variable and the value by which `robot` does each task; empty if the robot has other variables."""
+    first = f"{robot.name}."
+    if [one.name for one in robot.variables] == [first + _ONLY]:
+        only = robot.variables[0]
+        labels = [only.domain.label(value) for value in only.domain]
+        if labels[:1] == [_NONE]:
+            return {str(label): (only.name, label) for label in labels[1:]} or {_NONE: (only.name, 0)}
+    binary = (not one.domain.symbols and set(one.domain) == {0, 1} for one in robot.variables)
+    if all(one.name.startswith(first) for one in robot.variables) and all(binary):
+        return {one.name.removeprefix(first): (one.name, 1) for one in robot.variables}
+    return {}
+
+
 def _listed(team: Team, outcome: Outcome, places: MapPlaces) -> list[str]:
-    """Return the optima that were listed, but for the first, which is the assignment."""
+    """Return the listed optima except the first, which is the assignment."""
     if outcome.optima is None:
         return []
     what = "solution" if outcome.verdict == Verdict.SOLUTION else "optimum"

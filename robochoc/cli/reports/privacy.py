@@ -1,4 +1,4 @@
-"""The report of `robochoc privacy`: a table, robot by robot, and the same as JSON."""
+"""The report of `robochoc privacy`: a table with a row per robot, and JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.model.wording import counted, listed
 from robochoc.privacy import Kind, Measure, PrivacyReport
 
 NOT_KNOWN = "not known"
-_MEANT = {
+_MEASURE_TEXTS = {
     Measure.LINEAR: "by LinearTS (share of the states that are excluded)",
     Measure.ENTROPY: "by EntropyTS (share of the bits that are known)",
     Measure.KNOWN: "as the share of secrets that are known exactly",
@@ -29,7 +29,7 @@ def print_privacy(report: PrivacyReport, measure: Measure) -> None:
     if not kinds:
         click.echo("  no robot has a secret")
     else:
-        click.echo(f"  loss {_MEANT[measure]}, the mean over all other robots")
+        click.echo(f"  loss {_MEASURE_TEXTS[measure]}, the mean over all other robots")
         for line in table_lines(["robot", *kinds], _rows(report, kinds, measure), right=kinds):
             click.echo(f"  {line}")
     for line in _notes(report):
@@ -46,14 +46,14 @@ def _rows(report: PrivacyReport, kinds: list[Kind], measure: Measure) -> Iterato
 
 def _notes(report: PrivacyReport) -> Iterator[str]:
     if report.without_rule:
-        yield f"not known: no rule says what these messages prove: {listed(report.without_rule)}"
+        yield f"not known: no rule defines what these messages prove: {listed(report.without_rule)}"
     if report.undecided:
         yield f"no decisions: {report.undecided}"
 
 
 def privacy_json(report: PrivacyReport) -> str:
-    """Return everything as one JSON object; null stands for a loss that is not known."""
-    told: dict[str, object] = {
+    """Return the report as one JSON object; an unknown loss is null."""
+    fields: dict[str, object] = {
         "team": report.team,
         "protocol": report.protocol,
         "run": report.run,
@@ -66,7 +66,7 @@ def privacy_json(report: PrivacyReport) -> str:
         "without_rule": report.without_rule,
         "undecided": report.undecided,
     }
-    return msgspec.json.format(msgspec.json.encode(told), indent=2).decode()
+    return msgspec.json.format(msgspec.json.encode(fields), indent=2).decode()
 
 
 def _text(loss: float | None) -> str:

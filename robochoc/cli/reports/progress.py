@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 REFRESH_S = 0.1
 TICK_S = 0.5
 _ERASE = "\r\x1b[K"
-"""Go to the beginning of the line, and erase it (ECMA-48)."""
+"""Go to the start of the line, and erase it (ECMA-48)."""
 
 
-def waiting(show: Callable[[Progress], None]) -> Callable[[], None]:
-    """Return a function that shows the elapsed time while the robots have nothing to report."""
+def waiting_for_reports(show: Callable[[Progress], None]) -> Callable[[], None]:
+    """Return a function that shows the elapsed time while no robot reports."""
     from robochoc.communication.run_result import Progress
 
     began = time.monotonic()
-    return lambda: show(Progress(0, time.monotonic() - began, "the robots may report"))
+    return lambda: show(Progress(0, time.monotonic() - began, "waiting for reports of robots"))
 
 
 @contextmanager
 def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows the progress of a run on the last line of a terminal; None if stderr is none.
+    """Give a function that shows the progress of a run on the last line of a terminal; None without a terminal.
 
-    The line is refreshed by calls only: a thread in the background and the forks of a run do not go together.
+    Only calls refresh the line, not a background thread: a run forks processes, which must not happen beside threads.
     """
-    if not _on_a_terminal():
+    if not _is_terminal():
         yield None
         return
     from robochoc.system.plain_text import on_one_line
@@ -83,17 +83,17 @@ def elapsed_time(what: str, stage: str) -> Iterator[None]:
 
 
 def print_above(line: str) -> None:
-    """Print `line` on standard error, where a progress line may stand."""
-    click.echo(f"{_ERASE}{line}" if _on_a_terminal() else line, err=True)
+    """Print `line` on standard error, above a progress line if there is one."""
+    click.echo(f"{_ERASE}{line}" if _is_terminal() else line, err=True)
 
 
-def _on_a_terminal() -> bool:
+def _is_terminal() -> bool:
     return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 @contextmanager
 def stages(team: str) -> Iterator[Callable[[str], None] | None]:
-    """Do as `progress_line` for work that has stages, and no messages to count."""
+    """Give a function like that of `progress_line`, for work with named stages instead of messages."""
     from robochoc.communication.run_result import Progress
 
     began = time.monotonic()

@@ -1,4 +1,4 @@
-"""The installed protocols, for people and for machines."""
+"""The report of `robochoc protocols`: the installed protocols, as a table, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from robochoc.solver import central
 from robochoc.system.compiled_core import docstring
 
 _KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
-"""Traits whose keys in `--json` keep their first names."""
+"""Traits with another key in `--json`: their name in the first version."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One protocol, or the central solver. `traits` is None where it is `broken`."""
+class ProtocolRow:
+    """One protocol, or the central solver. `traits` is None if the protocol is `broken`."""
 
     name: str
     place: str
@@ -34,12 +34,12 @@ class Row:
     traits: Traits | None
     broken: str = ""
     module: str = ""
-    """The module that has its docstring."""
+    """The module with the protocol's docstring."""
     settings: Settings = NO_SETTINGS
-    """Its settings, with the defaults."""
+    """The protocol's settings, with the defaults."""
 
     def is_for(self, purpose: str) -> bool:
-        """Return whether it is for `satisfaction`, `costs` or `asymmetric` costs; a broken one is for nothing."""
+        """Return whether the protocol is for `satisfaction`, `costs` or `asymmetric` costs; a broken one for none."""
         if self.traits is None:
             return False
         kinds = {
@@ -50,19 +50,19 @@ class Row:
         return kinds[purpose]
 
 
-def rows() -> list[Row]:
-    """Return all protocols that `robochoc solve --protocol` accepts, and the broken ones with the reason."""
+def rows() -> list[ProtocolRow]:
+    """Return all protocols that `robochoc solve --protocol` accepts, and the broken ones with their error."""
     return [*map(_row, installed_protocols()), _central_solver()]
 
 
-def protocols_json(found: Sequence[Row], *, explain: bool = False) -> bytes:
+def protocols_json(found: Sequence[ProtocolRow], *, explain: bool = False) -> bytes:
     """Return one JSON object per line. `explain` adds the docstring."""
     encode = msgspec.json.Encoder().encode
     return b"".join(encode(_object(row, explain=explain)) + b"\n" for row in found)
 
 
-def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
-    """Print name, purpose, completeness and use of each protocol, or with `long` all traits; then what is broken."""
+def print_protocols(found: Sequence[ProtocolRow], *, long: bool = False) -> None:
+    """Print name, purpose, completeness and use of each protocol, or with `long` all traits; then broken protocols."""
     headings = ["name", "for", "complete", "use when"]
     if long:
         headings = [
@@ -82,23 +82,23 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
         if row.broken:
             click.echo(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"))
     if not long and sys.stdout.isatty():
-        click.echo("next: robochoc protocols NAME explains one, auto the choice; --long shows papers, privacy and more")
+        click.echo("next: robochoc protocols NAME explains a protocol, 'auto' the choice; --long shows more columns")
 
 
-def protocol_text(row: Row) -> str:
-    """Return the protocol's traits, its place, its parameters and its docstring without the examples."""
+def protocol_text(row: ProtocolRow) -> str:
+    """Return the protocol's traits, its module, its parameters and its docstring without the examples."""
     head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
     place = f"{row.place}, from the package {row.package}"
     about = _docstring(row).partition("\n>>> ")[0].rstrip()
-    return f"{head}\n{place}\n{_settings(row)}\n{about or 'Its module has no docstring.'}"
+    return f"{head}\n{place}\n{_settings(row)}\n{about or 'The module has no docstring.'}"
 
 
-def _settings(row: Row) -> str:
-    """Return the parameters with their defaults and meanings; empty if there are none."""
-    there = msgspec.structs.asdict(row.settings)
-    if not there:
+def _settings(row: ProtocolRow) -> str:
+    """Return the parameters with their defaults and descriptions; empty if there are none."""
+    settings = msgspec.structs.asdict(row.settings)
+    if not settings:
         return ""
-    defaults = "  ".join(f"{name}={value}" for name, value in there.items())
+    defaults = "  ".join(f"{name}={value}" for name, value in settings.items())
     meaning = inspect.cleandoc(type(row.settings).__doc__ or "")
     return f"--set {defaults}\n\n{meaning}\n"
 
@@ -109,12 +109,12 @@ def _in_a_line(traits: Traits) -> str:
         "complete" if traits.complete else "incomplete",
         "one robot acts at a time" if traits.synchronous else "robots act at the same time",
         "constraints between any number of robots" if traits.n_ary else "constraints between two robots",
-        *(["partially known ones too"] if traits.partially_known else []),
-        *(["whose parts may cost"] if traits.asymmetric else []),
-        *(["goes on when the problem changes"] if traits.dynamic else []),
+        *(["also partially known constraints"] if traits.partially_known else []),
+        *(["also asymmetric costs"] if traits.asymmetric else []),
+        *(["continues when the problem changes"] if traits.dynamic else []),
         *(["also as arrays (--runtime arrays)"] if traits.arrays else []),
         *(["task allocations only"] if traits.allocates else []),
-        *(["bears the loss of messages"] if traits.bears_loss else []),
+        *(["tolerates lost messages"] if traits.bears_loss else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
         *([f"paper: {traits.paper}"] if traits.paper else []),
@@ -122,11 +122,11 @@ def _in_a_line(traits: Traits) -> str:
     return "; ".join(words)
 
 
-def _row(offer: InstalledProtocol) -> Row:
+def _row(offer: InstalledProtocol) -> ProtocolRow:
     if offer.protocol is None:
-        return Row(offer.name, offer.place, offer.package, None, offer.broken)
+        return ProtocolRow(offer.name, offer.place, offer.package, None, offer.broken)
     protocol = offer.protocol
-    return Row(
+    return ProtocolRow(
         offer.name,
         offer.place,
         offer.package,
@@ -136,17 +136,17 @@ def _row(offer: InstalledProtocol) -> Row:
     )
 
 
-def _central_solver() -> Row:
-    """Return the central solver, with the traits of a protocol that could do the same."""
+def _central_solver() -> ProtocolRow:
+    """Return the row of the central solver, with the traits of an equivalent protocol."""
     traits = Traits(
-        paper="no protocol: ACE decides all files merged",
+        paper="not a protocol: ACE solves all files merged",
         costs=True,
         partially_known=True,
         asymmetric=True,
         privacy="none",
-        use_when="to check an answer or to count solutions, without robots",
+        use_when="to check an answer or count solutions, without robots",
     )
-    return Row(
+    return ProtocolRow(
         CENTRAL,
         f"{central.CentralSolver.__module__}:CentralSolver",
         f"robochoc {__version__}",
@@ -155,7 +155,7 @@ def _central_solver() -> Row:
     )
 
 
-def _object(row: Row, *, explain: bool) -> dict[str, object]:
+def _object(row: ProtocolRow, *, explain: bool) -> dict[str, object]:
     traits = {_KEYS.get(name, name): value for name, value in asdict(row.traits).items()} if row.traits else {}
     known = {"name": row.name, "place": row.place, "package": row.package, "distributed": row.name != CENTRAL, **traits}
     known["settings"] = msgspec.structs.asdict(row.settings)
@@ -166,13 +166,13 @@ def _object(row: Row, *, explain: bool) -> dict[str, object]:
     return known
 
 
-def _docstring(row: Row) -> str:
-    """Return the docstring of its module; empty if there is none."""
+def _docstring(row: ProtocolRow) -> str:
+    """Return the docstring of the protocol's module; empty if there is none."""
     module = sys.modules.get(row.module)
     return inspect.cleandoc(docstring(module)) if module else ""
 
 
-def _cells(row: Row, headings: Sequence[str]) -> list[str]:
+def _cells(row: ProtocolRow, headings: Sequence[str]) -> list[str]:
     traits = row.traits
     if traits is None:
         return ["broken", *("-" for _ in headings[1:])]

@@ -13,9 +13,10 @@ from robochoc.run.registry import protocol_named
 
 
 def tree_text(outcome: Outcome) -> str:
-    """Return the tree, one robot per line, with its depth and its induced width; or that there is none.
+    """Return the tree, one robot per line, with its depth and induced width; or a note that there is none.
 
-    A run may end while robots still build it. Who knows its place then has no root yet: roots are the last to know.
+    A run may end while robots still build the tree. Then some robots have a parent but there is no root: roots are the
+    last to complete.
     """
     nodes = outcome.tree
     if not nodes and (outcome.verdict != Verdict.UNKNOWN or not _builds_tree(outcome.protocol)):
@@ -59,7 +60,7 @@ def _depth(nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[
 
 
 def _width(nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> int:
-    """Return the size of the largest separator (Dechter 2003, 4.1): robots above that a subtree has to agree with."""
+    """Return the size of the largest separator (Dechter 2003, 4.1): the robots above that share constraints with it."""
     separators: dict[str, set[str]] = {}
     for name in reversed(_from_the_roots(below)):
         above = {name for name in (nodes[name].parent, *nodes[name].pseudo_parents) if name is not None}

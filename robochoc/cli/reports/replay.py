@@ -20,40 +20,40 @@ from robochoc.journal.journal import Journal
 from robochoc.replay import Contradiction, Difference, ReplayResult
 
 LONGEST = 400
-"""Characters of one message's content."""
+"""Characters that are shown of a message's content."""
 MOST = 20
-"""The largest number of messages of a packet that are shown, and of robots that could not be followed."""
+"""The maximum number of messages of a packet, and of robots that could not be replayed, that are shown."""
 
 
 def replay_report(journal: Journal, replayed: ReplayResult) -> str:
-    """For people: a few lines, and the first difference if there is one."""
+    """Return the report as text: the counts, and the first difference if there is one."""
     header = journal.header
     lines = [f"{header.team}: {header.protocol}, runtime {header.runtime}, seed {header.seed}"]
     for what, count in _counts(replayed).items():
         lines.append(f"  {what:9} {count:>12,}")
     lines += _shortfalls(replayed)
     if replayed.difference is not None:
-        lines += _shown(replayed.difference)
+        lines += _difference_lines(replayed.difference)
     elif replayed.contradictions:
-        lines.append("  different, though all steps are the same:" if replayed.steps else "  different:")
-        lines += _contradicted(replayed.contradictions)
+        lines.append("  different, although all steps are the same:" if replayed.steps else "  different:")
+        lines += _contradiction_lines(replayed.contradictions)
     elif replayed.decided_before:
         witness = journal.outcome.witness if journal.outcome else ""
-        lines.append(f"  there are no steps to compare: it was decided before, as {witness} has no solution by itself")
+        lines.append(f"  no steps to compare: the run was decided before it began, as {witness} has no local solution")
     elif not replayed.steps:
-        lines.append("  nothing was compared: it holds no step of any robot that could be played")
+        lines.append("  nothing was compared: the journal has no step of a robot that could be replayed")
     elif replayed.damage and not replayed.truncated:
-        lines.append("  what stands before the damage is the same; this is not the journal that was written")
+        lines.append("  the same up to the damage; but the journal was altered after it was written")
     else:
-        whole = replayed.ended and not (replayed.stopped or replayed.unfinished or replayed.damage)
-        lines.append("  the same" if whole else "  the same, as far as it goes")
+        complete = replayed.ended and not (replayed.stopped or replayed.unfinished or replayed.damage)
+        lines.append("  the same" if complete else "  the same, as far as the journal could be replayed")
     return "\n".join(on_one_line(line) for line in lines)
 
 
 def replay_json(journal: Journal, replayed: ReplayResult) -> str:
-    """The same as one JSON object."""
+    """Return the report as one JSON object."""
     header = journal.header
-    told: dict[str, object] = {
+    fields: dict[str, object] = {
         "team": header.team,
         "protocol": header.protocol,
         "runtime": header.runtime,
@@ -69,7 +69,7 @@ def replay_json(journal: Journal, replayed: ReplayResult) -> str:
         "contradictions": replayed.contradictions,
         "decided_before": replayed.decided_before,
     }
-    return msgspec.json.format(msgspec.json.encode(told), indent=2).decode()
+    return msgspec.json.format(msgspec.json.encode(fields), indent=2).decode()
 
 
 def _counts(replayed: ReplayResult) -> dict[str, int]:
@@ -82,31 +82,31 @@ def _counts(replayed: ReplayResult) -> dict[str, int]:
 
 
 def _shortfalls(replayed: ReplayResult) -> Iterator[str]:
-    """Yield a text for everything that could not be replayed, with the reason."""
+    """Yield a line for each part that could not be replayed, with the reason."""
     if replayed.damage:
         yield f"  the journal {'ends early' if replayed.truncated else 'was altered'}: {replayed.damage}"
     elif not replayed.ended:
-        yield "  the journal does not say how the run ended"
+        yield "  the journal does not contain the end of the run"
     if replayed.unfinished:
-        yield f"  {replayed.unfinished:,} steps are there in part only"
+        yield f"  {replayed.unfinished:,} steps are incomplete"
     for one in replayed.stopped[:MOST]:
-        yield f"  {one.robot} could be followed up to its step {one.step} in run {one.run}: {one.why}"
+        yield f"  {one.robot} could be replayed up to its step {one.step} in run {one.run}: {one.why}"
     if len(replayed.stopped) > MOST:
         yield f"  and {len(replayed.stopped) - MOST:,} more robots"
 
 
-def _shown(difference: Difference) -> Iterator[str]:
+def _difference_lines(difference: Difference) -> Iterator[str]:
     place = f"step {difference.step} of {difference.robot} in run {difference.run} ({difference.protocol})"
-    yield f"  different, first in {place}"
+    yield f"  first difference: {place}"
     if difference.packet:
         for sent in difference.packet[:MOST]:
-            yield f"    took in   {sent.type} from {sent.sender}: {_content(sent.content)}"
+            yield f"    received  {sent.type} from {sent.sender}: {_content(sent.content)}"
         if len(difference.packet) > MOST:
             yield f"    and {len(difference.packet) - MOST:,} more"
     else:
-        yield "    it began"
-    yield f"    recorded  {_said(difference.recorded)}"
-    yield f"    replayed  {_said(difference.replayed)}"
+        yield "    its start"
+    yield f"    recorded  {_event_text(difference.recorded)}"
+    yield f"    replayed  {_event_text(difference.replayed)}"
     names = _differing(difference.recorded, difference.replayed)
     if names:
         yield f"    differs   in {', '.join(names)}"
@@ -114,7 +114,7 @@ def _shown(difference: Difference) -> Iterator[str]:
         yield f"    then it raised {difference.raised}"
 
 
-def _contradicted(found: Sequence[Contradiction]) -> Iterator[str]:
+def _contradiction_lines(found: Sequence[Contradiction]) -> Iterator[str]:
     """Yield lines for each claim of the journal that its steps contradict: what, recorded, replayed."""
     for one in found:
         yield f"    {one.what}"
@@ -123,7 +123,7 @@ def _contradicted(found: Sequence[Contradiction]) -> Iterator[str]:
 
 
 def _differing(recorded: AnyEvent | None, replayed: AnyEvent | None) -> list[str]:
-    """In what two events of one kind differ; of messages, the fields."""
+    """Return the names of the fields, and of a message's content, in which two events of one type differ."""
     if recorded is None or type(recorded) is not type(replayed):
         return []
     left, right = _fields(recorded), _fields(replayed)
@@ -136,22 +136,22 @@ def _fields(event: object) -> dict[str, object]:
     return {**{name: value for name, value in fields.items() if name != "t"}, **content}
 
 
-def _said(event: AnyEvent | None) -> str:
-    """Return a text on what a robot did."""
+def _event_text(event: AnyEvent | None) -> str:
+    """Return a text on the event of a robot."""
     match event:
         case Sent():
-            text = f"said {event.type} to {event.receiver}: {_content(event.content)}, {event.bytes:,} bytes"
+            text = f"sent {event.type} to {event.receiver}: {_content(event.content)}, {event.bytes:,} bytes"
         case Received():
-            text = f"took in {event.type} from {event.sender}"
+            text = f"received {event.type} from {event.sender}"
         case Decided():
             values = ", ".join(f"{name} = {value}" for name, value in event.assignment.items())
-            text = f"decided {_cut(values) or 'that it has no value'}"
+            text = f"decided {_cut(values) or 'to have no value'}"
         case Heard():
-            text = f"heard of an assignment that costs {event.cost:g}: {_content(event.values)}"
+            text = f"received an assignment of cost {event.cost:g}: {_content(event.values)}"
         case Concluded():
             text = f"concluded {event.verdict}"
         case Settled():
-            text = f"was done, after {event.checks:,} checks"
+            text = f"ended its step, after {event.checks:,} checks"
         case _:
             text = "nothing more" if event is None else type(event).__name__
     clock = getattr(event, "clock", None)

@@ -1,4 +1,4 @@
-"""The 3D scene, as a file or live: what `solve`, `fly` and `animate` share."""
+"""The 3D scene of `robochoc solve`, `fly` and `animate`, as a file or live."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def scene_for(
     flown: FlightLog | None = None,
     ground: GroundMap | None = None,
 ) -> Scene:
-    """Return the scene of `outcome`. If it was not flown yet, it is flown here, in calm air.
+    """Return the scene of `outcome`. Without the log of a flight, a flight in calm air is simulated here.
 
     Args:
-        outcome: What was decided.
-        team: The team as its files have it, before its scenario. Without it, all that is known are names.
-        mission: What `outcome` asks of the drones, if that is known already.
-        flown: How they flew `mission`.
-        ground: A map of the ground, for a mission that is not known yet.
+        outcome: The outcome.
+        team: The team of the files, before its scenario. Without it, the scene shows names only.
+        mission: The mission of `outcome`, if it is already known.
+        flown: The log of the flight of `mission`.
+        ground: A map of the ground, used if `mission` is None.
     """
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.mission import mission_of
@@ -52,7 +52,7 @@ def scene_for(
 
 
 def show_scene(scene: Scene, path: Path | None, *, serve: bool, port: int = 0, quiet: bool = False) -> None:
-    """Write `scene` as a page to `path`, if there is one; then serve it, if that is asked for."""
+    """Write `scene` as a page to `path`, if there is one; then show it live if `serve` is set."""
     if path:
         _write_page(scene, path, quiet=quiet)
     if serve:
@@ -60,7 +60,7 @@ def show_scene(scene: Scene, path: Path | None, *, serve: bool, port: int = 0, q
 
 
 def _write_page(scene: Scene, path: Path, *, quiet: bool) -> None:
-    """Write `scene` as one self-contained page, and say what to do with it."""
+    """Write `scene` as one self-contained page, and print its size and the next step."""
     from robochoc.view.page import scene_page
 
     content = scene_page(scene)

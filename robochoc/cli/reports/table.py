@@ -1,4 +1,4 @@
-"""A table for people: aligned columns without lines, so that other programs can read it from a pipe, too."""
+"""A table with aligned columns, without lines, so that other programs can read it from a pipe, too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.system.plain_text import on_one_line
 
 GAP = "  "
 NARROWEST = 18
-"""Characters. A column of prose is not wrapped to less."""
+"""Characters: the minimum width of a wrapped column."""
 
 
 def print_table(
@@ -24,7 +24,7 @@ def print_table(
 
     Args:
         headings: One for each column.
-        rows: The cells. What does not print in them is escaped.
+        rows: The cells. Unprintable characters in them are escaped.
         right: Headings of the columns that are aligned to the right: numbers.
         prose: The heading of the column that may be wrapped.
     """
@@ -54,7 +54,7 @@ def table_lines(
 
 
 def _lines(row: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> Iterator[str]:
-    """Yield the lines of one row: several where a cell is wider than its column."""
+    """Yield the lines of one row: several if a cell is wider than its column."""
     parts = [[cell] if _width(cell) <= width else wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
     for number in range(max(map(len, parts))):
         line = (part[number] if number < len(part) else "" for part in parts)
@@ -67,7 +67,7 @@ def _aligned(cell: str, width: int, right: bool) -> str:  # noqa: FBT001 - mappe
 
 
 def _width(text: str) -> int:
-    """Return the columns that `text` takes on a terminal (Unicode Standard Annex 11)."""
+    """Return the width of `text` on a terminal, in columns (Unicode Standard Annex 11)."""
     if text.isascii():
         return len(text)
     return sum(0 if unicodedata.combining(char) else 1 + (unicodedata.east_asian_width(char) in "WF") for char in text)

@@ -186,7 +186,7 @@ from robochoc.cli.main import TerminationSignals
 
 class Thing: pass
 
-TerminationSignals().listen()
+TerminationSignals().install()
 thing = Thing()
 callback = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
 del thing

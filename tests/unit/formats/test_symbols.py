@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.cli.reports.tasks import task_table
+from robochoc.cli.reports.outcome import task_table
 from robochoc.formats import InvalidInputError, check_team, read_robot, read_team, robot_in, robot_xml, write_team
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Name

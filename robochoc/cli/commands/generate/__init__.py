@@ -17,7 +17,7 @@ __all__ = ["generate"]
 def generate() -> None:
     """Write a team of a problem family as a folder of XML files.
 
-    Each seed stands for one team, the same on every machine. docs/guides/generate.md has the families, their sizes and
+    Each seed gives one team, the same on every machine. docs/guides/generate.md describes the families, their sizes and
     papers.
     """
 

@@ -1,4 +1,4 @@
-"""`robochoc generate random`, `coloring` and `ising`: problems on graphs, a robot a node."""
+"""`robochoc generate random`, `coloring` and `ising`: problems on graphs, with one robot per node."""
 
 from __future__ import annotations
 
@@ -6,15 +6,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.generated import GRAPH, OUTPUT, graph_of, graph_options, number, seed_option, team_written
-from robochoc.cli.options.numbers import Number, WholeNumber
+from robochoc.cli.options.generate import (
+    GRAPH,
+    OUTPUT,
+    graph_options,
+    number_option,
+    pop_graph,
+    seed_option,
+    writes_team,
+)
 from robochoc.cli.options.sections import COMMON, SectionedCommand
+from robochoc.cli.options.value_types import Number, WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
 
 MAX_COST = 1_000_000
-places_option = number("--places", "Decimal places of costs.", least=0, most=9, default=0)
+places_option = number_option("--places", "Decimal places of costs.", least=0, most=9, default=0)
 
 
 @click.command(
@@ -29,25 +37,27 @@ places_option = number("--places", "Decimal places of costs.", least=0, most=9, 
     short_help="Model B: random binary constraints, on a graph of your choice.",
 )
 @graph_options
-@number("--domain", "Number of values of each variable.")
+@number_option("--domain", "Number of values of each variable.")
 @click.option("--density", type=float, metavar="P", help="random: fraction of pairs of robots with a constraint.")
 @click.option(
     "--tightness",
     type=float,
     metavar="P",
-    help="Fraction of pairs of values that a constraint forbids, 0 to 1.  [default: 0 with --max-cost, else required]",
+    help="Fraction of pairs of values that a constraint forbids, 0 to 1.  [required; with --max-cost: default 0]",
 )
 @click.option(
     "--max-cost",
     type=WholeNumber(0, MAX_COST),
     metavar="COST",
-    help="Make a DisWCSP: each allowed pair of values has a cost, uniform from 0 to COST.",
+    help="Make a DCOP: each allowed pair of values has a cost, uniform from 0 to COST.",
 )
 @places_option
 @click.option("--maximize", is_flag=True, help="With --max-cost: costs are utilities, whose sum is maximised.")
-@click.option("--asymmetric", is_flag=True, help="With --max-cost: each robot of a pair has costs of its own (ADCOP).")
+@click.option(
+    "--asymmetric", is_flag=True, help="With --max-cost: the two robots of a pair have separate costs (ADCOP)."
+)
 @seed_option
-@team_written("random-AGENTS-DOMAIN-GRAPH-TIGHTNESS[-costMAX][-asymmetric]-SEED[-connected]")
+@writes_team("random-AGENTS-DOMAIN-GRAPH-TIGHTNESS[-costMAX][-asymmetric]-SEED[-connected]")
 def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # noqa: ANN401 - `random_csp`'s own
     """Uniform random problems (Model B; Prosser 1996, Gent et al. 2001), the usual benchmark of protocols.
 
@@ -62,17 +72,17 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
     robochoc generate random --agents 30 --domain 3 --graph scale-free --max-cost 9 --places 2
     robochoc generate random --agents 6 --domain 4 --density 0.5 --max-cost 100 --asymmetric
     robochoc generate random --domain 4 --graph town.graphml --tightness 0.3
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.random_csp import random_csp, random_on
     from robochoc.model.cost_units import CostUnits
 
     if problem["tightness"] is None and problem["max_cost"] is None:
-        raise click.UsageError("Missing option '--tightness' (without --max-cost).")
+        raise click.UsageError("Missing option '--tightness' (required without --max-cost).")
     if problem["max_cost"] is None and (places or maximize or problem["asymmetric"]):
-        raise click.UsageError("--places, --maximize and --asymmetric are about costs: give --max-cost, too.")
+        raise click.UsageError("--places, --maximize and --asymmetric require --max-cost.")
     problem["tightness"] = problem["tightness"] or 0
     problem["costs"] = CostUnits(maximize, places)
-    graph = graph_of(problem, "density")
+    graph = pop_graph(problem, "density")
     return random_csp(**problem) if graph is None else random_on(graph, **problem)
 
 
@@ -87,19 +97,19 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
     short_help="Graph colouring: hard, soft or weighted.",
 )
 @graph_options
-@number("--colors", "Number of values of each variable.", default=3)
+@number_option("--colors", "Number of values of each variable.", default=3)
 @click.option("--degree", type=float, metavar="D", help="random: average number of neighbours.")
 @click.option(
     "--conflicts",
     type=click.Choice(["soft", "weighted", "hard"]),
     default="soft",
     show_default=True,
-    help="Neighbours of the same colour cost 1, cost a random weight of their own, or are forbidden.",
+    help="Neighbours of the same colour cost 1, or the random weight of their edge, or are forbidden.",
 )
-@number("--max-cost", "weighted: weights are uniform up to this.", most=MAX_COST, default=10)
+@number_option("--max-cost", "weighted: weights are uniform up to this.", most=MAX_COST, default=10)
 @places_option
 @seed_option
-@team_written("coloring-AGENTS-COLORS-GRAPH-SEED[-connected]")
+@writes_team("coloring-AGENTS-COLORS-GRAPH-SEED[-connected]")
 def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
     """Graph colouring: two neighbours of the same colour cost 1.
 
@@ -109,17 +119,17 @@ def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
     robochoc generate coloring --agents 15 --degree 4
     robochoc generate coloring --agents 16 --graph grid --colors 2 --conflicts hard
     robochoc generate coloring --agents 20 --graph small-world --conflicts weighted --max-cost 100
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.coloring import coloring as graph_to_color
     from robochoc.generators.coloring import coloring_of
 
-    graph = graph_of(problem, "degree")
+    graph = pop_graph(problem, "degree")
     return graph_to_color(**problem) if graph is None else coloring_of(graph, **problem)
 
 
 @click.command(short_help="Ising models: spins on a torus, real couplings.")
-@number("--rows", "Number of rows.", least=2)
-@number("--columns", "Number of columns.", least=2)
+@number_option("--rows", "Number of rows.", least=2)
+@number_option("--columns", "Number of columns.", least=2)
 @click.option(
     "--coupling",
     default=1.6,
@@ -136,18 +146,18 @@ def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
     metavar="R",
     help="Fields are uniform from -R to R.",
 )
-@number("--places", "Decimal places of couplings and fields.", least=0, most=9, default=3)
+@number_option("--places", "Decimal places of couplings and fields.", least=0, most=9, default=3)
 @seed_option
-@team_written("ising-ROWSxCOLUMNS-B-R-SEED")
+@writes_team("ising-ROWSxCOLUMNS-B-R-SEED")
 def ising(**problem: Any) -> Team:  # noqa: ANN401 - `ising`'s own
-    """Ising models on a torus (Cerquides et al. 2018): spins 0 and 1, with a field each and four neighbours.
+    """Ising models on a torus (Cerquides et al. 2018): spins 0 and 1, each with a field and four neighbours.
 
-    Costs are decimals, also negative ones; the sum is minimised. Robot2.3 has the variable V2.3.
+    Costs are decimals and may be negative; their sum is minimised. Robot2.3 has the variable V2.3.
 
     \b
     robochoc generate ising --rows 3 --columns 4
     robochoc generate ising --rows 10 --columns 10 --coupling 1 --places 6
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.ising import ising as spins
 
     return spins(**problem)

@@ -1,4 +1,4 @@
-"""`robochoc generate` of problems on a map: who goes where, around the walls."""
+"""`robochoc generate formation`, `coverage` and `patrol`: problems on a map with walls."""
 
 from __future__ import annotations
 
@@ -8,38 +8,38 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.generated import (
+from robochoc.cli.options.generate import (
     OUTPUT,
     Command,
     Options,
     TeamOnMap,
-    number,
+    number_option,
     seed_option,
-    team_written,
+    writes_team,
 )
-from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.sections import COMMON, SectionedCommand
+from robochoc.cli.options.value_types import Number, WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.generators.maps.reach import MapChoice
 
 MAX_ROBOTS, MAX_CELLS = 100, 1000
-"""As `generators/maps/reach.py` has them, which is not imported at the start."""
+"""The limits of `generators/maps/reach.py`, repeated since that module is not imported at the start."""
 ON_MAP = ("--radius", "--speed", "--within", "--cell", "--cells")
-"""The section on robots and cells."""
-_OWN = ("map", "agents", "at", "radius", "speed", "within", "cell", "cells")
+"""The options in the section on robots and cells."""
+_MAP_PARAMETERS = ("map", "agents", "at", "radius", "speed", "within", "cell", "cells")
 
 
-def metres(name: str, text: str, default: float | None = None, unit: str = "M") -> Callable[..., Any]:
-    """Return an option that takes a length, or another measure that is not negative."""
+def measure_option(name: str, text: str, default: float | None = None, unit: str = "M") -> Callable[..., Any]:
+    """Return an option whose value is a length or another measure that is not negative."""
     return click.option(
         name, default=default, show_default=default is not None, type=Number(0), metavar=unit, help=text
     )
 
 
 def map_options(command: Command) -> Command:
-    """Add the options of maps, which `choice_of` takes out again."""
+    """Add the options of maps, which `pop_map_choice` evaluates."""
     for option in reversed(
         (
             click.option(
@@ -48,26 +48,29 @@ def map_options(command: Command) -> Command:
                 type=InputPath(),
                 required=True,
                 metavar="FILE",
-                help="Map of ROS's map_server (YAML, which names an image), or an OctoMap (.bt, .ot).",
+                help="Map of ROS's map_server (YAML file that names an image), or an OctoMap (.bt, .ot).",
             ),
             click.option(
                 "--agents",
                 type=WholeNumber(1, MAX_ROBOTS),
                 metavar="N",
-                help="Number of robots.  [default: as many as --at has]",
+                help="Number of robots.  [default: the number of positions in --at]",
             ),
             click.option(
-                "--at", default="", metavar="'X,Y X,Y'", help="Where robots are, in metres.  [default: in free cells]"
+                "--at",
+                default="",
+                metavar="'X,Y X,Y'",
+                help="Positions of the robots, in metres.  [default: random free cells]",
             ),
-            metres("--radius", "Radius of a robot: it fits through doors of twice that, and flights keep it.", 0.2),
-            metres("--speed", "Metres a second.", 0.5, "M/S"),
-            metres("--within", "Robots get as far as they come in so many seconds.", unit="SECONDS"),
-            metres("--cell", "Side of a cell.  [default: as small as --cells allows]"),
+            measure_option("--radius", "Radius of a robot, which is also its minimum distance from walls.", 0.2),
+            measure_option("--speed", "Speed of robots, in metres per second.", 0.5, "M/S"),
+            measure_option("--within", "Longest travel time of a robot; farther cells are not values.", unit="SECONDS"),
+            measure_option("--cell", "Side of a cell.  [default: as small as --cells allows]"),
             click.option(
                 "--cells",
                 type=WholeNumber(1, MAX_CELLS),
                 metavar="N",
-                help="Maximum number of free cells, which are values.  [default: 100; with --cell: 1000]",
+                help="Maximum number of free cells, which are the values.  [default: 100; with --cell: 1000]",
             ),
         )
     ):
@@ -75,11 +78,11 @@ def map_options(command: Command) -> Command:
     return command
 
 
-def choice_of(options: Options) -> MapChoice:
-    """Take the options of maps out of `options`, and return what they say."""
+def pop_map_choice(options: Options) -> MapChoice:
+    """Remove the options of maps from `options`, and return the choice of map, robots and cells."""
     from robochoc.generators.maps.reach import MapChoice
 
-    given = {key: options.pop(key) for key in _OWN}
+    given = {key: options.pop(key) for key in _MAP_PARAMETERS}
     return MapChoice(**{**given, "map": str(Path(given["map"]))})
 
 
@@ -91,7 +94,7 @@ def choice_of(options: Options) -> MapChoice:
         "Robots and cells": ON_MAP,
         "Output": OUTPUT,
     },
-    short_help="On a map: robots take the slots of a formation.",
+    short_help="On a map: robots choose the slots of a formation.",
 )
 @map_options
 @click.option(
@@ -99,33 +102,35 @@ def choice_of(options: Options) -> MapChoice:
     default="line",
     show_default=True,
     metavar="SHAPE",
-    help="line, column, wedge, circle, grid, or a file with 'AHEAD,LEFT' in metres in each line.",
+    help="line, column, wedge, circle, grid, or a file with one slot per line: 'AHEAD,LEFT' in metres.",
 )
-@metres("--spacing", "Between neighbours in the shape.", 1.0)
+@measure_option("--spacing", "Distance between neighbours in the shape.", 1.0)
 @click.option(
     "--heading",
     default=0.0,
     show_default=True,
     type=Number(-360, 360),
     metavar="DEGREES",
-    help="Where the formation looks: counterclockwise from x.",
+    help="Direction of the formation: counterclockwise from x.",
 )
-@click.option("--anchor", default="", metavar="X,Y", help="Middle of the shape.  [default: the mean of all robots]")
+@click.option(
+    "--anchor", default="", metavar="X,Y", help="Centre of the shape.  [default: the mean position of all robots]"
+)
 @seed_option
-@team_written("formation-MAP-SHAPE-AGENTS-SEED")
+@writes_team("formation-MAP-SHAPE-AGENTS-SEED")
 def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
-    """Formations on a map: each robot takes a slot, and the sum of their travel times is minimised.
+    """Formations on a map: each robot chooses a slot, and the sum of travel times is minimised.
 
-    A robot's values are the slots that it can get to, around walls and inflated obstacles. No two take the same. Slots
-    in walls move to the nearest free cell. Waypoints are in cells; map.json beside the robots has the walls. On an
-    OctoMap all places have a Z: cells are cubes, and drones fly through free ones.
+    A robot's values are the slots that it can reach around walls and inflated obstacles. No two robots choose the same
+    slot. Slots in walls are moved to the nearest free cell. Waypoints are in cells; map.json in the folder has the
+    walls. On an OctoMap all places have a Z: cells are cubes, and drones fly through free ones.
 
     \b
     robochoc generate formation --map docs/examples/building/building.yaml --agents 4 --shape wedge --anchor 3,2
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.maps.formation import formation as on_map
 
-    return on_map(choice_of(problem), **problem)
+    return on_map(pop_map_choice(problem), **problem)
 
 
 @click.command(
@@ -136,25 +141,25 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
         "Robots and cells": ON_MAP,
         "Output": OUTPUT,
     },
-    short_help="On a map: robots see as much as they can.",
+    short_help="On a map: robots see as much area as possible.",
 )
 @map_options
-@metres("--sensing", "How far robots see, along free lines.", 3.0)
-@metres("--worth", "Travel time that it is worth to see a square metre, or a cubic one.", 10.0, "SECONDS")
+@measure_option("--sensing", "Range of sight, along free lines.", 3.0)
+@measure_option("--worth", "Travel time that seeing one square (or cubic) metre is worth.", 10.0, "SECONDS")
 @seed_option
-@team_written("coverage-MAP-AGENTS-SEED")
+@writes_team("coverage-MAP-AGENTS-SEED")
 def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
     """Coverage of a map (Cortes et al. 2004): robots choose cells from which they see much together.
 
-    The cost is the travel time of all robots and the worth of what they do not see. What two robots both see counts
-    once; of what three see, it counts less. A robot's values are the cells that it can get to.
+    The cost is the travel time of all robots plus the worth of the area that no robot sees. An area that two robots see
+    counts once; an area that three see counts less. A robot's values are the cells that it can reach.
 
     \b
     robochoc generate coverage --map docs/examples/building/building.yaml --agents 3 --cells 40 --within 12
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.maps.coverage import coverage as on_map
 
-    return on_map(choice_of(problem), **problem)
+    return on_map(pop_map_choice(problem), **problem)
 
 
 @click.command(
@@ -165,26 +170,26 @@ def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
         "Robots and cells": ON_MAP,
         "Output": OUTPUT,
     },
-    short_help="On a map: who visits which point of interest next.",
+    short_help="On a map: robots choose the points of interest to visit next.",
 )
 @map_options
-@number("--points", "Number of points that are drawn, far from each other.", most=100, default=6)
-@click.option("--visit", default="", metavar="'X,Y X,Y'", help="The points, in metres, in the place of drawn ones.")
-@number("--idle", "Nobody has been at a point for 0 to N seconds.", least=0, most=1_000_000, default=120)
-@number("--rounds", "Visits that each robot plans.", most=4, default=1)
-@metres("--apart", "Robots that are nearer to each other pay for it.", 2.0)
+@number_option("--points", "Number of random points, far from each other.", most=100, default=6)
+@click.option("--visit", default="", metavar="'X,Y X,Y'", help="The points, in metres, instead of random ones.")
+@number_option("--idle", "Points were last visited 0 to N seconds ago.", least=0, most=1_000_000, default=120)
+@number_option("--rounds", "Number of visits that each robot plans.", most=4, default=1)
+@measure_option("--apart", "Robots nearer to each other than this have a cost.", 2.0)
 @seed_option
-@team_written("patrol-MAP-AGENTS-POINTS-ROUNDS-SEED")
+@writes_team("patrol-MAP-AGENTS-POINTS-ROUNDS-SEED")
 def patrol(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `patrol`'s own
     """Patrols on a map (Machado et al. 2002, Portugal and Rocha 2013): each robot visits a point in each round.
 
-    The cost is the travel time of all robots, and how long the points that nobody visits have been idle. No point is
-    visited twice. With --rounds a robot has a variable for each round; it flies to the first.
+    The cost is the travel time of all robots plus the idle time of the points that no robot visits. No point is visited
+    twice. With --rounds, a robot has one variable per round; it flies to the point of the first.
 
     \b
     robochoc generate patrol --map docs/examples/building/building.yaml --agents 3 --points 8
     robochoc generate patrol --map docs/examples/building/building.yaml --agents 2 --points 6 --rounds 2
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.maps.patrol import patrol as on_map
 
-    return on_map(choice_of(problem), **problem)
+    return on_map(pop_map_choice(problem), **problem)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from robochoc.cli.options.generated import next_step
-from robochoc.cli.options.numbers import WholeNumber
+from robochoc.cli.options.generate import next_step
 from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
 
 MAX_N = 49
-"""As `generators/queens3d.py` has it, which is not imported at the start."""
+"""The limit of `generators/queens3d.py`, repeated since that module is not imported at the start."""
 
 
 @click.command(short_help="3D N^2 queens: one robot per cell or row of the board.")
@@ -40,7 +40,7 @@ MAX_N = 49
 @click.option("--force", is_flag=True, help="Replace the folder if it exists.")
 @invalid_input_fails
 def queens3d(n: int, model: str, robots: str, output: Path | None, *, force: bool) -> None:
-    """3D N^2 queens: N x N drones, one per cell of the board; each takes a level, and no two may attack each other.
+    """3D N^2 queens: N x N drones, one per cell of the board; each chooses a level such that no two attack each other.
 
     Robots are named by row and column, as in the paper: Robot3.1 has the variable V3.1. With --robots rows, Robot3 has
     the variables V3.1, V3.2, ...

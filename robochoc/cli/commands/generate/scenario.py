@@ -6,15 +6,15 @@ from pathlib import Path
 
 import click
 
-from robochoc.cli.options.generated import seed_option
-from robochoc.cli.options.numbers import Number, WholeNumber
+from robochoc.cli.options.generate import seed_option
 from robochoc.cli.options.paths import InputPath, TeamFolder
+from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 
 KINDS = ("remove-value", "add-value", "remove-constraint", "add-constraint", "remove-agent", "add-agent")
 
 
-@click.command(short_help="A random scenario for a team: what changes over time.")
+@click.command(short_help="A random scenario for a team: changes over time.")
 @click.argument("team", type=TeamFolder())
 @click.option("--events", required=True, type=WholeNumber(1, 1000), metavar="N", help="Number of events.")
 @click.option(
@@ -23,16 +23,14 @@ KINDS = ("remove-value", "add-value", "remove-constraint", "add-constraint", "re
     show_default=True,
     type=Number(0, 1),
     metavar="R",
-    help="Changes in an event, as a share of the team's shared constraints; at least one.",
+    help="Changes per event, as a share of the team's shared constraints; at least one.",
 )
-@click.option(
-    "--kinds", multiple=True, type=click.Choice(KINDS), help="Kind of changes; may be given again.  [default: all]"
-)
+@click.option("--kinds", multiple=True, type=click.Choice(KINDS), help="Kind of changes. Repeatable.  [default: all]")
 @click.option(
     "--after",
     type=WholeNumber(1, 1_000_000),
     metavar="N",
-    help="Events happen after N messages.  [default: when the problem before is solved]",
+    help="Events occur after N messages.  [default: when the previous problem is solved]",
 )
 @seed_option
 @click.option(
@@ -55,14 +53,14 @@ def scenario(
     *,
     force: bool,
 ) -> None:
-    """Write a copy of a team with a random scenario: constraints, values and robots come and go.
+    """Write a copy of a team with a random scenario: constraints, values and robots are added and removed.
 
-    Each event is one that the team as it is then can take. What has gone may come back.
+    Each event is valid for the team at that time. Removed parts may be added again.
 
     \b
     robochoc generate scenario instances/queens3d-4 --events 5
     robochoc generate scenario out/random --events 10 --rate 0.05 --kinds add-constraint --kinds remove-constraint
-    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.formats import read_team, write_team
     from robochoc.formats.folder import GROUND_FILE
     from robochoc.generators.scenario import random_scenario

@@ -64,7 +64,7 @@ def test_a_robot_of_one_task_has_it_as_its_value(tmp_path: Path) -> None:
     assert [one.name for one in team["ann"].variables] == ["ann.task"]
     outcome = solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR))
     assert sorted(map(str, outcome.labelled(outcome.assignment).values())) == ["dig", "none"]
-    assert "    nobody does lay-1" in outcome_report(team, outcome)
+    assert "    not assigned: lay-1" in outcome_report(team, outcome)
 
 
 def test_names_that_are_not_allowed_here_come_back(tmp_path: Path) -> None:

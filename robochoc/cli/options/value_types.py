@@ -1,11 +1,11 @@
-"""Names on the command line: completed by the shell, and with a hint where one is misspelt."""
+"""Types of option values: numbers within limits, protocol names, and names or files."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,13 +15,47 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 
+def _limits(kind: click.IntRange | click.FloatRange) -> str:
+    """Return the limits of a range in words.
+
+    >>> _limits(click.IntRange(1)), _limits(click.FloatRange(0, 0.9)), _limits(click.FloatRange(0, min_open=True))
+    (' of at least 1', ' from 0 to 0.9', ' greater than 0')
+    """
+    low, high = kind.min, kind.max
+    if low is None or high is None:
+        return "" if low is None else f" greater than {low:g}" if kind.min_open else f" of at least {low:g}"
+    return f" from {low:g} to {high:g}" + (f", but not {low:g}" if kind.min_open else "")
+
+
+class WholeNumber(click.IntRange):
+    """A whole number within limits."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
+        """Return the number, or fail with a message in plain English."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is not a whole number{_limits(self)}", param, ctx)
+
+
+class Number(click.FloatRange):
+    """A number within limits."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
+        """Return the number, or fail with a message in plain English."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is not a number{_limits(self)}", param, ctx)
+
+
 class ProtocolName(click.ParamType[str]):
-    """The name of an installed protocol, in any case, or another word, which the run refuses with a hint."""
+    """The name of an installed protocol, in any case. The run rejects other words, with a hint."""
 
     name = "protocol"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:  # noqa: ARG002 - click's
-        """Return the name as the protocol's package spells it."""
+        """Return the name in the protocol's own spelling."""
         from robochoc.run.registry import installed_spelling
 
         return installed_spelling(value)
@@ -36,12 +70,12 @@ class ProtocolName(click.ParamType[str]):
 
 
 class NameOrFile(click.Path):
-    """One of `names`, or else the path of a file that is there.
+    """One of `names`, or the path of an existing file.
 
     Args:
-        kind: What the names are of, for messages: `order`.
+        kind: The word for such a name in messages: `order`.
         names: The names.
-        other_spellings: Further spellings of some of them.
+        other_spellings: Further spellings of some names.
     """
 
     def __init__(self, kind: str, names: Sequence[str], other_spellings: dict[str, str] | None = None) -> None:
@@ -51,7 +85,7 @@ class NameOrFile(click.Path):
         self._other_spellings = other_spellings or {}
 
     def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> str | Path:
-        """Return the name, or the path. Fail, as wrong usage, where it is neither."""
+        """Return the name or the path. Any other word is wrong usage."""
         word = os.fsdecode(value)
         name = self._other_spellings.get(word, word)
         if name in self._names:
@@ -61,11 +95,11 @@ class NameOrFile(click.Path):
 
             near = difflib.get_close_matches(name, self._names, 1)
             hint = f"did you mean '{near[0]}'?" if near else f"{self._kind}s: {', '.join(self._names)}"
-            self.fail(f"'{word}' is no {self._kind} and no file; {hint}", param, ctx)
+            self.fail(f"'{word}' is neither a known {self._kind} nor a file; {hint}", param, ctx)
         return Path(word)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Return the names that begin with `incomplete`, and where there is none, files."""
+        """Return the names that begin with `incomplete`; files if there are none."""
         return _beginning_with(incomplete, self._names) or super().shell_complete(ctx, param, incomplete)
 
 

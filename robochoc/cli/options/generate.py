@@ -1,4 +1,4 @@
-"""Options that families of `robochoc generate` share, and the writing of what they make."""
+"""Options that families of `robochoc generate` share, and the writing of the generated team."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
-from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
 
@@ -21,16 +21,18 @@ if TYPE_CHECKING:
 
 MAX = 1000
 MAX_NODES = 1_000_000
-"""As `generators/draws.py` has it, which is not imported at the start."""
+"""The limit of `generators/draws.py`, repeated since that module is not imported at the start."""
 MAX_PROCESSES = 1000
-"""With more robots, the simulator is proposed: docs/guides/large-teams.md."""
+"""Robots. For larger teams, `next_step` suggests the simulator (docs/guides/large-teams.md)."""
 Options = dict[str, Any]
 Command = Callable[..., None]
 TeamOnMap: TypeAlias = "tuple[Team, GroundMap]"
 
 
-def number(name: str, text: str, *, least: int = 1, most: int = MAX, default: int | None = None) -> Callable[..., Any]:
-    """Return an option that takes an integer; required unless it has a default."""
+def number_option(
+    name: str, text: str, *, least: int = 1, most: int = MAX, default: int | None = None
+) -> Callable[..., Any]:
+    """Return an option with an integer value; required unless it has a default."""
     return click.option(
         name,
         required=default is None,
@@ -42,8 +44,8 @@ def number(name: str, text: str, *, least: int = 1, most: int = MAX, default: in
     )
 
 
-def share(name: str, text: str, default: float) -> Callable[..., Any]:
-    """Return an option that takes a share or a probability."""
+def share_option(name: str, text: str, default: float) -> Callable[..., Any]:
+    """Return an option whose value is a share or a probability."""
     return click.option(
         name, default=default, show_default=True, type=Number(0, 1), metavar="P", help=f"{text}, 0 to 1."
     )
@@ -54,10 +56,11 @@ seed_option = click.option(
 )
 
 
-def team_written(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Command]:
-    """Return a decorator: the command makes a team, which is written to a folder of -o, or called after the team.
+def writes_team(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Command]:
+    """Return a decorator for a function that makes a team: the command writes it to the folder of -o.
 
-    `folder` is how the help calls that. Numbers that do not fit together (`ValueError`) are wrong usage.
+    The default folder has the team's name; `folder` describes it in the help text. A `ValueError` of the function, for
+    numbers that are inconsistent, is wrong usage.
     """
 
     def decorate(make: Callable[..., Team | TeamOnMap]) -> Command:
@@ -76,9 +79,9 @@ def team_written(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Com
 
 
 def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace: bool) -> None:
-    """Write what `make` makes; numbers that do not fit together are wrong usage.
+    """Write the team of `make`, and its map of the ground if there is one, as `robochoc fly --map` reads it.
 
-    With a map of the ground, that is written beside the team, as `robochoc fly --map` reads it.
+    A `ValueError` of `make`, for numbers that are inconsistent, is wrong usage.
     """
     from robochoc.formats import InvalidInputError, write_team
     from robochoc.formats.folder import GROUND_FILE
@@ -92,13 +95,13 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
         raise click.UsageError(str(error)) from None
     team, ground = made if isinstance(made, tuple) else (made, None)
     folder = output or Path("instances") / team.name
-    beside = {}
+    other_files = {}
     if ground:
         from robochoc.formats.ground_map import ground_map_json
 
-        beside[GROUND_FILE] = ground_map_json(ground)
+        other_files[GROUND_FILE] = ground_map_json(ground)
     with elapsed_time("generate", f"writing {len(team.robots):,} robots"):
-        write_team(team, folder, replace=replace, beside=beside)
+        write_team(team, folder, replace=replace, beside=other_files)
     constraints = sum(len(robot.shared) for robot in team.robots)
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")
@@ -107,7 +110,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
 
 
 def next_step(folder: Path | str, robots: int) -> str:
-    """Return how to solve the team in `folder`: not in processes where that would be very many."""
+    """Return a hint with the command that solves the team in `folder`: in the simulator if it has many robots."""
     return f"next: robochoc solve {folder}{' --runtime simulator' if robots > MAX_PROCESSES else ''}"
 
 
@@ -119,12 +122,12 @@ GRAPH = ("--connected", "--links", "--neighbours", "--rewiring", "--rows", "--to
 KINDS = ("random", "scale-free", "small-world", "grid", "tree")
 
 
-_OWN = ("links", "neighbours", "rewiring", "rows", "torus", "connected")
-"""Parameters of some kinds of graphs alone."""
+_GRAPH_PARAMETERS = ("links", "neighbours", "rewiring", "rows", "torus", "connected")
+"""Parameters that apply to some kinds of graphs only."""
 
 
 def graph_options(command: Command) -> Command:
-    """Add the options of constraint graphs, which `graph_of` takes out again."""
+    """Add the options of constraint graphs, which `pop_graph` evaluates."""
     for option in reversed(
         (
             click.option("--agents", type=WholeNumber(1, MAX_NODES), metavar="N", help="Number of robots."),
@@ -133,10 +136,9 @@ def graph_options(command: Command) -> Command:
                 default="random",
                 show_default=True,
                 metavar="KIND",
-                help=f"Constraint graph: {', '.join(KINDS)}, or a file that networkx reads (GraphML, GEXF, GML,"
-                " edge list).",
+                help=f"Constraint graph: {', '.join(KINDS)}, or a file (GraphML, GEXF, GML, edge list).",
             ),
-            click.option("--connected", is_flag=True, help="random, small-world: draw graphs until one is connected."),
+            click.option("--connected", is_flag=True, help="random, small-world: repeat until the graph is connected."),
             click.option(
                 "--links", type=WholeNumber(1), metavar="N", help="scale-free: links of a new node.  [default: 2]"
             ),
@@ -149,24 +151,24 @@ def graph_options(command: Command) -> Command:
             click.option(
                 "--rows", type=WholeNumber(1), metavar="N", help="grid: rows.  [default: nearest to a square]"
             ),
-            click.option("--torus", is_flag=True, help="grid: the borders meet."),
+            click.option("--torus", is_flag=True, help="grid: join opposite borders."),
         )
     ):
         command = option(command)
     return command
 
 
-def graph_of(options: Options, density: str) -> Graph | None:
-    """Take the options of graphs out of `options`, and return the graph; None: a random one, of a given `density`.
+def pop_graph(options: Options, density: str) -> Graph | None:
+    """Remove the options of graphs from `options`, and return the graph; None for a random graph of a given `density`.
 
-    For that one `options` keep the number of robots, the density and whether it is connected.
+    For the random graph, `options` retains the number of robots, the density and whether it must be connected.
 
     Raises:
-        ValueError: if an option is missing, or has nothing to say about this graph, or numbers do not fit together.
+        ValueError: if an option is missing or does not apply to this graph, or numbers are inconsistent.
     """
     from robochoc.generators.graph_choice import GraphChoice
 
-    given = {key: options.pop(key) for key in _OWN}
+    given = {key: options.pop(key) for key in _GRAPH_PARAMETERS}
     choice = GraphChoice(kind=options.pop("graph"), agents=options["agents"], **given)
     graph = choice.graph(density, options[density], dashes="--")
     if graph is None:
