@@ -176,7 +176,11 @@ def test_a_port_in_use(higher: int, site: Deployment) -> None:
         (["directory", "--master", "127.0.0.1:17000", "--as", "Watcher"], 1, "enrol with a token"),
         (["directory", "--master", "127.0.0.1:17000", "--as", "../up"], 2, "../up"),
         (["directory", "--master", "h", "--as", "A", "--search", "colour=red"], 2, "slots are name, protocol"),
-        (["directory", "--master", "127.0.0.1:17000", "--as", "A", "--sl", "--json"], 2, "--sl cannot be used with --json"),
+        (
+            ["directory", "--master", "127.0.0.1:17000", "--as", "A", "--sl", "--json"],
+            2,
+            "--sl cannot be used with --json",
+        ),
     ],
 )
 def test_what_cannot_be_is_said_in_a_line(
