@@ -1,1 +1,1 @@
-"""Communication Management unit: how envelopes travel, in one thread or between processes."""
+"""Communication Management unit: moves messages between robots, in one thread, between processes or over a network."""

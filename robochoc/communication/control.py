@@ -1,8 +1,8 @@
 """The control messages between the parent and a robot's process, over their control pipe.
 
 The parent is the paper's master: it waits for the confirmation of all robots before it orders the start, opens
-queues between robots that want to talk, finds out when all is quiet, and ends each epoch. It carries no protocol
-message. When it closes the pipe, the robot ends.
+queues between robots that request them, detects quiescence, and ends each epoch. It carries no protocol message. When
+it closes the pipe, the robot ends.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import Invalidated
 
 QUEUES_AT_ONCE = 16
-"""The number of queues that a robot requests at once. Meanwhile, the parent holds as many more descriptors."""
+"""The most queues that a robot requests at once: the parent needs this many more descriptors meanwhile."""
 
 
 class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
     pass
 
 
-class OfEpoch(_Control, frozen=True):
-    """Messages that have no meaning once their epoch is over."""
+class EpochMessage(_Control, frozen=True):
+    """A message that is outdated once its epoch is over."""
 
     epoch: int
 
@@ -34,38 +34,38 @@ class OfEpoch(_Control, frozen=True):
 # From a robot to the parent
 
 
-class Ready(OfEpoch, frozen=True):
-    """The robot is there, with its problem compiled."""
+class Ready(EpochMessage, frozen=True):
+    """The robot is running and has compiled its problem."""
 
 
-class OpenQueues(OfEpoch, frozen=True):
-    """The robot needs queues to `receivers`, at most `QUEUES_AT_ONCE` of them. Asked again in each epoch."""
+class OpenQueues(EpochMessage, frozen=True):
+    """The request for queues to `receivers`, at most `QUEUES_AT_ONCE` of them. Repeated in each epoch."""
 
     receivers: list[str]
 
 
-class Counters(OfEpoch, frozen=True):
-    """The robot's protocol messages of this epoch, in answer to wave `wave`, or (0) as it is idle."""
+class Counters(EpochMessage, frozen=True):
+    """The counts of the robot's protocol messages in this epoch: the answer to `wave`, or (0) because it is idle."""
 
     wave: int
     sent: int
     received: int
 
 
-class Conclusion(OfEpoch, frozen=True):
-    """The robot alone has found how the search ends. Before `Ready`: a verdict stands in spite of the changes."""
+class Conclusion(EpochMessage, frozen=True):
+    """A verdict that the robot found alone. Before `Ready`: a verdict that holds in spite of the changes."""
 
     verdict: str
 
 
-class WentOn(OfEpoch, frozen=True):
-    """The answer to `GoOn`: whether the robot has gone on without something that it had waited for."""
+class WentOn(EpochMessage, frozen=True):
+    """The answer to `GoOn`: whether the robot has continued without a missing message."""
 
     went: bool
 
 
-class Snapshot(OfEpoch, frozen=True):
-    """The answer to `TakeSnapshot`: what the robot has, and how many messages it has dropped; the search goes on."""
+class Snapshot(EpochMessage, frozen=True):
+    """The answer to `TakeSnapshot`: the robot's values and findings, and the messages it has dropped; it continues."""
 
     number: int
     assignment: dict[str, int]
@@ -79,8 +79,8 @@ class Events(_Control, frozen=True):
     events: list[AnyEvent]
 
 
-class Report(OfEpoch, frozen=True):
-    """The end of an epoch: the values of the robot's variables, its counts, and what it knows of the whole team."""
+class Report(EpochMessage, frozen=True):
+    """The end of an epoch: the values of the robot's variables, its counts, and its findings about the whole team."""
 
     assignment: dict[str, int]
     metrics: Metrics
@@ -88,9 +88,9 @@ class Report(OfEpoch, frozen=True):
 
 
 class Failed(_Control, frozen=True):
-    """The robot cannot continue; `unsupported`: because of its problem, not because something broke.
+    """The robot cannot continue; `unsupported`: because of its problem, not because of a failure.
 
-    `elsewhere`: another protocol may be able to (`TooLargeError`).
+    `elsewhere`: another protocol may be able to solve it (`TooLargeError`).
     """
 
     why: str
@@ -102,9 +102,9 @@ class Failed(_Control, frozen=True):
 
 
 class Begin(_Control, frozen=True):
-    """The order to search, as all robots are there. `began` is the run's beginning, on the monotonic clock.
+    """The order to search, once all robots are ready. `began` is the run's start, on the monotonic clock.
 
-    `lossless`: no message of the epoch before was lost.
+    `lossless`: no message of the previous epoch was lost.
     """
 
     began: float
@@ -112,13 +112,13 @@ class Begin(_Control, frozen=True):
 
 
 class Pause(_Control, frozen=True):
-    """The order to be silent and report, as this epoch's search is over."""
+    """The order to stop and report, as this epoch's search is over."""
 
 
 class Change(_Control, frozen=True):
-    """A new epoch. `change` holds the robot's `AgentProblem` and what is `Invalidated` (see `sealed`).
+    """A new epoch. `change` contains the robot's `AgentProblem` and the `Invalidated` results (see `pack_change`).
 
-    Robots in `gone` have left; if there are others of their names, queues to and from them are to be opened anew.
+    Robots in `gone` have left; if new robots have their names, queues to and from these are opened again.
     """
 
     epoch: int
@@ -127,13 +127,13 @@ class Change(_Control, frozen=True):
 
 
 class QueuesTo(_Control, frozen=True):
-    """The write ends of the queues to `robots` come with this, in their order."""
+    """The write ends of the queues to `robots` are attached, in this order."""
 
     robots: list[str]
 
 
 class QueueFrom(_Control, frozen=True):
-    """The read end of the queue from `robot` comes with this."""
+    """The read end of the queue from `robot` is attached."""
 
     robot: str
 
@@ -145,30 +145,30 @@ class Wave(_Control, frozen=True):
 
 
 class TakeSnapshot(_Control, frozen=True):
-    """The order to tell what the robot has, and to search on. The answer has the same `number`."""
+    """The order to report a snapshot, and to continue the search. The answer has the same `number`."""
 
     number: int
 
 
 class GoOn(_Control, frozen=True):
-    """The order to go on without the messages that a robot waits for: nothing is under way any more."""
+    """The order to continue without the messages that a robot waits for: no message is in transit any more."""
 
 
-def sealed(part: AgentProblem, invalidated: Invalidated) -> bytes:
+def pack_change(part: AgentProblem, invalidated: Invalidated) -> bytes:
     """Return the content of a `Change`."""
     return pickle.dumps((part, invalidated))
 
 
-def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
-    """Return the arguments of `sealed`. Only for bytes from the own parent, over the socket that only the two have.
+def unpack_change(change: bytes) -> tuple[AgentProblem, Invalidated]:
+    """Return the arguments of `pack_change`. Only for bytes from this process's parent, over their private socket.
 
-    A process is started with the same means (`multiprocessing`); no message of a protocol ever comes here.
+    Processes are started by the same means (`multiprocessing`); no message of a protocol is unpickled.
     """
-    part, invalidated = pickle.loads(change)  # noqa: S301 - our own, as said above
+    part, invalidated = pickle.loads(change)  # noqa: S301 - written by our parent process
     return part, invalidated
 
 
 RobotMessage = Ready | Counters | Conclusion | WentOn | Snapshot | Events
-"""A robot's message to the runtime during a search, in every runtime. Runtimes differ in the report of the end."""
+"""A robot's message to the master during a search, in every runtime. Runtimes differ in the final report."""
 FromRobot = RobotMessage | OpenQueues | Report | Failed
 FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave | TakeSnapshot | GoOn

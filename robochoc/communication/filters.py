@@ -1,8 +1,8 @@
-"""Channel filters: they transform the content of a message between its sender and its receiver.
+"""Channel filters transform the content of a message between its sender and its receiver.
 
-A filter comes from an installed package, under the entry point group `robochoc.filters`, as protocols do. Several can
-be stacked: they seal in their order, and open in the reverse one. Two come with robochoc: `signed` and `sealed`. What
-they protect from, and how to write one: docs/guides/security.md.
+Like protocols, filters are registered by installed packages, in the entry point group `robochoc.filters`. Several can
+be stacked: they seal in their order, and open in the reverse order. robochoc contains two: `signed` and `sealed`. Their
+protection, and how to write a filter: docs/guides/security.md.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ GROUP = "robochoc.filters"
 
 
 class NotGenuineError(Exception):
-    """The data is not what `sender` has sealed for this robot in this context. No part of it may be used."""
+    """The data was not sealed by the sender for this robot in this context. No part of it may be used."""
 
 
 class UnknownFilterError(LookupError):
-    """No installed package offers a filter of that name, or what it offers cannot be used."""
+    """No installed package has a filter of that name, or the filter cannot be used."""
 
 
 class ChannelFilter(ABC):
     """A filter for all messages of the robot whose keys are in `ring`.
 
-    `context` is what both sides know of a message without being told in it: run, sender, receiver and sequence number,
-    as bytes that the caller makes. It is not sent along; a message moved into another context does not open.
+    `context` encodes facts that both sides know without the message: run, sender, receiver and sequence number. It is
+    not sent; a message that is moved into another context cannot be opened.
     """
 
     def __init__(self, ring: KeyRing) -> None:
@@ -38,44 +38,41 @@ class ChannelFilter(ABC):
 
     @abstractmethod
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """Return what is sent instead of `content`. Each call may give something else. Raises `UnknownPeerError`."""
+        """Return the bytes to send for `content`; they may differ in each call. Raises `UnknownPeerError`."""
 
     @abstractmethod
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """Return what `sender` has sealed; `content` may be anything. Raises `NotGenuineError`."""
+        """Return the content that `sender` has sealed; the argument may be any bytes. Raises `NotGenuineError`."""
 
 
 class FilterStack(ChannelFilter):
-    """Filters one upon the other, as one. Without any, messages stay as they are."""
+    """A stack of filters as one filter. An empty stack does not change messages."""
 
     def __init__(self, ring: KeyRing, filters: Sequence[type[ChannelFilter]]) -> None:
         super().__init__(ring)
         self._filters = tuple(kind(ring) for kind in filters)
 
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """Return what the last filter makes of what the first ones have made of `content`."""
+        """See `ChannelFilter.seal`."""
         for each in self._filters:
             content = each.seal(receiver, content, context)
         return content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """Return what the first filter has sealed.
-
-        A filter that fails in whatever way has not opened it: `NotGenuineError`.
-        """
+        """Return the opened content. Any failure of a filter becomes a `NotGenuineError`."""
         for each in reversed(self._filters):
             try:
                 content = each.open(sender, content, context)
             except NotGenuineError:
                 raise
             except Exception as error:
-                told = on_one_line(f"{type(each).__name__} failed: {type(error).__name__}: {error}")
-                raise NotGenuineError(told) from error
+                text = on_one_line(f"{type(each).__name__} failed: {type(error).__name__}: {error}")
+                raise NotGenuineError(text) from error
         return content
 
 
 def filter_named(name: str) -> type[ChannelFilter]:
-    """Return the filter called `name`. Raises `UnknownFilterError`, which names those there are."""
+    """Return the filter called `name`. Raises `UnknownFilterError`, which lists the installed filters."""
     found = entry_points_named(GROUP, name)
     if not found:
         raise UnknownFilterError(not_installed_message(GROUP, "filter", name))
@@ -88,7 +85,7 @@ def filter_named(name: str) -> type[ChannelFilter]:
 def _fault(loaded: object) -> str:
     """Return the reason why `loaded` cannot be used as a filter. Empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, ChannelFilter)):
-        return "is no subclass of ChannelFilter"
+        return "is not a subclass of ChannelFilter"
     if loaded.__abstractmethods__:
         return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
     return ""

@@ -1,8 +1,9 @@
-"""The host: what stands between a protocol, which is pure, and a runtime, which moves envelopes.
+"""The host connects a protocol, which is pure, with a runtime, which moves envelopes.
 
-It decodes and encodes, stamps envelopes with the clock of non-concurrent constraint checks (NCCC; Meisels et al.
-2002: c = max(c, c of the message), plus one for each check; a message carries c as it was when it was said), counts,
-and reports events to an observer. Every runtime uses it, so the same run counts the same everywhere.
+It decodes and encodes messages, stamps envelopes with the clock of non-concurrent constraint checks (NCCC; Meisels et
+al. 2002: c = max(c, c of the message), plus one for each check; a message carries the value of c at which it was
+written), counts messages and checks, and reports events to an observer. Every runtime uses the host, so the same run
+has the same counts everywhere.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, Self, cast, get_args
 
 import msgspec
 
-from robochoc.communication.dropped import Dropped
+from robochoc.communication.message_dropper import MessageDropper
 from robochoc.journal.events import Bounded, Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
@@ -30,23 +31,23 @@ from robochoc.solver.explanation import Invalidated
 from robochoc.system.compiling import mypyc_attr
 
 _MOST_SHARED = 1 << 22
-"""Bytes of messages that are kept for those who may share them."""
+"""Largest size of a message cache, in bytes."""
 _SIZE_OF_A_MESSAGE = 256
-"""What a message takes besides its content, about."""
+"""Approximate bytes of a message besides its content."""
 
 
 _UNUSABLE = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
-"""Errors that a protocol raises for a message it cannot use: its own refusals, and failures to compute with it."""
+"""Errors of a protocol that cannot use a message: its own refusals, and failed computations."""
 
 
 class BadMessageError(ValueError):
-    """The bytes of an envelope are no message of the protocol, or its robot cannot use what they say."""
+    """The content of an envelope is not a message of the protocol, or the robot cannot use it."""
 
 
-class UnderWay:
-    """Messages of this process whose receivers may share them (`Message.shareable`), by their content: the last ones.
+class MessageCache:
+    """The latest messages of this process whose receivers may share them (`Message.shareable`), by content.
 
-    What is not among them any more is decoded, and is the same.
+    Messages that are no longer in the cache are decoded again, with the same result.
     """
 
     def __init__(self) -> None:
@@ -54,11 +55,11 @@ class UnderWay:
         self._size = 0
 
     def get(self, content: bytes) -> Message | None:
-        """Return the message with this content; None: it has to be decoded."""
+        """Return the message with this content; None if it is not in the cache."""
         return self._messages.get(content)
 
     def keep(self, content: bytes, message: Message) -> None:
-        """Keep `message`, and drop the oldest ones if they are too large together."""
+        """Add `message`, and remove the oldest ones while the cache is too large."""
         messages = self._messages
         if content in messages:
             return
@@ -75,10 +76,10 @@ class Host:
     """Drives one robot's protocol object."""
 
     @classmethod
-    def of(cls, protocol: type[Protocol], part: AgentProblem, order: PriorityOrder | None = None) -> Self:
+    def create(cls, protocol: type[Protocol], part: AgentProblem, order: PriorityOrder | None = None) -> Self:
         """Return a host for the robot whose part of the problem is `part`.
 
-        `order` is that of `part`, where the robots of one process share it. Raises `UnsupportedError` (see
+        `order`: the priority order of `part`, if the robots of one process share it. Raises `UnsupportedError` (see
         `LocalProblem`).
         """
         return cls(protocol(LocalProblem(part), order or order_of(part)), part.parameters)
@@ -87,21 +88,21 @@ class Host:
         self.protocol = protocol
         self.name = protocol.problem.agent
         self._equip(parameters)
-        self.dropped = self._dropper(parameters)
-        """Decides which messages to this robot are lost, and counts them; None: none is."""
+        self.dropper = self._dropper(parameters)
+        """Decides which messages to this robot are lost, and counts them; None if no message is."""
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0
         self.said_at: list[int] = []
-        """Of each message that the last step has said: `checks` as it was then."""
+        """The value of `checks` at each message of the last step."""
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
         self._begun = False
-        self.under_way: UnderWay | None = None
-        """Where robots that share a process find what may be shared (the simulator's); otherwise it is decoded."""
+        self.message_cache: MessageCache | None = None
+        """The messages that the robots of a simulation share; None: each robot decodes its own."""
         self._decode: Callable[[bytes], Message] = message_decoder(protocol.messages).decode
         self.counted = 0
-        """Constraint checks that the clock has counted: all of them, but within a step."""
+        """Constraint checks that the clock includes: all of them, except within a step."""
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
         self._bounded: int | float = 0
@@ -120,8 +121,8 @@ class Host:
     ) -> None:
         """Report each event to `observer` from now on, stamped with `now()`.
 
-        Where time is counted in checks, `then(n)` is the time when the robot had done n: for what it takes in and says.
-        `bounds`: tell of lower bounds, too.
+        Where time is counted in checks, `then(n)` is the time at which the robot had done n of them: the time of its
+        received and sent messages. `bounds`: report lower bounds, too.
         """
         self._bounds = bounds
         self._observer = observer
@@ -130,13 +131,13 @@ class Host:
 
     @property
     def checks(self) -> int:
-        """Constraint checks so far."""
+        """The number of constraint checks so far."""
         return self.protocol.problem.checks
 
     def start(self, *, lossless: bool = True) -> list[Envelope]:
-        """Begin the search, or go on with it after a change; returns what the robot says first.
+        """Start the search, or resume it after a change; return the robot's first messages.
 
-        `lossless` says whether no message of the epoch before was lost.
+        `lossless`: no message of the previous epoch was lost.
         """
         protocol = self.protocol
         if self._begun and isinstance(protocol, DynamicProtocol):
@@ -147,21 +148,21 @@ class Host:
         return self._said()
 
     def change(self, part: AgentProblem, invalidated: Invalidated, order: PriorityOrder | None = None) -> None:
-        """Enter a new epoch: the problem has changed to `part`, and counting begins again.
+        """Enter a new epoch with the changed problem `part`, and reset all counts.
 
-        A protocol that can, and has begun, goes on with what it knows; any other is begun anew. `order` is as in `of`.
-        Raises `UnsupportedError`.
+        A dynamic protocol that was started continues with its knowledge; any other protocol is started again. `order`
+        is as in `create`. Raises `UnsupportedError`.
         """
         problem, order = LocalProblem(part), order or order_of(part)
         if self._begun and isinstance(self.protocol, DynamicProtocol):
-            problem.allow_undeclared()  # until others have heard that a value is gone
+            problem.allow_undeclared()  # until other robots know that a value was removed
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
         else:
             self.protocol = type(self.protocol)(problem, order)
             self._equip(part.parameters)
             self._begun = False
-        self.dropped = self._dropper(part.parameters)
+        self.dropper = self._dropper(part.parameters)
         self.clock = self.bytes = self.largest = self.counted = self._step_began = 0
         self.sent = {}
         self._reported = (None, None)
@@ -169,21 +170,21 @@ class Host:
         self._bounded = 0
 
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
-        """Take in all waiting messages, let the protocol settle, and return what it says.
+        """Receive all waiting messages, let the protocol settle, and return its messages.
 
-        Raises `BadMessageError` when an envelope's content is no message of the protocol, or one that cannot be used.
+        Raises `BadMessageError` if the protocol cannot decode or use the content of an envelope.
         """
         for envelope in packet:
-            self.take_in(envelope)
+            self.receive(envelope)
         return self.settle()
 
-    def take_in(self, envelope: Envelope) -> None:
-        """Take in one message of a packet, of which more may follow. Raises `BadMessageError`.
+    def receive(self, envelope: Envelope) -> None:
+        """Receive one message of a packet, which may contain more. Raises `BadMessageError`.
 
-        What the robot says at once does not carry the clocks of those that follow.
+        Immediate answers do not carry the clocks of the messages that follow.
         """
         try:
-            message = None if self.under_way is None else self.under_way.get(envelope.content)
+            message = None if self.message_cache is None else self.message_cache.get(envelope.content)
             if message is None:
                 message = self._decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -208,7 +209,7 @@ class Host:
             )
 
     def catch_up(self, clock: int) -> None:
-        """Advance the clock of the message taken in last, and of the answers to it, by this amount."""
+        """Advance to `clock`, and move the stamps of the answers to the last message by the same amount."""
         late = clock - self.clock
         self.clock = clock
         for place in range(self._answers, len(self._stamps)):
@@ -225,21 +226,22 @@ class Host:
     def handle_lossy(
         self, packet: Sequence[Envelope], missing: Callable[[Envelope], int | None], *, lost: bool
     ) -> list[Envelope] | None:
-        """Handle a packet, as `handle` does, in a search in which messages get lost, and return what the robot says.
+        """Handle a packet, as `handle` does, in a search in which messages get lost; return the robot's messages.
 
-        A protocol that bears loss is told what is missing. One that does not is told nothing. It may raise anything
-        once a message is lost, and cannot go on then.
+        Only a protocol that bears loss is informed of missing messages. Any other protocol may raise any error once a
+        message is lost, and then cannot continue.
 
         Args:
             packet: The messages that have arrived.
-            missing: Returns how many messages of its sender were lost right before a message; None: it is lost as well.
+            missing: Returns the number of messages of the same sender that were lost right before a message; None if
+                the message is lost as well.
             lost: Whether a message of the search is or may be lost, to this robot or to others.
 
         Returns:
-            The messages. None: the protocol cannot go on.
+            The robot's messages; None if the protocol cannot continue.
 
         Raises:
-            BadMessageError: as `handle` does, where no loss is an excuse.
+            BadMessageError: as `handle`, if no loss explains the error.
         """
         bears = self.protocol.traits.bears_loss
         try:
@@ -249,7 +251,7 @@ class Host:
                     continue
                 for _ in range(many if bears else 0):
                     self.protocol.miss(envelope.sender)
-                self.take_in(envelope)
+                self.receive(envelope)
             return self.settle()
         except Exception:
             if bears or not lost:
@@ -257,17 +259,17 @@ class Host:
             return None
 
     def go_on(self) -> list[Envelope] | None:
-        """Let the protocol continue without what it waits for; return its messages. None: it does not continue."""
+        """Let the protocol continue without the missing messages; return its messages, or None if it cannot."""
         return self._said() if self.protocol.go_on() else None
 
     def metrics(self) -> Metrics:
-        """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
-        lost = 0 if self.dropped is None else self.dropped.many
+        """Return this robot's counts so far; `ncccs` is this robot's clock."""
+        lost = 0 if self.dropper is None else self.dropper.count
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest, lost_messages=lost)
 
-    def _dropper(self, parameters: RunParameters) -> Dropped | None:
+    def _dropper(self, parameters: RunParameters) -> MessageDropper | None:
         loss = parameters.message_loss
-        return Dropped(loss, parameters.seed, self.name) if loss else None
+        return MessageDropper(loss, parameters.seed, self.name) if loss else None
 
     def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol its settings and its random generator."""
@@ -277,7 +279,7 @@ class Host:
         protocol.secret = KeyStream(parameters.seed, self.name)
 
     def _said(self) -> list[Envelope]:
-        """Count the checks of a step that has ended, and wrap what the protocol has said in it."""
+        """Count the checks of a finished step, and return its messages in envelopes."""
         self._tick()
         protocol = self.protocol
         self.said_at = protocol.said_at
@@ -289,7 +291,7 @@ class Host:
         return envelopes
 
     def _envelopes(self) -> list[Envelope]:
-        """Encode and count all messages in the outbox; one that goes to several robots in turn is encoded once."""
+        """Encode and count all messages in the outbox; encode a message to several robots in a row once."""
         found = []
         last: Message | None = None
         content, kind = b"", ""
@@ -297,8 +299,8 @@ class Host:
             if message is not last:
                 last, content, kind = message, encode(message), type(message).__name__
                 self.largest = max(self.largest, len(content))
-                if self.under_way is not None and message.shareable:
-                    self.under_way.keep(content, message)
+                if self.message_cache is not None and message.shareable:
+                    self.message_cache.keep(content, message)
             self.sent[kind] = self.sent.get(kind, 0) + 1
             self.bytes += len(content)
             envelope = Envelope(self.name, receiver, content, clock)
@@ -320,7 +322,7 @@ class Host:
         )
 
     def _tick(self) -> None:
-        """Advance the clock by one for each new check, and stamp the messages of this time with it."""
+        """Advance the clock by one for each new check, and stamp the messages written since the last call."""
         protocol = self.protocol
         stamps, said_at = self._stamps, protocol.said_at
         checks = protocol.problem.checks
@@ -342,7 +344,7 @@ class Host:
         self._stamps.clear()
 
     def _report_state(self, observer: Observer) -> None:
-        """Tell of a value, a verdict or a best assignment that is new since the last report."""
+        """Report a value, a verdict or a best assignment that is new since the last report."""
         best: Any = self.protocol.incumbent  # as an `Incumbent`, mypyc would make a float of its cost
         if best is not None and best.cost < self._heard:
             self._heard = best.cost
@@ -359,7 +361,7 @@ class Host:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
 
     def _report_bound(self, observer: Observer) -> None:
-        """Tell of a lower bound that is higher than all before."""
+        """Report a lower bound that is higher than all previous ones."""
         bound: Any = self.protocol.findings.bound
         if bound is not None and self._bounded < bound < math.inf:
             self._bounded = bound
@@ -367,10 +369,10 @@ class Host:
 
 
 def _refusal(what: str, error: Exception) -> BadMessageError:
-    """Return the error for `what` a robot cannot use, with the place where its protocol has raised `error`.
+    """Return the error for an unusable message, described by `what`, with the traceback of the protocol's `error`.
 
-    It is made here, in one place: protocols check a message where they use it, and no check is made twice. A mistake
-    of the protocol looks the same; the place tells.
+    Protocols check a message where they use it, so no check is made twice. A mistake in the protocol causes the same
+    error; the traceback shows the difference.
     """
     text = f"{what} that cannot be used: {type(error).__name__}: {error}"
     return BadMessageError(text).with_traceback(error.__traceback__)
@@ -383,11 +385,11 @@ def may_be_shared(messages: object) -> bool:
 
 @cache
 def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
-    """Return the decoder of a protocol's `messages`. It is made once: that takes longer than to decode a few."""
+    """Return the decoder of a protocol's `messages`, cached as its construction is slow."""
     return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
 def order_of(part: AgentProblem) -> PriorityOrder:
-    """Return the order in which the robots of a team work, with its pseudo-tree if they know it."""
+    """Return the priority order of the team's robots, with its pseudo-tree if they know it."""
     known = part.known
     return PriorityOrder(known.order, known.links, known.rank)

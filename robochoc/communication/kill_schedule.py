@@ -7,44 +7,44 @@ from typing import NamedTuple
 
 
 class Kill(NamedTuple):
-    """The process of `robot` is to end with SIGKILL, `after_s` seconds after the search began."""
+    """SIGKILL for the process of `robot`, `after_s` seconds after the start of the search."""
 
     robot: str
     after_s: float
 
 
 class KillSchedule:
-    """The kills of one run that are still to come. All times are in seconds, on the monotonic clock."""
+    """The pending kills of one run. All times are in seconds, on the monotonic clock."""
 
     def __init__(self, kills: Iterable[Kill] = ()) -> None:
         self._pending = sorted(kills, key=lambda kill: kill.after_s)
         self._began: float | None = None
         self._took_s = 0.0
 
-    def begin(self, now: float) -> None:
-        """Note that the run's first search begins. Later searches change nothing."""
+    def start(self, now: float) -> None:
+        """Note the start of the run's first search. Later searches change nothing."""
         self._began = now if self._began is None else self._began
 
     def end(self, now: float) -> None:
-        """Note that a search is over."""
+        """Note the end of a search."""
         if self._began is not None:
             self._took_s = now - self._began
 
     def wait_s(self, now: float) -> float | None:
-        """Return how many seconds are left until the next kill; None if there is none."""
+        """Return the seconds until the next kill; None if there is none."""
         if self._began is None or not self._pending:
             return None
         return max(0.0, self._began + self._pending[0].after_s - now)
 
     def due(self, now: float) -> list[str]:
-        """Return the robots to kill now. They are no longer pending."""
+        """Remove the robots to kill now from the schedule, and return them."""
         names = []
         while self.wait_s(now) == 0:
             names.append(self._pending.pop(0).robot)
         return names
 
     def warn_of_pending(self) -> None:
-        """Say, by Python's `logging`, which robots were not killed because the search was over before."""
+        """Warn, by Python's `logging`, of robots that were not killed because the search ended before."""
         if not self._pending:
             return
         import logging  # noqa: PLC0415 - nearly no run has anything to report

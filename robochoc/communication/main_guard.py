@@ -1,4 +1,4 @@
-"""Processes that are not forked import the program's own file: what it does unguarded, each of them would do again."""
+"""A check for `if __name__ == "__main__":`, as processes that are not forked import, and so run, the program's file."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from robochoc.solver.encoding import UnsupportedError
 
 
 def require_main_guard() -> None:
-    """Raise `UnsupportedError` if the line of the program's file that is being run would be run by an import, too.
+    """Raise `UnsupportedError` if an import of the program's file would run its present line, too.
 
-    It may be run where it stands below `if __name__ == "__main__":`, where processes do not import the file (there is
-    none, or it is the `__main__` of a package: see `multiprocessing.spawn`), and where its source cannot be read.
+    The line is allowed below `if __name__ == "__main__":`, if processes do not import the file (there is none, or it
+    is the `__main__` of a package: see `multiprocessing.spawn`), and if its source cannot be read.
     """
     main = sys.modules["__main__"]
     file = getattr(main, "__file__", None)
@@ -23,13 +23,13 @@ def require_main_guard() -> None:
     line = _line_of(vars(main), file)
     if line is not None and not _is_guarded(Path(file), line):
         raise UnsupportedError(
-            f"{file}:{line}: each robot's process imports this file, and would come here again; write"
-            ' if __name__ == "__main__": and what starts the robots below it, or use runtime="processes"'
+            f"{file}:{line}: each robot's process imports this file, and would run this line again: move the code that"
+            ' starts the robots below if __name__ == "__main__":, or use runtime="processes"'
         )
 
 
 def _line_of(names: dict[str, object], file: str) -> int | None:
-    """Return the line of the module with these `names` that is being run. None: another thread runs it."""
+    """Return the present line of the module with these `names`; None if another thread runs it."""
     frame: FrameType | None = sys._getframe(1)  # noqa: SLF001 - `inspect.stack` reads the files of all frames
     while frame is not None:
         code = frame.f_code
@@ -40,7 +40,7 @@ def _line_of(names: dict[str, object], file: str) -> int | None:
 
 
 def _is_guarded(file: Path, line: int) -> bool:
-    """Return whether `line` is run in the program itself only, as far as one can see."""
+    """Return whether `line` is run in the program itself only, judged by the syntax tree."""
     try:
         before = [one for one in ast.parse(file.read_bytes()).body if one.lineno <= line]
     except (OSError, SyntaxError, ValueError, RecursionError):

@@ -1,7 +1,7 @@
 """The master's loop of one search, for every transport: processes' pipes, or the network.
 
 The master waits until all robots are ready, orders the start, asks for counters until they show quiescence, and ends
-the search. What it decides is in `SearchState`; how it reads and sends control messages is the runtime's.
+the search. Its decisions are in `SearchState`; each runtime implements the transport of control messages.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.search_watch import SearchWatch
-from robochoc.communication.session import over
+from robochoc.communication.session import is_past
 from robochoc.system.stopping import stop_requested
 
 TICK_S = 0.2
@@ -23,15 +23,15 @@ TICK_S = 0.2
 
 
 class MasterLoop(ABC):
-    """The loop of a master whose search is in `state`. `progress` receives the count of messages now and then.
+    """The loop of a master with the search `state`. `progress` receives the count of messages every `TICK_S` seconds.
 
-    `watch` gets snapshots of the search while it goes on (None: nobody watches).
+    `watch` receives snapshots during the search (None: no snapshots are made).
     """
 
     state: SearchState
     watch: SearchWatch | None = None
     check_s: float = TICK_S
-    """Seconds between two checks of which robots are still there."""
+    """Seconds between two checks for lost robots."""
 
     def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
         self._progress = progress
@@ -51,23 +51,23 @@ class MasterLoop(ABC):
 
     @abstractmethod
     def _check_robots(self, now: float) -> None:
-        """Find out which robots are gone. Raises as `_serve`."""
+        """Find lost robots. Raises as `_serve`."""
 
     @abstractmethod
     def _order_start(self) -> None:
-        """Tell all robots to begin."""
+        """Order all robots to start."""
 
     @abstractmethod
     def _send_all(self, message: Wave | GoOn | TakeSnapshot, /) -> None:
         """Send a control message to all robots."""
 
     def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
-        """Have `kill` end robots' processes as `kills` says."""
+        """Call `kill` with the name of each robot at its time in `kills`."""
         self._kills = kills
         self._kill = kill
 
     def _search_until(self, deadline: float | None) -> None:
-        """Search until there is a verdict, it has to be broken off, the deadline comes, or somebody asks to stop.
+        """Search until a verdict, an abort, the deadline, or a request to stop.
 
         Raises as `_serve`.
         """
@@ -76,7 +76,7 @@ class MasterLoop(ABC):
         if not state.ready or state.ended:
             return
         self._order_start()
-        self._kills.begin(time.monotonic())
+        self._kills.start(time.monotonic())
         state.ordered = state.searching = True
         self._serve_until(lambda: state.ended or self.is_to_stop, deadline)
         state.searching = False
@@ -84,14 +84,14 @@ class MasterLoop(ABC):
 
     @property
     def is_to_stop(self) -> bool:
-        """Return whether somebody has asked to stop, or the search need not go on."""
+        """Whether a stop was requested, or the watch is satisfied."""
         return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
     def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
         """Serve the robots until `done()`, or until the deadline on the monotonic clock. Raises as `_serve`."""
         while not done():
             now = time.monotonic()
-            if over(deadline):
+            if is_past(deadline):
                 return
             waits = (TICK_S, None if deadline is None else deadline - now, self._kills.wait_s(now))
             watch = self.watch if self.state.searching else None
@@ -107,22 +107,22 @@ class MasterLoop(ABC):
                 self._take_snapshots(watch)
 
     def _take_snapshots(self, watch: SearchWatch) -> None:
-        """Give `watch` the snapshot that all robots have answered, and ask for the next one when it is wanted."""
+        """Give `watch` a complete snapshot, and request the next one when it is due."""
         snapshot = self._snapshot()
         if snapshot is not None:
-            watch.take(snapshot)
+            watch.receive(snapshot)
         if watch.wants_snapshot(time.monotonic()):
-            number = self.state.begin_snapshot()
+            number = self.state.start_snapshot()
             if number is not None:
                 self._ask_for_snapshot(number)
 
     def _ask_for_snapshot(self, number: int) -> None:
-        """Ask all robots for the snapshot `number`."""
+        """Request the snapshot `number` from all robots."""
         self._send_all(TakeSnapshot(number))
 
     def _snapshot(self) -> RunResult | None:
-        """Return the snapshot that was asked for, once it is complete; None before, and afterwards."""
-        return self.state.end_snapshot()
+        """Return the requested snapshot once, when it is complete; otherwise None."""
+        return self.state.completed_snapshot()
 
     def _kill_due(self) -> None:
         if self._kill is not None:
@@ -130,12 +130,12 @@ class MasterLoop(ABC):
                 self._kill(name)
 
     def _detect_end(self, now: float) -> None:
-        """Begin a wave when it could show quiescence, or when the count of messages is wanted."""
+        """Start a wave if it could show quiescence, or if the count of messages is needed for the progress."""
         wanted = self._progress is not None and now - self._shown >= TICK_S
         if self._progress and wanted:
             self._shown = now
             self._progress(Progress(self.state.counters.sent, time.monotonic() - self._began))
-        if self.state.begin_going_on():
+        if self.state.start_continuation():
             self._send_all(GoOn())
         wave = self.state.next_wave(wanted=wanted)
         if wave is not None:

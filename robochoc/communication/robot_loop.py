@@ -1,7 +1,7 @@
 """A robot's part in a search, for every transport: queues between processes, or the network.
 
-It stands between the host, which drives the protocol, and a runtime, which moves bytes. It confirms that the robot is
-ready, hands packets of messages to the host, counts, reports to the master, and is silent once the search is over.
+The loop connects the host, which drives the protocol, with a runtime, which moves bytes. It confirms that the robot is
+ready, passes packets of messages to the host, counts messages, reports to the master, and stops at the end.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, Snapshot, WentOn
-from robochoc.communication.dropped import Dropped
 from robochoc.communication.host import Host
+from robochoc.communication.message_dropper import MessageDropper
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
 from robochoc.protocols.findings import Findings
@@ -20,22 +20,22 @@ from robochoc.protocols.findings import Findings
 IDLE_S = 0.002
 """Seconds without a message after which a robot reports its counters.
 
-It says when to ask, never what is true.
+The detection of quiescence is correct for any value.
 """
 EVENTS_AT_ONCE = 500
 """The most events in one bundle to the master."""
 
 
 class RobotLoop(ABC):
-    """One robot in the search `epoch`; `observed` says whether its events are wanted, `bounds`, also lower bounds.
+    """One robot in the search `epoch`; `observed`: it reports events; `bounds`: these include lower bounds.
 
-    A runtime calls `confirm` when the robot's host is there, `begin` when the master orders the start, `admit` for each
-    message and `take_in` for each packet of them, `report_idle` when nothing comes, `go_on` when the master says that
-    nothing will, and `pause` at the end.
+    A runtime calls `confirm` when the robot's host exists, `start` when the master orders the start, `admit` for each
+    message and `receive` for each packet of messages, `report_idle` when no message arrives, `go_on` when the master
+    reports that none will, and `pause` at the end.
     """
 
     bundle_bytes: int
-    """The size at which a bundle of events is closed: bytes of all its messages."""
+    """The size at which a bundle of events is sent: bytes of all its messages."""
 
     def __init__(self, epoch: int, *, observed: bool, bounds: bool = False) -> None:
         self.epoch = epoch
@@ -52,10 +52,10 @@ class RobotLoop(ABC):
         self._reported: tuple[int, int] | None = None
         self._searching = self._concluded = self._paused = self._mute = False
 
-    # What a runtime supplies
+    # Implemented by runtimes
 
     @abstractmethod
-    def _say(self, message: RobotMessage) -> None:
+    def _send_to_master(self, message: RobotMessage) -> None:
         """Send a control message to the master."""
 
     @abstractmethod
@@ -64,24 +64,24 @@ class RobotLoop(ABC):
 
     @abstractmethod
     def _report_end(self) -> None:
-        """Tell the master what came of the search."""
+        """Send the master the final report of the search."""
 
     # The course of a search
 
     def confirm(self, host: Host) -> None:
-        """Tell the master that the robot is ready to search with `host`."""
+        """Report to the master that the robot is ready to search with `host`."""
         if self._host is not host and self._observed:
             host.observe(self._events.append, self._now, bounds=self._bounds)
         self._host = host
-        self._conclude(host)  # a verdict can stand in spite of a change
-        self._say(Ready(self.epoch))
+        self._conclude(host)  # a verdict can hold in spite of a change
+        self._send_to_master(Ready(self.epoch))
 
-    def begin(self, began: float, *, lossless: bool = True) -> None:
-        """Begin the search, or resume it after a change. Nothing happens before `confirm`.
+    def start(self, began: float, *, lossless: bool = True) -> None:
+        """Start the search, or resume it after a change. Does nothing before `confirm`.
 
         Args:
-            began: When the run began, on the monotonic clock.
-            lossless: No message of the epoch before was lost.
+            began: The time of the run's start, on the monotonic clock.
+            lossless: No message of the previous epoch was lost.
         """
         if self._host is None:
             return
@@ -90,50 +90,53 @@ class RobotLoop(ABC):
         self._reported = (-1, -1)
         self._send(self._host, self._host.start(lossless=lossless))
         early, self._early = self._early, []
-        self.take_in(early)
+        self.receive(early)
 
     def admit(self, envelope: Envelope) -> bool:
-        """Return whether `envelope` belongs to the packet at hand.
+        """Return whether `envelope` belongs to the present packet.
 
-        It is kept before the start, and lost after the end.
+        Before the start it is stored for later, after the end it is dropped.
         """
         if not (self._searching or self._paused):
             self._early.append(envelope)
         return self._searching
 
-    def take_in(self, packet: Sequence[Envelope]) -> None:
-        """Handle all messages that wait, and send the answers. Raises `BadMessageError`."""
+    def receive(self, packet: Sequence[Envelope]) -> None:
+        """Handle a packet of messages, and send the answers. Raises `BadMessageError`."""
         if packet and self._host and self._searching:
             self._received += len(packet)
-            dropped = self._host.dropped
-            self._send(self._host, self._host.handle(packet) if dropped is None else self._lossy(packet, dropped))
+            dropper = self._host.dropper
+            self._send(
+                self._host, self._host.handle(packet) if dropper is None else self._handle_lossy(packet, dropper)
+            )
         if len(self._events) > EVENTS_AT_ONCE:
             self.report_events()
 
-    def _lossy(self, packet: Sequence[Envelope], dropped: Dropped) -> list[Envelope]:
-        """Handle what is not dropped of a packet; return what the robot says.
+    def _handle_lossy(self, packet: Sequence[Envelope], dropper: MessageDropper) -> list[Envelope]:
+        """Handle the messages of a packet that are not dropped; return the robot's messages.
 
-        Where its protocol cannot go on without what is missing, here or at another robot, it is silent from then on.
+        If the protocol cannot continue without a message that was dropped here or at another robot, the robot sends
+        nothing more.
         """
         if self._host is None or self._mute:
             return []
-        said = self._host.handle_lossy(packet, dropped.missing, lost=True)
+        said = self._host.handle_lossy(packet, dropper.missing, lost=True)
         if said is None:
             self._mute = True
-            dropped.refuse()
+            dropper.mark_lossy()
             return []
         return said
 
     def go_on(self) -> None:
-        """Go on without the messages that the protocol waits for, and tell the master whether it does."""
+        """Continue without the messages that the protocol waits for, and report to the master whether it does."""
         host = self._host
         said = host.go_on() if host is not None and self._searching else None
         if host is not None and said is not None:
             self._send(host, said)
-        self._say(WentOn(self.epoch, said is not None))
+        self._send_to_master(WentOn(self.epoch, said is not None))
 
     def pause(self) -> None:
-        """Be silent, and report. What still arrives is lost."""
+        """Stop, and send the final report. Messages that arrive later are dropped."""
         self._searching, self._paused = False, True
         self._early = []
         self.report_events()
@@ -145,49 +148,49 @@ class RobotLoop(ABC):
         self._conclude(host)
 
     def _conclude(self, host: Host) -> None:
-        """Tell the master, once, that the protocol has a verdict."""
+        """Report the protocol's verdict to the master, once."""
         verdict = host.protocol.verdict
         if verdict is not None and not self._concluded:
             self._concluded = True
-            self._say(Conclusion(self.epoch, verdict))
+            self._send_to_master(Conclusion(self.epoch, verdict))
 
     # Reports
 
     @property
     def is_restless(self) -> bool:
-        """Return whether the master does not know the present counters yet."""
+        """Whether the counters have changed since the last report to the master."""
         return self._searching and self._reported != (self._sent, self._received)
 
     def report_counters(self, wave: int) -> None:
-        """Tell the master how many messages were sent and received: in answer to `wave`, or (0) unasked."""
+        """Send the master the counts of sent and received messages: in answer to `wave`, or (0) unasked."""
         self._reported = (self._sent, self._received)
-        self._say(Counters(self.epoch, wave, *self._reported))
+        self._send_to_master(Counters(self.epoch, wave, *self._reported))
 
     def report_snapshot(self, number: int) -> None:
-        """Tell the master what the robot has, in answer to `TakeSnapshot`. The search goes on."""
+        """Send the master the answer to `TakeSnapshot`. The search continues."""
         host = self._host
         if host is not None:
             assignment, findings = self._known_to_master(host)
-            lost = 0 if host.dropped is None else host.dropped.many
-            self._say(Snapshot(self.epoch, number, assignment, lost, findings))
+            lost = 0 if host.dropper is None else host.dropper.count
+            self._send_to_master(Snapshot(self.epoch, number, assignment, lost, findings))
 
     def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
-        """Return what the master may know: the own values, and what is known of the whole search."""
+        """Return the values and findings that the master may know."""
         return host.protocol.assignment, host.protocol.findings
 
     def report_idle(self) -> None:
-        """Send the master all reports that are due, as the robot is idle."""
+        """Send the master all due reports, as the robot is idle."""
         self.report_events()
         self.report_counters(0)
 
     def report_events(self) -> None:
-        """Send the events since the last report, in bundles that the way to the master can carry."""
+        """Send the events since the last report, in bundles of at most about `bundle_bytes`."""
         events, self._events[:] = list(self._events), []
         size = start = 0
         for end, event in enumerate(events, 1):
             size += event.bytes if isinstance(event, Sent) else 0
             if size >= self.bundle_bytes or end - start == EVENTS_AT_ONCE or end == len(events):
-                self._say(Events(events[start:end]))
+                self._send_to_master(Events(events[start:end]))
                 size, start = 0, end
 
     def _now(self) -> float:

@@ -1,7 +1,7 @@
 """The state of one search as its master sees it, independent of the transport. Pure.
 
-It knows which robots are ready, their counters, who was lost, which verdict the search has, and what robots report.
-The runtimes of processes and of the network use the same state; the network's also distrusts what robots say
+It contains the ready robots, the counters, the lost robots, the verdict of the search, and the robots' reports. The
+runtimes of processes and of the network use the same state; the network's also audits the robots' messages
 (`network/audited_state.py`).
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready, Report, Snapshot, WentOn
+from robochoc.communication.control import Conclusion, Counters, EpochMessage, Ready, Report, Snapshot, WentOn
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.search_watch import SnapshotRound
@@ -24,14 +24,14 @@ class SearchState:
     """The state of the search `epoch` by the robots in `order`.
 
     Attributes:
-        counters: The robots' message counters, and the wave that is under way.
-        lost: Why robots were lost in this search, by name.
-        verdict: How the search has ended; None while it has not.
+        counters: The robots' message counters, and the open wave.
+        lost: The reasons of losses in this search, by robot.
+        verdict: The verdict of the search; None until it has ended.
         witness: The robot that concluded the verdict; None when quiescence or a limit ended the search.
         max_messages: The limit on messages, if there is one.
-        ordered: The robots were told to begin.
-        searching: They search now.
-        lossy: Messages are lost, and the protocol bears that: robots that wait go on without, until none does.
+        ordered: The robots were ordered to start.
+        searching: The robots search now.
+        lossy: Messages are lost, and the protocol bears that: waiting robots continue without them, until none does.
     """
 
     def __init__(
@@ -54,10 +54,10 @@ class SearchState:
         self._went = False
         self._snapshots = SnapshotRound()
 
-    def handle(self, name: str, message: OfEpoch) -> str:
-        """Take in a control message of the robot `name`; return what is wrong with it, or an empty text.
+    def handle(self, name: str, message: EpochMessage) -> str:
+        """Handle a control message of the robot `name`; return the reason why it is invalid, or an empty text.
 
-        Late messages of another search, and those of lost robots, change nothing.
+        Late messages of another search, and messages of lost robots, are ignored.
         """
         fault = ""
         if message.epoch != self.epoch or name not in self._present:
@@ -76,7 +76,7 @@ class SearchState:
             case Report():
                 fault = self._take_report(name, message)
             case _:
-                fault = "it is none for the master"
+                fault = "its message is not for the master"
         return fault
 
     def _count(self, name: str, wave: int, counts: Counts) -> str:
@@ -84,16 +84,16 @@ class SearchState:
         return ""
 
     def _conclude(self, name: str, verdict: str) -> str:
-        """Take in a verdict that the robot `name` concluded alone. The first one stands."""
+        """Record a verdict that the robot `name` concluded alone. The first verdict counts."""
         fault = self._traits.fault_of_conclusion(verdict)
         if not fault and self.verdict is None:
             self.verdict, self.witness = Verdict(verdict), name
         return fault
 
     def _note_went_on(self, name: str, *, went: bool) -> str:
-        """Note whether a robot has gone on; once all have answered and none has, the search is over."""
+        """Record whether a robot has continued; if all have answered and none has, the search is over."""
         if name not in self._undecided:
-            return "it was not asked whether it goes on"
+            return "it answered whether it continues, without having been asked"
         self._undecided.discard(name)
         self._went = self._went or went
         if not self._undecided and not self._went:
@@ -104,16 +104,16 @@ class SearchState:
     def _take_snapshot(self, name: str, snapshot: Snapshot) -> str:
         return self._snapshots.add(name, snapshot)
 
-    def begin_snapshot(self) -> int | None:
-        """Return the number of a snapshot that all robots are to be asked for; None while one is under way."""
-        return self._snapshots.begin()
+    def start_snapshot(self) -> int | None:
+        """Return the number of a snapshot to request from all robots; None while another one is pending."""
+        return self._snapshots.open()
 
-    def end_snapshot(self) -> RunResult | None:
-        """Return the snapshot that was asked for, once all robots have answered; None before, and afterwards."""
-        return self._snapshots.end(self._present)
+    def completed_snapshot(self) -> RunResult | None:
+        """Return the requested snapshot once, when all robots have answered; otherwise None."""
+        return self._snapshots.close(self._present)
 
-    def begin_going_on(self) -> bool:
-        """Return whether all robots are to be told to go on: nothing is under way, and some may wait in vain."""
+    def start_continuation(self) -> bool:
+        """Return whether to order all robots to continue: no message is in transit, and some may wait for lost ones."""
         if not self.lossy or not self.counters.quiescent or self.ended:
             return False
         self.counters.quiescent = False
@@ -125,7 +125,7 @@ class SearchState:
         return ""
 
     def lose(self, name: str, why: str) -> None:
-        """Note that the robot is lost; what it reported no longer counts."""
+        """Mark the robot as lost, and discard its report."""
         self.lost.setdefault(name, why)
         self._present.discard(name)
         self._unready.discard(name)
@@ -134,46 +134,46 @@ class SearchState:
 
     @property
     def ready(self) -> bool:
-        """Return whether all robots can begin."""
+        """Whether all robots are ready."""
         return not self._unready
 
     @property
     def broken_off(self) -> bool:
-        """Return whether the search must end without a verdict: robots were lost, or the message limit is reached."""
+        """Whether the search must end without a verdict: robots were lost, or the message limit is reached."""
         return bool(self.lost) or (self.max_messages is not None and self.counters.sent >= self.max_messages)
 
     @property
     def ended(self) -> bool:
-        """Return whether the search is over, with a verdict or without."""
+        """Whether the search is over, with or without a verdict."""
         return self.verdict is not None or self.broken_off
 
     @property
     def wave_due(self) -> bool:
-        """Return whether a wave could show quiescence, or that the message limit is reached."""
-        return self.counters.due or (self.max_messages is not None and not self.counters.waving)
+        """Whether a wave could show quiescence, or that the message limit is reached."""
+        return self.counters.due or (self.max_messages is not None and not self.counters.is_wave_open)
 
     def next_wave(self, *, wanted: bool = False) -> int | None:
-        """Return the number of a wave to begin now, or None.
+        """Return the number of a wave to start now, or None.
 
-        When the last wave has shown quiescence, the verdict is a solution (unless a robot has concluded another).
+        If the last wave has shown quiescence, the verdict is a solution (unless a robot has concluded another one).
 
         Args:
-            wanted: Begin a wave unless one is under way, as the count of messages is wanted.
+            wanted: Start a wave unless one is open, as the count of messages is needed.
         """
         if self._undecided:
             return None
         if self.counters.quiescent:
             self.verdict = self.verdict or Verdict.SOLUTION
             return None
-        return self.counters.begin_wave() if self.wave_due or (wanted and not self.counters.waving) else None
+        return self.counters.start_wave() if self.wave_due or (wanted and not self.counters.is_wave_open) else None
 
     def has_reported(self, name: str) -> bool:
-        """Return whether the robot has reported the end of its search."""
+        """Return whether the robot has sent its final report."""
         return name in self._reports
 
     @property
     def pending_reports(self) -> tuple[str, ...]:
-        """The robots that have not reported yet, sorted."""
+        """The robots that have not sent their final report, sorted."""
         return tuple(sorted(self._present - self._reports.keys()))
 
     def result(self, wall_s: float) -> RunResult:

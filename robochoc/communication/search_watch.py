@@ -1,4 +1,4 @@
-"""Watching a search while it goes on: at times the watcher gets what the robots have, and they search on."""
+"""Watching a search: the watcher receives snapshots of the robots' values while they continue."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class SearchWatch(ABC):
-    """Watches a search. Runtimes call `wants_snapshot` now and then, and `take` with each snapshot."""
+    """Watches a search. Runtimes call `wants_snapshot` now and then, and `receive` with each snapshot."""
 
     @property
     @abstractmethod
     def satisfied(self) -> bool:
-        """Return whether the search need not go on."""
+        """Whether the search may stop."""
 
     @abstractmethod
     def wait_s(self, now: float) -> float:
-        """Return in how many seconds `wants_snapshot` should be called; `now` is on the monotonic clock."""
+        """Return the seconds until the next call of `wants_snapshot`; `now` is on the monotonic clock."""
 
     @abstractmethod
     def wants_snapshot(self, now: float) -> bool:
-        """Do what is due, and return whether a snapshot is to be taken now."""
+        """Do the work that is due, and return whether a snapshot is needed now."""
 
     @abstractmethod
-    def take(self, snapshot: RunResult) -> None:
-        """Take in a snapshot. Its verdict is `unknown`, as the search goes on."""
+    def receive(self, snapshot: RunResult) -> None:
+        """Receive a snapshot. Its verdict is `unknown`, as the search continues."""
 
 
 class SnapshotRound:
-    """The answers of robots to `TakeSnapshot`, one number after the other."""
+    """The robots' answers to `TakeSnapshot`, for one number at a time."""
 
     def __init__(self) -> None:
         self.number = 0
         self._open = False
         self._answers: dict[str, Snapshot] = {}
 
-    def begin(self) -> int | None:
-        """Return the number of a round that begins; None while another one goes on."""
+    def open(self) -> int | None:
+        """Open a round and return its number; None if another one is open."""
         if self._open:
             return None
         self._open, self._answers = True, {}
@@ -51,14 +51,14 @@ class SnapshotRound:
         return self.number
 
     def add(self, name: str, answer: Snapshot) -> str:
-        """Add the answer of the robot `name`; return what is wrong with it, or an empty text."""
+        """Add the answer of the robot `name`; return the reason why it is invalid, or an empty text."""
         if not self._open or answer.number != self.number or name in self._answers:
-            return "it was not asked what it has"
+            return "it sent a snapshot that was not requested"
         self._answers[name] = answer
         return ""
 
-    def end(self, present: Iterable[str]) -> RunResult | None:
-        """Return the snapshot, and end the round, once all robots that are `present` have answered; else None."""
+    def close(self, present: Iterable[str]) -> RunResult | None:
+        """Close the round and return its snapshot if all robots in `present` have answered; otherwise None."""
         if not self._open or not self._answers.keys() >= set(present):
             return None
         self._open = False
@@ -73,6 +73,6 @@ class SnapshotRound:
 def snapshot_of(
     assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings], lost_messages: int = 0
 ) -> RunResult:
-    """Return what robots have at a moment, by their names, as the result of a search that has no verdict."""
+    """Return robots' values and findings at one moment, by name, as the result of a search without a verdict."""
     metrics = Metrics(lost_messages=lost_messages)
     return RunResult(Verdict.UNKNOWN, None, dict(assignments), metrics, findings=dict(findings))

@@ -1,4 +1,4 @@
-"""A session: a team that searches, and continues when its problem changes. Every runtime offers one."""
+"""A session: a team that searches, and continues when its problem changes. Every runtime implements `Session`."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Epoch(NamedTuple):
 
     Attributes:
         compiled: The team, with compiled domains.
-        invalidated: What of the epoch before no longer holds.
-        restarted: Robots that begin anew, though there may have been others of their names before.
-        parameters: What robots are given besides the problem.
+        invalidated: The results of the previous epoch that no longer hold.
+        restarted: Robots that start without knowledge, even if robots of the same names existed before.
+        parameters: The robots' parameters besides the problem.
     """
 
     compiled: CompiledTeam
@@ -34,7 +34,7 @@ class Epoch(NamedTuple):
 
     @property
     def team(self) -> Team:
-        """The team, in the order that its robots work in."""
+        """The team, in its robots' priority order."""
         return self.compiled.team
 
     def parts(self, protocol: type[Protocol]) -> dict[str, AgentProblem]:
@@ -47,37 +47,37 @@ class Epoch(NamedTuple):
 class Session(ABC):
     """One team and one protocol in one runtime. A context manager.
 
-    `compiled` is what its robots work on: the `team` that it was opened with (compiled without a solver, where that was
-    not done before), and after each `change` that epoch's. `anew`: robots know nothing of the epoch before, whatever
-    their protocol could have kept. `watch` gets snapshots of a search while it goes on (None: nobody watches).
+    `compiled` is the team on which its robots work: first the given `team` (compiled without a solver unless it already
+    is), and after each `change` the team of that epoch. `starts_fresh`: robots keep no knowledge of the previous epoch,
+    even if their protocol could. `watch` receives snapshots during a search (None: no snapshots are made).
     """
 
-    anew: bool = False
+    starts_fresh: bool = False
     watch: SearchWatch | None = None
 
     def __init__(self, team: Team | CompiledTeam) -> None:
         self.compiled = ensure_compiled(team)
 
-    def workable(self, team: Team) -> Team:
-        """Return `team`, a later form of the one that the robots work on, as they can continue with it."""
+    def usable_team(self, team: Team) -> Team:
+        """Return the part of `team`, a changed version of the present team, with which the robots can continue."""
         return team
 
     @property
     @abstractmethod
     def lossless(self) -> bool:
-        """Return whether no message of the previous search was lost: it became quiescent, or there was none."""
+        """Whether no message of the previous search was lost: it became quiescent, or there was none."""
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
         """Search until there is a verdict, for at most `timeout` seconds or (about) `messages` messages.
 
-        When a limit comes first the verdict is `unknown`. The metrics are those of this search. Robots begin only
-        when all are there, as the paper's master orders the start. Raises `RobotsLostError` where robots can be lost.
+        If a limit is reached first, the verdict is `unknown`. The metrics are those of this search. Robots start only
+        when all are ready, as the paper's master orders the start. Raises `RobotsLostError` where robots can be lost.
         """
 
     @abstractmethod
     def change(self, epoch: Epoch) -> None:
-        """Give every robot its part of the changed problem; the next `search` works on that. Raises as `search`."""
+        """Give every robot its part of the changed problem, for the next `search`. Raises as `search`."""
 
     @abstractmethod
     def close(self) -> None:
@@ -97,6 +97,6 @@ class Session(ABC):
         self.close()
 
 
-def over(deadline: float | None) -> bool:
-    """Return whether `deadline` (on the monotonic clock; None: there is none) has come."""
+def is_past(deadline: float | None) -> bool:
+    """Return whether `deadline` (on the monotonic clock; None: no deadline) has passed."""
     return deadline is not None and time.monotonic() >= deadline

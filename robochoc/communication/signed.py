@@ -1,6 +1,6 @@
-"""The channel filter `signed`: everybody can read a message, and only its sender can have written it.
+"""The channel filter `signed`: everybody can read a message, but only its sender can have written it.
 
-Ed25519 (RFC 8032) over sender, receiver, context and content. 64 bytes more a message.
+Ed25519 (RFC 8032) over sender, receiver, context and content. 64 more bytes a message.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ class Signed(ChannelFilter):
     """Puts a signature before the content."""
 
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """Signature and content."""
+        """See `ChannelFilter.seal`."""
         signature = self.ring.sign(_signed_part(self.ring.name, receiver, content, context))
         return signature + content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """Return the content, if `sender` has signed it for this robot and `context`. Raises `NotGenuineError`."""
+        """See `ChannelFilter.open`."""
         signature, plain = content[:_SIGNATURE_BYTES], content[_SIGNATURE_BYTES:]
         part = _signed_part(sender, self.ring.name, plain, context)
         try:

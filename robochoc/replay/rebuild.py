@@ -224,7 +224,7 @@ def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epo
     name = part.robot.name
     try:
         if before is None or name in epoch.restarted:
-            return Host.of(protocol, part)
+            return Host.create(protocol, part)
         before.change(part, epoch.invalidated)
     except _UNCOMPILED:
         raise

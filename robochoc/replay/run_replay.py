@@ -153,7 +153,7 @@ class RunReplay:
         return sent, envelope
 
     def _take_in(self, host: Host, message: Sent, envelope: Envelope) -> None:
-        host.take_in(envelope)
+        host.receive(envelope)
         self.taken_in.append((message, self._decoder.message(envelope.content)))
 
     def _delay(self, host: Host, received: Received, events: list[AnyEvent]) -> None:

@@ -140,7 +140,7 @@ class Improvements(SearchWatch):
         self._asked, self._due = now, float("inf")
         return True
 
-    def take(self, snapshot: RunResult) -> None:
+    def receive(self, snapshot: RunResult) -> None:
         """See `SearchWatch`: check it, and publish it if it is better."""
         came = time.monotonic()
         self._note(self._evaluate(snapshot))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robochoc.communication.simulator.channel import ChannelModel
-from robochoc.communication.simulator.link_loss import has_place
+from robochoc.communication.simulator.loss_models import has_place
 from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import Robot, Team

@@ -143,9 +143,9 @@ def _losses_of(options: Options) -> Losses | None:
 
     if options.message_loss or not options.loss or options.channel is None:
         return Losses(options.loss, options.seed) if options.loss else None
-    from robochoc.communication.simulator.link_losses import LinkLosses  # noqa: PLC0415 - start-up: seldom asked for
+    from robochoc.communication.simulator.channel_losses import ChannelLosses  # noqa: PLC0415 - start-up: seldom asked for
 
-    return LinkLosses(options.channel, options.seed)
+    return ChannelLosses(options.channel, options.seed)
 
 
 def open_arrays(request: SessionRequest) -> Session:

@@ -291,7 +291,7 @@ class ScenarioRun:
 
         If that needs no search, the session stays with what it has until one does.
         """
-        compiled = self._compile(session.workable(self.ordered_team())) if self._prepare is None else self.prepared()
+        compiled = self._compile(session.usable_team(self.ordered_team())) if self._prepare is None else self.prepared()
         self._joining.update(joining)
         if self.found is not None:
             return Epoch(compiled, parameters=self._parameters)

@@ -33,6 +33,6 @@ class StartEvents:
         if protocol.traits.costs:
             detail["minimises"] = True
         self._observer(Began(t=0, protocol=protocol.__name__, **detail))
-        fresh = epoch.team.order if session and session.anew else epoch.restarted
+        fresh = epoch.team.order if session and session.starts_fresh else epoch.restarted
         lossless = session is None or session.lossless
         self._observer(self._writer.given(epoch.team, epoch.parameters, epoch.invalidated, fresh=fresh, quiet=lossless))

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
-from robochoc.communication.simulator.link_loss import Bursts, NamedLink, PathLoss
+from robochoc.communication.simulator.loss_models import Bursts, NamedLink, PathLoss
 from robochoc.formats import InvalidInputError
 from tests.support.cases import cases
 from tests.support.journal_entries import entries_of
@@ -122,10 +122,10 @@ BAD = {
     "latency_ms = 5\ndistance_loss = [0, 1]": "distance_loss[0]: expected a list, found an integer",
     f"latency_ms = 5\ndistance_loss = [{','.join(f'[{place}, 0]' for place in range(1001))}]": "up to 1,000 pairs",
     "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[path_loss]\npower_dbm = 1\nsensitivity_dbm = -80": (
-        "distance_loss: path_loss says already what is lost by distance"
+        "distance_loss: cannot be combined with path_loss"
     ),
     "latency_ms = 5\nunit_m = 0": "unit_m: expected a number from 0.001 to",
-    "latency_ms = 5\n[positions]\nA = [0, 0]": "positions: nothing is lost by distance; add path_loss or",
+    "latency_ms = 5\n[positions]\nA = [0, 0]": "positions: requires path_loss or distance_loss; add one",
     "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = [0]": "positions: A: expected [x, y] or [x, y, z]",
     "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = [0, nan]": "positions: A: expected [x, y]",
     "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = [0, 1e10]": "positions: A: expected [x, y]",
@@ -156,7 +156,7 @@ def test_a_bad_file_is_told_in_one_line(tmp_path: Path) -> None:
 
 def test_what_is_no_file_or_no_text(tmp_path: Path) -> None:
     (tmp_path / "raw.toml").write_bytes(b"\xff\xfe")
-    for name, message in (("", "is no file"), ("none.toml", "is no file"), ("raw.toml", "is not UTF-8")):
+    for name, message in (("", "is not a file"), ("none.toml", "is no file"), ("raw.toml", "is not UTF-8")):
         with pytest.raises(InvalidInputError, match=message):
             read_channel(tmp_path / name)
 
@@ -195,7 +195,7 @@ def test_what_is_lost_depends_on_where_robots_are(tmp_path: Path) -> None:
 
 
 def test_a_channel_that_is_no_file_of_a_channel_is_told() -> None:
-    for path, message in ((ROOT / "README.md", "is not a valid TOML file"), (ROOT, "is no file")):
+    for path, message in ((ROOT / "README.md", "is not a valid TOML file"), (ROOT, "is not a file")):
         words = ("--runtime", "simulator", "--channel", path)
         done = robochoc_within("solve", ROOT / "docs" / "examples" / "scouts", *words)
         assert (done.returncode, done.stdout) == (1, "")

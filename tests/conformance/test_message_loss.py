@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from robochoc.communication.simulator.channel import ChannelModel
-from robochoc.communication.simulator.link_loss import Bursts, NamedLink, PathLoss, Point
+from robochoc.communication.simulator.loss_models import Bursts, NamedLink, PathLoss, Point
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome, Verdict

@@ -39,7 +39,7 @@ class Round:
         self.snapshots = CheckedSnapshots(self.state, members, lambda name, word: self.sent.append((name, word)))
 
     def begin(self) -> None:
-        number = self.state.begin_snapshot()
+        number = self.state.start_snapshot()
         assert number is not None
         self.snapshots.ask(number)
 

@@ -10,7 +10,7 @@ import pytest
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.run_result import RobotsLostError, RunResult
-from robochoc.communication.session import over
+from robochoc.communication.session import is_past
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
 from robochoc.model.outcome import Verdict
@@ -184,10 +184,10 @@ def test_when_the_time_is_over_there_is_what_was_decided_so_far(monkeypatch: pyt
 
     def is_over(deadline: float | None) -> bool:
         far = deadline is not None and deadline > time.monotonic() + an_hour / 2
-        return over(deadline) or (far and any(isinstance(event, Received) for event in list(events)))
+        return is_past(deadline) or (far and any(isinstance(event, Received) for event in list(events)))
 
     for module in ("master_loop", "network.master"):
-        monkeypatch.setattr(f"robochoc.communication.{module}.over", is_over)
+        monkeypatch.setattr(f"robochoc.communication.{module}.is_past", is_over)
     parameters = RunParameters(settings={"file": "/nowhere"})
     with LocalNetwork(CHAIN, PausedABT, observer=events.append, parameters=parameters) as network:
         result = network.search(timeout=an_hour)

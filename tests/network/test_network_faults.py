@@ -388,5 +388,5 @@ def test_too_few_open_files_are_one_line() -> None:
     limited = ["sh", "-c", 'ulimit -n 20 && exec "$@"', "sh", sys.executable, "-m", *command]
     result = subprocess.run(limited, capture_output=True, text=True, check=False)
     assert result.returncode == 2, result.stderr
-    assert "too few files may be open: 20, with" in result.stderr
+    assert "the limit of 20 open files is too low" in result.stderr
     assert result.stderr.count("\n") == 1

@@ -34,7 +34,7 @@ def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -
     for now in (12, 13):
         assert state.missing(now, 10) == 0
         assert state.wave_due
-        wave = state.counters.begin_wave()
+        wave = state.counters.start_wave()
         state.handle("A", Counters(1, wave, 3, 0))
         assert state.missing(now + 50, 10) == 0, "B has not answered"
         state.handle("B", Counters(1, wave, 0, 2))
@@ -49,10 +49,10 @@ def test_no_message_is_missing_while_a_robot_has_not_said_whether_it_goes_on() -
     state.lossy = True
     for name in ("A", "B"):
         state.handle(name, Counters(1, 0, 1, 1))
-    wave = state.counters.begin_wave()
+    wave = state.counters.start_wave()
     for name in ("A", "B"):
         state.handle(name, Counters(1, wave, 1, 1))
-    assert state.begin_going_on()
+    assert state.start_continuation()
     state.handle("A", WentOn(1, went=True))
     state.handle("A", Counters(1, 0, 2, 1))
     for now in (0, 11, 12, 13, 14):

@@ -105,7 +105,7 @@ def quiet(accounts: dict[str, DetailedReport], heard: dict[str, tuple[int, int]]
     """All have answered two waves, and reported."""
     state = begun(traits)
     for _ in range(2):
-        wave = state.counters.begin_wave()
+        wave = state.counters.start_wave()
         for name, counts in heard.items():
             assert not state.handle(name, Counters(1, wave, *counts))
     for name, account in accounts.items():
@@ -146,7 +146,7 @@ def test_whom_it_stirs_after_all_were_quiet_is_not_blamed() -> None:
     }
     state = begun(SFB.traits)
     for _ in range(2):
-        wave = state.counters.begin_wave()
+        wave = state.counters.start_wave()
         for name, counts in heard.items():
             state.handle(name, Counters(1, wave, *counts))
     assert not state.handle("RA", accounts["RA"]), "it has answered what it was told"
@@ -166,7 +166,7 @@ def test_who_does_not_answer() -> None:
     state = begun()
     for name in state.order:
         state.handle(name, Ready(1))
-    state.handle("RA", Counters(1, state.counters.begin_wave(), 150, 3))
+    state.handle("RA", Counters(1, state.counters.start_wave(), 150, 3))
     state.note_end(1, in_time=False)
     assert state.unfinished == "RB, RC have not answered the master"
 

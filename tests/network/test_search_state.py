@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
+from robochoc.communication.control import Conclusion, Counters, EpochMessage, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, ProtocolMessage
 from robochoc.model.outcome import Metrics, Verdict
@@ -27,14 +27,14 @@ def begun(state: AuditedSearchState) -> AuditedSearchState:
     return state
 
 
-def all_hear(state: AuditedSearchState, word: OfEpoch) -> None:
+def all_hear(state: AuditedSearchState, word: EpochMessage) -> None:
     for name in ROBOTS:
         assert not state.handle(name, word)
 
 
 def waved(state: AuditedSearchState, sent: int, received: int) -> None:
     """Ask all, who answer with these counters each."""
-    all_hear(state, Counters(1, state.counters.begin_wave(), sent, received))
+    all_hear(state, Counters(1, state.counters.start_wave(), sent, received))
 
 
 def test_ready_when_all_are() -> None:
@@ -86,7 +86,7 @@ def test_a_verdict_that_is_none_is_refused(verdict: str) -> None:
 
 
 def test_words_that_are_not_for_the_master_are_told() -> None:
-    assert AuditedSearchState(1, ROBOTS).handle("R1", ProtocolMessage(1, 0, b"")) == "it is none for the master"
+    assert AuditedSearchState(1, ROBOTS).handle("R1", ProtocolMessage(1, 0, b"")) == "its message is not for the master"
 
 
 def quiet(state: AuditedSearchState) -> bool:

@@ -97,7 +97,7 @@ def begun(
     around = Around()
     one = searcher(around.context(observed=observed, private=private), protocol, team=team)
     one.prepare()
-    one.begin(0)
+    one.start(0)
     return around, one
 
 
@@ -130,7 +130,7 @@ def test_where_all_know_a_constraint_its_holder_tells_and_waits_to_be_told() -> 
     assert receiver == "RA"
     assert isinstance(word, Copies)
     assert [record.scope for record in msgspec.msgpack.decode(word.content, type=list[SharedRecord])] == [("A", "B")]
-    one.begin(0)
+    one.start(0)
     assert len(around.sent) == 1  # not ready: there is nothing to begin
     one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
     one.learn("RC", b"\x90")
@@ -142,7 +142,7 @@ def test_searching_counts_and_tells() -> None:
     one = searcher(around.context())
     one.prepare()
     assert not one.admit(ok(1))  # before the start it waits
-    one.begin(0)
+    one.start(0)
     assert not said_all(one)
     (said,) = [word for _, word in around.sent[-1:]]
     assert isinstance(said, ProtocolMessage)
@@ -151,7 +151,7 @@ def test_searching_counts_and_tells() -> None:
     assert said_all(one)
     assert around.said[-1] == Counters(1, 0, len(around.sent), 1)
     assert one.admit(ok(2, clock=50))
-    one.take_in([ok(2, clock=50)])
+    one.receive([ok(2, clock=50)])
     assert not said_all(one)
     assert one.assignment == {"B": 1}
     last = around.sent[-1][1]
@@ -161,14 +161,14 @@ def test_searching_counts_and_tells() -> None:
 
 def test_after_the_end_nothing_is_taken_in() -> None:
     around, one = begun()
-    one.take_in([ok(1)])
+    one.receive([ok(1)])
     one.pause()
     sent = len(around.sent)
     (account,) = around.heard(DetailedReport)
     assert isinstance(account, DetailedReport)
     assert account.assignment == {"B": 2}
     assert not one.admit(ok(2))
-    one.take_in([ok(2), Envelope("RA", "RB", b"no message", 0)])
+    one.receive([ok(2), Envelope("RA", "RB", b"no message", 0)])
     assert one.assignment == {"B": 2}
     assert len(around.sent) == sent
     assert not one.is_restless
@@ -178,7 +178,7 @@ def test_nothing_is_taken_in_before_the_start() -> None:
     around = Around()
     one = searcher(around.context())
     one.prepare()
-    one.take_in([ok(1)])
+    one.receive([ok(1)])
     assert not around.sent
     assert one.assignment == {}
 
@@ -186,7 +186,7 @@ def test_nothing_is_taken_in_before_the_start() -> None:
 def test_what_is_no_message_is_bad() -> None:
     _, one = begun()
     with pytest.raises(BadMessageError, match="RA sent RB an invalid message"):
-        one.take_in([Envelope("RA", "RB", b"\x93", 0)])
+        one.receive([Envelope("RA", "RB", b"\x93", 0)])
 
 
 def test_what_waits_for_the_start_is_bounded_for_each_sender() -> None:
@@ -225,7 +225,7 @@ def test_in_a_private_run_values_stay_at_home() -> None:
 def test_events_are_told_if_anybody_wants_them_and_not_too_many_at_once() -> None:
     for observed in (False, True):
         around, one = begun(observed=observed)
-        one.take_in([ok(1 + number % 2) for number in range(2 * EVENTS_AT_ONCE)])
+        one.receive([ok(1 + number % 2) for number in range(2 * EVENTS_AT_ONCE)])
         one.pause()
         told = [word.events for word in around.said if isinstance(word, Events)]
         assert all(0 < len(events) <= EVENTS_AT_ONCE for events in told)
@@ -238,16 +238,16 @@ def test_a_verdict_is_told_once() -> None:
     around = Around()
     one = Searcher(CompiledRobot(team["RA"]), tasks(team, ABT)["RA"], ABT, around.context())
     one.prepare()
-    one.begin(0)
+    one.start(0)
     nogood = msgspec.msgpack.encode(["Nogood", {}, [1]])
     for _ in range(2):
-        one.take_in([Envelope("RB", "RA", nogood, 0)])
+        one.receive([Envelope("RB", "RA", nogood, 0)])
     assert around.heard(Conclusion) == [Conclusion(1, "no-solution")]
 
 
 def test_checking_is_by_the_own_file() -> None:
     _, one = begun()
-    one.take_in([ok(1)])
+    one.receive([ok(1)])
     assert one.check_constraints({"A": 1, "C": 1}) == judgement(price=0)
     assert one.check_constraints({"A": 2, "C": 2}) == judgement(price=INFINITE)
     assert one.check_constraints({"A": 1, "B": 1}) == judgement(price=0)  # its own value it knows itself
@@ -287,7 +287,7 @@ def believed(around: Around) -> DetailedReport:
 
 def test_a_clock_that_another_has_set_as_late_as_can_be() -> None:
     around, one = begun()
-    one.take_in([ok(1, clock=LATEST)])
+    one.receive([ok(1, clock=LATEST)])
     last = around.sent[-1][1]
     assert isinstance(last, ProtocolMessage)
     assert last.clock == LATEST
@@ -299,7 +299,7 @@ def test_a_clock_that_another_has_set_as_late_as_can_be() -> None:
 def test_costs_that_another_has_made_up_are_not_passed_on() -> None:
     around, one = begun(SyncBB, chain(4))
     best = BestPath(-5, ((1,), (2,), (1,)))
-    one.take_in([Envelope("RA", "RB", encode(Path([((1,), 0)], best)), 0)])
+    one.receive([Envelope("RA", "RB", encode(Path([((1,), 0)], best)), 0)])
     one.pause()
     assert believed(around).findings == NOTHING
 
@@ -309,7 +309,7 @@ def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.Monkey
     one = searcher(around.context(), AWC)
     one.prepare()
     one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
-    one.begin(0)
+    one.start(0)
     copy = Charge("RC", ("B", "C"), 1, 0)
     assert one.check_constraints({"A": 2, "C": 2}).copies == (copy,)
     monkeypatch.setattr("robochoc.communication.network.constraint_check.MOST_CHARGES", 1)
@@ -323,7 +323,7 @@ def test_a_master_that_recalls_does_not_get_all_cycles() -> None:
     one = searcher(around.context(), DSA, team=team)
     one.prepare()
     one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(team["RC"])))))
-    one.begin(0)
+    one.start(0)
     one.report_snapshot(1)
     one.recall(Recall(1, 2))
     one.pause()

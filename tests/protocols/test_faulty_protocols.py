@@ -56,7 +56,7 @@ FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
     (RaisesAtOnce, FIRST, r"ValueError: no ideas at all"),
     (Leaves, FIRST, r"its process ended with status 7"),
     (HangsUp, FIRST, r"its process cannot be reached any more"),
-    (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
+    (AsksForStranger, FIRST, r"it sent a message to 'Robot9.9', which is not a robot of the team"),
     (TalksNonsense, SECOND, rf"BadMessageError: {FIRST} sent {SECOND} an invalid message"),
 ])  # fmt: skip
 def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:

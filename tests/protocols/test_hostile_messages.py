@@ -82,7 +82,7 @@ def parts_of(protocol: type[Protocol], team: Team) -> Parts:
 
 def run(protocol: type[Protocol], parts: Parts, number: int = -1, content: bytes = b"") -> list[Envelope]:
     """Return the messages of a run, one by one; the one of this `number` has another `content`."""
-    hosts = {name: Host.of(protocol, part) for name, part in parts.items()}
+    hosts = {name: Host.create(protocol, part) for name, part in parts.items()}
     waiting = deque(envelope for host in hosts.values() for envelope in host.start())
     taken: list[Envelope] = []
     while waiting and len(taken) < MOST:

@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import cast
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
+from robochoc.communication.control import EpochMessage, Failed, Pause, Wave
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
     CheckRequest,
@@ -125,7 +125,7 @@ class InMemoryNetwork:
             self._searching = state.ordered = True
             self._settle()
             while not (state.verdict or state.counters.quiescent or state.broken_off) and state.wave_due:
-                self._tell_all(Wave(state.counters.begin_wave()))
+                self._tell_all(Wave(state.counters.start_wave()))
                 self._settle()
             if state.counters.quiescent:
                 state.verdict = state.verdict or Verdict.SOLUTION
@@ -189,7 +189,7 @@ class InMemoryNetwork:
                 self.objections.append(objection)
             case Failed() as failed:
                 self.failures[name] = failed
-            case OfEpoch() as word:
+            case EpochMessage() as word:
                 self._weigh(name, self.state.handle(name, word))
             case _:
                 pass

@@ -93,7 +93,7 @@ class ArraysRun(Session):
     def _watched(self) -> None:
         """Give those who watch a snapshot, if they want one."""
         if self.watch is not None and self.watch.wants_snapshot(time.monotonic()):
-            self.watch.take(snapshot_of(self._assignments(), self._findings()))
+            self.watch.receive(snapshot_of(self._assignments(), self._findings()))
 
     @property
     def _is_to_stop(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import islice
 
-from robochoc.communication.control import OfEpoch, Report, Snapshot
+from robochoc.communication.control import EpochMessage, Report, Snapshot
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport
 from robochoc.communication.network.plausibility import (
     NOTHING_DECLARED,
@@ -65,7 +65,7 @@ class AuditedSearchState(SearchState):
         self._still_since = 0.0
         self._asked = 0
 
-    def handle(self, name: str, message: OfEpoch) -> str:
+    def handle(self, name: str, message: EpochMessage) -> str:
         """See `SearchState.handle`. Robots also report what their constraints charge."""
         if isinstance(message, CheckResult) and message.epoch == self.epoch and name in self._present:
             return self._take_check(name, message)
@@ -75,10 +75,10 @@ class AuditedSearchState(SearchState):
         """Take in counters. In one wave robots have received no more than all have sent by the next one."""
         if fault := fault_of_counters(counts, self.counters.latest(name)):
             return fault
-        was_waving = self.counters.waving
+        was_waving = self.counters.is_wave_open
         super()._count(name, wave, counts)
         total = self.counters.total
-        if was_waving and not self.counters.waving and total is not None:
+        if was_waving and not self.counters.is_wave_open and total is not None:
             if self._received_before is not None and self._received_before > total.sent:
                 self.stuck = f"robots have counted {self._received_before:,} messages taken in, and {total.sent:,} sent"
             self._received_before = total.received
@@ -151,7 +151,7 @@ class AuditedSearchState(SearchState):
     @property
     def wave_due(self) -> bool:
         """Return whether a wave is useful: see `SearchState.wave_due`, or messages are missing."""
-        return super().wave_due or (bool(self._asked) and not self.counters.waving)
+        return super().wave_due or (bool(self._asked) and not self.counters.is_wave_open)
 
     def missing(self, now: float, patience_s: float) -> int:
         """Return how many messages were sent and are lost for good; 0 as long as that is not certain.
@@ -167,7 +167,7 @@ class AuditedSearchState(SearchState):
         total = self.counters.total
         if total is None or total != self._still or total.sent == total.received or self._undecided:
             self._still, self._still_since, self._asked = total, now, 0
-        elif now - self._still_since > patience_s and not self.counters.waving:
+        elif now - self._still_since > patience_s and not self.counters.is_wave_open:
             if self._asked == _ASKED_ENOUGH:
                 return total.sent - total.received
             self._asked += 1

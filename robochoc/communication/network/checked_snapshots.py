@@ -53,7 +53,7 @@ class CheckedSnapshots:
 
     def advance(self) -> RunResult | None:
         """Do what is next in the round. Return its snapshot once all robots have checked it; None before."""
-        told = self._state.end_snapshot() if self._unchecked is None else None
+        told = self._state.completed_snapshot() if self._unchecked is None else None
         if told is not None:
             self._go_on(told)
         checks = self._state.snapshot_checks if self._unchecked is not None else None
@@ -71,7 +71,7 @@ class CheckedSnapshots:
             return
         bests = [found.best for found in told.findings.values() if found.best is not None]
         parts = self._parts_of_best(bests) or self._parts_of_cycle(told)
-        number = self._state.begin_snapshot() if parts else None
+        number = self._state.start_snapshot() if parts else None
         if number is not None:
             self._first = told
             self._ask(number, parts)

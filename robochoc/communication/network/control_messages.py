@@ -16,10 +16,10 @@ import msgspec
 from robochoc.communication.control import (
     Conclusion,
     Counters,
+    EpochMessage,
     Events,
     Failed,
     GoOn,
-    OfEpoch,
     Pause,
     Ready,
     Report,
@@ -97,7 +97,7 @@ class Charge(NamedTuple):
     price: int | float
 
 
-class CheckResult(OfEpoch, frozen=True):
+class CheckResult(EpochMessage, frozen=True):
     """The cost of the robot's constraints for the decided values. `allowed`: none is violated.
 
     `held` is their number. Of these, `shared` are those that others may know too; `copies` are constraints of others
@@ -174,7 +174,7 @@ class DomainRequest(_Message, frozen=True):
     variables: tuple[str, ...]
 
 
-class Task(OfEpoch, frozen=True):
+class Task(EpochMessage, frozen=True):
     """A search: what all robots know of each other (see `solver/agent_problem.py`), and how they search."""
 
     protocol: str
@@ -190,11 +190,11 @@ class Task(OfEpoch, frozen=True):
     message_loss: float = 0.0
 
 
-class StartSearch(OfEpoch, frozen=True):
+class StartSearch(EpochMessage, frozen=True):
     """The order to begin, as all robots are ready."""
 
 
-class Recall(OfEpoch, frozen=True):
+class Recall(EpochMessage, frozen=True):
     """Asks for a `Snapshot` of this `number`: what the robot has now.
 
     With a `cycle`: what it had in that cycle of its protocol. With a `value`: what is behind that value, as others see
@@ -206,7 +206,7 @@ class Recall(OfEpoch, frozen=True):
     value: Value | None = None
 
 
-class CheckRequest(OfEpoch, frozen=True):
+class CheckRequest(EpochMessage, frozen=True):
     """The decided values of those that share constraints with the robot: it checks them, with its own.
 
     `snapshot`: they are those of that snapshot (0: those that were reported at the end).
@@ -216,7 +216,7 @@ class CheckRequest(OfEpoch, frozen=True):
     snapshot: int = 0
 
 
-class Adopt(OfEpoch, frozen=True):
+class Adopt(EpochMessage, frozen=True):
     """The order to keep what the robot had at the snapshot `number`, the best so far (0: what it reported at the end).
 
     With a `why`, it is the robot's decision until it hears otherwise: the verdict, in a few words.
@@ -258,14 +258,14 @@ class Leave(_Message, frozen=True):
 # From robot to robot
 
 
-class ProtocolMessage(OfEpoch, frozen=True):
+class ProtocolMessage(EpochMessage, frozen=True):
     """A protocol's message, as the filters have sealed it, with the sender's NCCC clock."""
 
     clock: Annotated[int, msgspec.Meta(ge=0, le=LATEST)]
     content: bytes
 
 
-class Copies(OfEpoch, frozen=True):
+class Copies(EpochMessage, frozen=True):
     """The totally known constraints of the sender whose scopes the receiver is in, for protocols with shared scopes.
 
     `content` holds `SharedRecord`s, as the filters have sealed it.

@@ -63,7 +63,7 @@ class LocalNetwork(Session):
     Robots compile nothing: they come compiled, and when others are lost they still show what they showed before.
     """
 
-    anew = True
+    starts_fresh = True
 
     def __init__(
         self,
@@ -156,8 +156,8 @@ class LocalNetwork(Session):
         self._master.watch = self.watch
         return self._master.search(self._protocol.__name__, self._protocol.traits, self._parameters, left, messages)
 
-    def workable(self, team: Team) -> Team:
-        """Return what is left of the team: robots whose values still mean what they meant. See `Session.workable`."""
+    def usable_team(self, team: Team) -> Team:
+        """Return the robots of the team whose values have kept their meaning. See `Session.usable_team`."""
         return keep_interfaces(team, self.compiled.team)
 
     def change(self, epoch: Epoch) -> None:

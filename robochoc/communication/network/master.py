@@ -18,7 +18,7 @@ from typing import Self
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
-from robochoc.communication.control import Events, Failed, OfEpoch, Pause
+from robochoc.communication.control import EpochMessage, Events, Failed, Pause
 from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.checked_snapshots import CheckedSnapshots
@@ -52,7 +52,7 @@ from robochoc.communication.network.registrar import Registrar
 from robochoc.communication.network.requests import Requests
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
-from robochoc.communication.session import over
+from robochoc.communication.session import is_past
 from robochoc.journal.events import Observer
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import RunParameters
@@ -144,7 +144,7 @@ class Master(MasterLoop):
         """
         self._serve_until(lambda: self.members.complete, deadline)
         unseen = self.members.unseen()
-        while unseen and not over(deadline):
+        while unseen and not is_past(deadline):
             for name, variables in unseen.items():
                 self._send(name, DomainRequest(variables))
             self._serve_until(lambda before=unseen: self.members.unseen() != before, deadline)  # type: ignore[misc]
@@ -189,7 +189,7 @@ class Master(MasterLoop):
         self._search_until(deadline)
         if self.snapshots and self.watch and not state.lost:
             self.watch.wants_snapshot(time.monotonic())  # what is due now does not wait for the reports
-        state.note_end(time.monotonic() - began, in_time=not (over(deadline) or self.is_to_stop))
+        state.note_end(time.monotonic() - began, in_time=not (is_past(deadline) or self.is_to_stop))
         self._collect()
         return state.result(state.duration_s)
 
@@ -248,7 +248,7 @@ class Master(MasterLoop):
             # A run may be over before the directory was looked at again.
             self._notify_subscribers()
             self._send_all(leave)
-            while staying() and not over(until):
+            while staying() and not is_past(until):
                 self._serve_until(lambda: not staying(), time.monotonic() + AGAIN_S)
                 self._send_all(leave)
             self._serve_until(lambda: not self._journal_server.lagging, time.monotonic() + FAREWELL_S)
@@ -347,7 +347,7 @@ class Master(MasterLoop):
 
     def _handle(self, name: str, member: Member, message: ControlMessage) -> None:
         match message:
-            case OfEpoch():
+            case EpochMessage():
                 self._note_failure(name, self.state.handle(name, message))
             case Joined(incarnation, card):
                 member.join(incarnation, card)

@@ -114,7 +114,7 @@ class NetworkRobot:
         self._kept = Backlog()
         self._lost_frames: set[tuple[int, str]] = set()
         """Epochs and senders whose frame losses were reported. Each pair is reported once."""
-        self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
+        self._refusals = Refusals(lambda who, what, why: self._send_to_master(Objection(who, what, why)))
 
     def run(self) -> Ending:
         """Register, and take part until the end."""
@@ -161,7 +161,7 @@ class NetworkRobot:
                 case FramesLost() | PresenceChanged() | WakeUp():
                     pass
         if self._searcher:
-            self._searcher.take_in(packet)
+            self._searcher.receive(packet)
         if items:
             return
         if self._searcher and self._searcher.is_restless:
@@ -174,11 +174,11 @@ class NetworkRobot:
         loss = (self._searcher.epoch if self._searcher else 0, sender)
         if loss not in self._lost_frames:
             self._lost_frames.add(loss)
-            self._say(LostFrames(sender, frames))
+            self._send_to_master(LostFrames(sender, frames))
 
     # Frames
 
-    def _say(self, message: ToMaster) -> None:
+    def _send_to_master(self, message: ToMaster) -> None:
         self._transport.send(MASTER, self._channel.frame(message))
 
     def _send(self, receiver: str, message: ToPeer) -> None:
@@ -251,11 +251,13 @@ class NetworkRobot:
                 raise RunOverError(f"the master does not take {self._robot.name}: {why}", failed=True)
             case DomainRequest(variables):
                 domains = {variable.name: variable.domain for variable in self._robot.variables}
-                self._say(DomainAnswer({name: ranges_of(domains[name]) for name in variables if name in domains}))
+                self._send_to_master(
+                    DomainAnswer({name: ranges_of(domains[name]) for name in variables if name in domains})
+                )
             case Revoked(name):
                 self._channel.revoke(name)
             case Leave(why, failed):
-                self._say(Bye())
+                self._send_to_master(Bye())
                 raise RunOverError(why, failed=failed)
             case RegistrationDenied() | DirectoryAnswer() | JournalAnswer():
                 pass
@@ -269,7 +271,7 @@ class NetworkRobot:
                 self._take_task(order)
             case StartSearch(epoch) if searcher and epoch == searcher.epoch:
                 self._settings.stage("searching")
-                searcher.begin(time.monotonic())
+                searcher.start(time.monotonic())
             case Wave(number) if searcher:
                 searcher.report_counters(number)
             case GoOn() if searcher:
@@ -289,7 +291,7 @@ class NetworkRobot:
             case Recall(epoch) if epoch == searcher.epoch:
                 searcher.recall(order)
             case CheckRequest(epoch, values, snapshot) if epoch == searcher.epoch:
-                self._say(searcher.check_constraints(values, snapshot))
+                self._send_to_master(searcher.check_constraints(values, snapshot))
             case Adopt(epoch, number, why) if epoch == searcher.epoch:
                 searcher.adopt(number, published=bool(why))
                 if why:
@@ -301,7 +303,7 @@ class NetworkRobot:
         self._object(MASTER, f"{type(order).__name__} is nothing to be told now")
 
     def _register(self, incarnation: str) -> None:
-        self._say(Register(profile_of(self._robot), incarnation))
+        self._send_to_master(Register(profile_of(self._robot), incarnation))
 
     def _enter(self, welcome: Welcome) -> None:
         """Enter the run. A second welcome comes after an outage, and one of another run from another master."""
@@ -310,7 +312,7 @@ class NetworkRobot:
         if self._registration.accept(welcome):
             self._channel.begin(welcome.run, welcome.filters)
             self._settings.stage("registered, waiting for the others")
-        self._say(Joined(welcome.incarnation, self._channel.card))
+        self._send_to_master(Joined(welcome.incarnation, self._channel.card))
 
     def _take_task(self, task: Task) -> None:
         """Enter a new epoch."""
@@ -324,7 +326,7 @@ class NetworkRobot:
         except LookupError as unknown:
             raise UnsupportedError(f"{self._robot.name}: {unknown}") from None
         observed = (welcome.observed and not welcome.private) or self._settings.sniffed  # events have values in them
-        context = RobotContext(self._say, self._send, self._settings.set_rank, observed, welcome.private)
+        context = RobotContext(self._send_to_master, self._send, self._settings.set_rank, observed, welcome.private)
         own = self._own.relinked(among(self._robot, task.interfaces), self._settings.compiled)
         self._searcher = Searcher(own, task, protocol, context)
         self._searcher.prepare()
@@ -342,12 +344,12 @@ class NetworkRobot:
         """Tell the master why this robot cannot continue, and wait a while for its leave."""
         if self._registration.welcome is None:
             return
-        self._say(message)
+        self._send_to_master(message)
         until = time.monotonic() + self._settings.patience_s
         while time.monotonic() < until and self._transport.router:
             for item in self._items():
                 if isinstance(item, FrameArrived) and item.sender == MASTER and self._is_leave(item.content):
-                    self._say(Bye())
+                    self._send_to_master(Bye())
                     return
 
     def _is_leave(self, content: bytes) -> bool:

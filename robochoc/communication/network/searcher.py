@@ -158,7 +158,7 @@ class Searcher(RobotLoop):
         shared = self._protocol.traits.shared_scopes
         if self._host or (shared and any(child.name not in self._copies for child in self._robot.children)):
             return
-        host = Host.of(self._protocol, self._part())
+        host = Host.create(self._protocol, self._part())
         host.protocol.secret = secrets.randbits
         self._context.set_rank(self._task.order.index(self._robot.name), len(self._task.order))
         self.confirm(host)
@@ -212,13 +212,13 @@ class Searcher(RobotLoop):
             raise BadMessageError(f"{envelope.sender} says too much before the search has begun")
         return super().admit(envelope)
 
-    def take_in(self, packet: Sequence[Envelope]) -> None:
-        """See `RobotLoop.take_in`. Messages are counted by sender, as the master compares the counts."""
+    def receive(self, packet: Sequence[Envelope]) -> None:
+        """See `RobotLoop.receive`. Messages are counted by sender, as the master compares the counts."""
         if self._host and self._searching:
             for envelope in packet:
                 self._received_from[envelope.sender] += 1
                 self._clocks[envelope.sender] = max(envelope.clock, self._clocks.get(envelope.sender, 0))
-        super().take_in(packet)
+        super().receive(packet)
 
     def _transmit(self, envelopes: Sequence[Envelope]) -> None:
         for _, receiver, content, clock in envelopes:
@@ -228,7 +228,7 @@ class Searcher(RobotLoop):
 
     # Reports
 
-    def _say(self, message: RobotMessage) -> None:
+    def _send_to_master(self, message: RobotMessage) -> None:
         self._context.say(message)
 
     def _report_end(self) -> None:
@@ -273,8 +273,8 @@ class Searcher(RobotLoop):
         values = {} if private else values_asked_for(order, host.protocol, self._own.domain)
         self._recalled.note(order.number, values)
         findings = NOTHING if private else self._findings(host.protocol)
-        lost = 0 if host.dropped is None else host.dropped.many
-        self._say(Snapshot(self.epoch, order.number, values, lost, findings))
+        lost = 0 if host.dropper is None else host.dropper.count
+        self._send_to_master(Snapshot(self.epoch, order.number, values, lost, findings))
 
     def adopt(self, number: int, *, published: bool) -> None:
         """Keep what the robot had at a snapshot; see `Recalled.adopt`. Raises `FrameRefusedError`."""

@@ -15,14 +15,14 @@ from robochoc.solver.encoding import UnsupportedError
 
 _DECODER = msgspec.msgpack.Decoder(FromParent)
 _ENCODER = msgspec.msgpack.Encoder()
-"""Made before the fork: once for all robots."""
+"""Built before the fork, once for all robots."""
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _TRUNCATED = int(socket.MSG_CTRUNC)
-"""As a plain number: to combine an enumeration's member makes a new one."""
+"""A plain number, as combining enumeration members creates new ones."""
 
 
 class ControlPipe:
-    """The robot's end of its control pipe: orders, with the queues' ends that come with them, and answers."""
+    """The robot's end of its control pipe: receives orders with attached queue ends, and sends answers."""
 
     def __init__(self, name: str, control: socket.socket) -> None:
         self._name = name
@@ -37,16 +37,16 @@ class ControlPipe:
         return self._socket.fileno()
 
     def send(self, message: FromRobot) -> bool:
-        """Send `message`; return False when a part of it has to wait until the pipe is writable."""
+        """Send `message`; return False if a part of it has to wait until the pipe is writable."""
         self._writer.put(_ENCODER.encode(message))
         return self._writer.flush()
 
     def flush(self) -> bool:
-        """Send what had to wait; return False when something still has to."""
+        """Send waiting bytes; return False if some still have to wait."""
         return self._writer.flush()
 
     def orders(self) -> list[FromParent]:
-        """Return all orders that have come. Afterwards `ended` says whether the parent is gone."""
+        """Return all received orders. Afterwards `ended` is true if the parent is gone."""
         try:
             chunk, ancillary, flags, _ = self._socket.recvmsg(READ_BYTES, _ROOM_FOR_FDS)
         except BlockingIOError:
@@ -55,7 +55,7 @@ class ControlPipe:
             chunk, ancillary, flags = b"", [], 0
         if flags & _TRUNCATED:
             raise UnsupportedError(
-                f"{self._name} needs more open files than the system allows (raise the limit, see 'ulimit -n')"
+                f"{self._name} needs more open files than the system allows: raise the limit, see 'ulimit -n'"
             )
         for _, _, data in ancillary:
             fds = array.array("i")
@@ -66,11 +66,11 @@ class ControlPipe:
         return [_DECODER.decode(body) for body in unpack(self._buffer)]
 
     def take_fd(self) -> int:
-        """Return the next end of a queue that came with the orders."""
+        """Return the next queue end that was attached to the orders."""
         return self._fds.popleft()
 
     def finish(self) -> None:
-        """Send what still waits, and close."""
+        """Send all waiting bytes, and close the pipe."""
         os.set_blocking(self.fileno(), True)
         self._writer.flush()
         self._socket.close()

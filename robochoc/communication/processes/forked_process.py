@@ -1,7 +1,7 @@
-"""A process that is forked from this one, and that has to write to as little as possible of what it inherits.
+"""A forked process that writes to as little inherited memory as possible.
 
-`multiprocessing.Process` asks all earlier processes for their ends whenever one is started, and each forked one takes
-apart what it finds about all others. Both grow with the square of the team: 1,000 robots took 3 s and 2 GB for it.
+`multiprocessing.Process` checks all earlier processes whenever one is started, and each forked process destroys the
+inherited objects of all others. Both costs grow with the square of the team: 3 s and 2 GB for 1,000 robots.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import NoReturn, Protocol
 
 
 class ChildProcess(Protocol):
-    """What the runtime needs to know of a robot's process, however it was started."""
+    """The runtime's interface to a robot's process, for every start method."""
 
     @property
     def pid(self) -> int | None:
@@ -26,34 +26,34 @@ class ChildProcess(Protocol):
 
     @property
     def sentinel(self) -> int:
-        """A descriptor that can be read once the process has ended."""
+        """A descriptor that becomes readable when the process ends."""
 
     @property
     def exitcode(self) -> int | None:
-        """How it ended: its status, or the negative number of the signal that killed it. None: it is alive."""
+        """Its exit status, or the negative number of the signal that killed it. None: it is alive."""
 
     def start(self) -> None:
         """Start it. Raises `OSError` when the system does not allow it."""
 
     def kill(self) -> None:
-        """End it by SIGKILL. One that has ended is left alone."""
+        """End it by SIGKILL. Does nothing if it has ended."""
 
     def join(self) -> None:
         """Wait for its end."""
 
     def close(self) -> None:
-        """Release what belongs to it. It has ended, or was never started."""
+        """Release its resources. It has ended, or was never started."""
 
 
 class ForkedProcess:
     """A process that runs `act`, once it is started, and ends. See `ChildProcess`.
 
-    Its standard input is empty. What `act` raises is printed; then the status is 1, or that of `SystemExit`.
+    Its standard input is empty. An error of `act` is printed; then the status is 1, or that of `SystemExit`.
 
     Args:
-        act: What it runs.
+        act: The function to run.
         kept: Descriptors that it needs.
-        closed: Ranges of descriptors that it closes, but for `kept`. They are read when it is started.
+        closed: Ranges of descriptors that it closes, except `kept`. They are read when it is started.
     """
 
     def __init__(self, act: Callable[[], None], kept: Iterable[int], closed: Sequence[range] = ()) -> None:
@@ -75,16 +75,16 @@ class ForkedProcess:
         os.close(self._its_end)
 
     def _run(self) -> NoReturn:
-        """Run in the process that was just forked, and end it: nothing of the parent's is tidied up here."""
+        """Run in the forked process, and end it without any cleanup of the parent's objects."""
         status = 1
         try:
-            gc.freeze()  # to look for garbage among what was inherited is to write to it
+            gc.freeze()  # a garbage collection would write to inherited memory
             self._close()
             self._act()
             status = 0
         except SystemExit as leave:
             status = leave.code if isinstance(leave.code, int) else int(leave.code is not None)
-        except BaseException:  # noqa: BLE001 - whatever it was: here is the end
+        except BaseException:  # noqa: BLE001 - the process ends here
             traceback.print_exc()
         finally:
             with suppress(OSError):
@@ -130,21 +130,21 @@ class ForkedProcess:
     def _wait(self, options: int) -> None:
         if self.pid is None:
             return
-        with suppress(ChildProcessError):  # somebody else has asked, and keeps the answer
+        with suppress(ChildProcessError):  # other code has waited for this process
             pid, status = os.waitpid(self.pid, options)
             if pid:
                 self._exitcode = os.waitstatus_to_exitcode(status)
 
 
 def _flush() -> None:
-    """Write what was printed, so that it is printed once."""
+    """Flush the standard streams, so that their content is not printed twice."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, ValueError):  # there is none, or it is closed
             stream.flush()
 
 
 def ended_of(sentinels: Iterable[int], patience_s: float) -> list[int]:
-    """Return those of processes' `sentinels` whose processes have ended: wait at most `patience_s` s for one."""
+    """Wait at most `patience_s` seconds; return those of `sentinels` whose processes have ended."""
     poll = select.poll()
     for sentinel in sentinels:
         poll.register(sentinel, select.POLLIN)

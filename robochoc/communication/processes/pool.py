@@ -1,4 +1,4 @@
-"""The pool of the robots' processes: the parent starts them here, reads what they send, and ends them."""
+"""The pool of the robots' processes: starts processes, reads their messages, and ends them."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _FDS_SPARE = 128
 
 
 class ProcessPool:
-    """The processes of a team. `robots` holds those that take part, by name.
+    """The processes of a team. `robots` contains the participating robots, by name.
 
-    `ended` finds those that have died. A dismissed one ends by itself, soon.
+    `ended` finds those that have died. A dismissed process ends by itself, soon.
     """
 
     def __init__(self, start_method: StartMethod) -> None:
@@ -47,13 +47,13 @@ class ProcessPool:
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
 
     def make_room(self, robots: int) -> None:
-        """Raise the limit on open files as this number of robots needs it."""
+        """Raise the limit on open files for this number of robots."""
         allow_descriptors(robots * _FDS_PER_ROBOT + _FDS_SPARE)
 
     def start(self, starts: Sequence[RobotStart]) -> None:
-        """Start processes, at most `STARTED_AT_ONCE`. Raises `OSError` when the system allows no more.
+        """Start processes, at most `STARTED_AT_ONCE`. Raises `OSError` if the system allows no more.
 
-        Signals wait until they have set their own handlers, and until they are known here. They do not wait for the
+        Signals are held until the processes have set their handlers and are registered here, but not during the whole
         start of a large team.
         """
         prepared: list[RobotLink] = []
@@ -64,7 +64,7 @@ class ProcessPool:
                 self._start(prepared)
 
     def _prepared(self, start: RobotStart, theirs: ExitStack) -> RobotLink:
-        """Return the robot with a process that is still to be started. Its ends of pipes are closed by `theirs`."""
+        """Return the robot with an unstarted process. `theirs` closes the process's ends of pipes."""
         name = start.part.robot.name
         ours, control = socket.socketpair()
         theirs.enter_context(control)
@@ -75,7 +75,7 @@ class ProcessPool:
             raise
 
     def _start(self, prepared: Sequence[RobotLink]) -> None:
-        """Start the processes one right after the other: whatever is written between two forks is copied."""
+        """Start the processes without other work between the forks, as memory that is written there is copied."""
         started = 0
         self._inherited[:] = ranges_of(self._own_descriptors(prepared))
         try:
@@ -95,13 +95,13 @@ class ProcessPool:
         """Return a process that runs the robot with its end of its control pipe."""
         if self._start_method == "fork":
             return ForkedProcess(partial(robot_process, start, control), [control.fileno()], self._inherited)
-        from multiprocessing.context import ForkServerContext  # noqa: PLC0415 - nobody else needs it
+        from multiprocessing.context import ForkServerContext  # noqa: PLC0415 - seldom needed
 
         name = start.part.robot.name
         return ForkServerContext().Process(target=served_robot_process, name=name, args=(start, control), daemon=True)
 
     def _own_descriptors(self, prepared: Sequence[RobotLink]) -> Iterator[int]:
-        """Yield all ends of pipes: what robots would inherit of them hides from others that an end is gone."""
+        """Yield all ends of pipes: inherited copies would hide from other robots that an end is closed."""
         for robot in [*self.robots.values(), *self._dismissed, *prepared]:
             if isinstance(robot.process, ForkedProcess):
                 yield robot.process.sentinel
@@ -114,11 +114,11 @@ class ProcessPool:
     # Reading
 
     def readable(self, patience_s: float) -> list[RobotLink]:
-        """Return robots that have sent something, or none: after `patience_s` seconds, or when one has ended."""
+        """Return the robots with messages to read; empty after `patience_s` seconds, or when a process has ended."""
         return [key.data for key, _ in self._selector.select(patience_s) if key.data is not None]
 
     def receive(self, robot: RobotLink) -> list[FromRobot]:
-        """Return what `robot` has sent. One that has hung up is about to end, and its sentinel shows it soon."""
+        """Return the messages of `robot`. A robot that has hung up will end soon, and its sentinel shows that."""
         if self.robots.get(robot.name) is not robot or robot.control not in self._selector.get_map():
             return []  # dismissed, or ended, since it was found to be readable
         messages = robot.receive()
@@ -137,7 +137,7 @@ class ProcessPool:
             yield robot, messages
 
     def with_status(self, *statuses: ProcessStatus) -> dict[ProcessStatus, list[RobotLink]]:
-        """Return the robots whose processes have one of `statuses`, for each of these."""
+        """Return, for each of `statuses`, the robots whose processes have it."""
         found: dict[ProcessStatus, list[RobotLink]] = {status: [] for status in statuses}
         for robot in self.robots.values():
             if (status := robot.status) in found:
@@ -147,10 +147,7 @@ class ProcessPool:
     # Queues
 
     def open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
-        """Open queues: `sender` gets their write ends, and each of `receivers` its read end.
-
-        Raises `UnsupportedError`.
-        """
+        """Open queues: write ends go to `sender`, read ends to `receivers`. Raises `UnsupportedError`."""
         with ExitStack() as copies:
             writers = []
             for name in receivers:
@@ -158,8 +155,8 @@ class ProcessPool:
                     reader, writer = os.pipe()
                 except OSError as error:
                     raise UnsupportedError(
-                        f"the system does not let {sender.name} have a queue to {name}: {error.strerror}"
-                        " (raise its limits, see 'ulimit -n', or use the simulator)"
+                        f"the system does not allow a queue from {sender.name} to {name}: {error.strerror}:"
+                        " raise its limits, see 'ulimit -n', or use the simulator"
                     ) from error
                 copies.callback(os.close, writer)
                 writers.append(writer)
@@ -172,7 +169,7 @@ class ProcessPool:
     # Ending
 
     def dismiss(self, name: str, *, kill: bool = False) -> None:
-        """Let the robot go: its control pipe is closed, and it ends by itself unless it is to be killed."""
+        """Remove the robot and close its control pipe. The process ends by itself, unless `kill` is set."""
         robot = self.robots.pop(name)
         self._unwatch(robot)
         if robot.process.sentinel in self._ends.get_map():
@@ -190,9 +187,9 @@ class ProcessPool:
             robot.process.close()
 
     def end_all(self, reported: Callable[[str], bool]) -> None:
-        """End all processes. Robots that have `reported` get a moment to end by themselves; others are killed at once.
+        """End all processes. Robots that have `reported` may end by themselves for `GRACE_S`; others are killed.
 
-        Nothing is lost by that, and on a busy machine it takes long until a process has ended by itself.
+        No result is lost, and on a busy machine a process needs long to end by itself.
         """
         with signals_held():
             self._selector.close()
@@ -205,7 +202,7 @@ class ProcessPool:
             self.robots, self._dismissed = {}, []
             _await([robot.process.sentinel for robot in all_robots])
             for robot in all_robots:
-                # Also one that seems to have ended: a sentinel is a pipe, and a process can close it and live on.
+                # Kill also processes that seem to have ended: a process can close its sentinel, a pipe, and live on.
                 robot.process.kill()
                 robot.process.join()
                 robot.process.close()

@@ -1,15 +1,20 @@
-"""The operating system's status of a process: its state, whether it computes, and how it ended."""
+"""The operating system's status of a process: running, stopped or dying, whether it computes, and how it ended."""
 
 from __future__ import annotations
 
 import re
 import signal
 import time
+from collections.abc import Iterable, Mapping
 from enum import Enum, auto
 
 from robochoc.communication.processes.forked_process import ChildProcess
 from robochoc.communication.resources import read_text
 
+REPORT_AFTER_S = 5.0
+"""Seconds after which a stopped robot is reported."""
+LONGEST_STEP_S = 1.0
+"""The most that is counted between two updates: this process may have been stopped as well, by the same Ctrl-Z."""
 _EXIT_CODE_S, _DYING_S = 1.0, 60.0
 _EXIT_CODE_POLL_S = 0.001
 _PENDING_SIGNALS = re.compile(r"^SigPnd:\s*([0-9a-f]+)$", re.MULTILINE)
@@ -29,7 +34,7 @@ class ProcessStatus(Enum):
 def process_status(pid: int | None) -> ProcessStatus:
     """Return the state of a process (Linux; elsewhere it is always running).
 
-    A process is dying when SIGKILL is pending, or when it has no memory any more. One with a high `nice` value ends
+    A process is dying if SIGKILL is pending, or if it has no memory any more. A process with a high `nice` value ends
     late on a busy machine: up to seconds after it was killed.
     """
     status = read_text(f"/proc/{pid}/status")
@@ -42,13 +47,13 @@ def process_status(pid: int | None) -> ProcessStatus:
 
 
 def is_computing(pid: int | None) -> bool:
-    """Return whether a process uses the processor, or waits for its turn, or for the disk (Linux)."""
+    """Return whether a process uses the processor, or waits for it or for the disk (Linux)."""
     fields = read_text(f"/proc/{pid}/stat").rpartition(")")[2].split()
     return fields[:1] in (["R"], ["D"])
 
 
 def describe_end(process: ChildProcess) -> str:
-    """Return in words how `process` ended. Its sentinel is ready; the exit code follows a moment later.
+    """Describe the end of `process`. Its sentinel is ready; the exit code follows a moment later.
 
     Where all cores are busy, that moment can be seconds for a process with a high `nice` value.
     """
@@ -65,8 +70,56 @@ def describe_end(process: ChildProcess) -> str:
 
 
 def _signal_name(number: int) -> str:
-    """Return the name of a signal, such as SIGKILL. Those in the real-time range have none."""
+    """Return the name of a signal, such as SIGKILL; real-time signals have only a number."""
     try:
         return signal.Signals(number).name
     except ValueError:
         return f"signal {number}"
+
+
+class StoppedRobots:
+    """Counts how long robots have been stopped (SIGSTOP); after `patience_s` seconds (None: never) they are lost.
+
+    Without it the team would wait in silence. A robot that computes for long is not stopped: the kernel distinguishes
+    the two.
+    """
+
+    def __init__(self, patience_s: float | None = None) -> None:
+        self._patience_s = patience_s
+        self._updated: float | None = None
+        self._stopped_s: dict[str, float] = {}
+        self._reported: set[str] = set()
+
+    def update(self, stopped: Iterable[str], now: float) -> Mapping[str, str]:
+        """Record the robots that are `stopped` at the time `now` (seconds); return lost robots with the reasons.
+
+        Warns, by Python's `logging`, of a robot that has been stopped for long, and when it continues.
+        """
+        passed = 0.0 if self._updated is None else min(now - self._updated, LONGEST_STEP_S)
+        self._updated = now
+        before = self._stopped_s
+        self._stopped_s = {name: before[name] + passed if name in before else 0.0 for name in stopped}
+        for name in self._reported - self._stopped_s.keys():
+            self._reported.discard(name)
+            _warn(f"{name} continues")
+        lost = {} if self._patience_s is None else {n: s for n, s in self._stopped_s.items() if s >= self._patience_s}
+        for name, seconds in self._stopped_s.items():
+            if seconds >= REPORT_AFTER_S and name not in self._reported and name not in lost:
+                self._reported.add(name)
+                _warn(f"{name} has been stopped (SIGSTOP) for {seconds:.0f} s; the others wait for it{self._hint}")
+        for name in lost:
+            del self._stopped_s[name]
+            self._reported.discard(name)
+        return {name: f"its process had been stopped (SIGSTOP) for {seconds:.0f} s" for name, seconds in lost.items()}
+
+    @property
+    def _hint(self) -> str:
+        if self._patience_s is None:
+            return " (kill -CONT continues it; --patience SECONDS limits the wait)"
+        return f" (kill -CONT continues it; after {self._patience_s:g} s it is lost)"
+
+
+def _warn(text: str) -> None:
+    import logging  # noqa: PLC0415 - nearly no run has anything to report
+
+    logging.getLogger("robochoc").warning("%s", text)

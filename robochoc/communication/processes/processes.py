@@ -1,8 +1,8 @@
 """The default runtime: one OS process per robot, joined by multiprocessing queues, one for each directed edge.
 
 The parent is the paper's master. It starts the processes, waits for the confirmation of all, orders the start, opens a
-queue when a robot wants to talk to another for the first time, detects quiescence by four counters, and ends each
-epoch. Protocol messages go from robot to robot and never through the parent.
+queue for a robot's first message to another one, detects quiescence by four counters, and ends each epoch. Protocol
+messages go from robot to robot and never through the parent.
 
 Crash detection: the parent watches every process's sentinel; a robot's control pipe ends with the parent. Why fork, why
 queues are opened on demand, and what was measured: docs/explanation/design.md, "Processes".
@@ -18,26 +18,25 @@ from typing import assert_never
 from robochoc.communication.control import (
     Begin,
     Change,
+    EpochMessage,
     Events,
     Failed,
     FromParent,
     FromRobot,
-    OfEpoch,
     OpenQueues,
     Pause,
     Ready,
-    sealed,
+    pack_change,
 )
 from robochoc.communication.host import message_decoder
 from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.processes.pool import STARTED_AT_ONCE, ProcessPool, StartMethod
-from robochoc.communication.processes.process_status import ProcessStatus
+from robochoc.communication.processes.process_status import LONGEST_STEP_S, ProcessStatus, StoppedRobots
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, rehearse
-from robochoc.communication.processes.stopped import LONGEST_STEP_S, StoppedRobots
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
 from robochoc.communication.search_state import SearchState
-from robochoc.communication.session import Epoch, Session, over
+from robochoc.communication.session import Epoch, Session, is_past
 from robochoc.journal.events import AnyEvent, Lost, Observer, Registered
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
@@ -47,34 +46,34 @@ from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.garbage import garbage_frozen
 
 CHECK_S = 0.001
-"""The time between two checks of which processes are there, for each robot: so they take a small part of it."""
+"""Seconds between two checks for lost processes, for each robot, so that the checks take a small share of the time."""
 CROWD = 100
-"""The robots from which a rehearsal in the parent saves more than it takes."""
+"""The size of a team from which a rehearsal in the parent saves more time than it takes."""
 REPORTS_S = 5.0
 """The longest wait of the parent for reports after the end of an epoch, in seconds."""
 BUSY_REPORTS_S = 60.0
-"""The same for robots that compute, or wait for their turn of a busy machine, when there is a verdict."""
+"""The same for robots that compute, or wait for the processor of a busy machine, after a verdict."""
 LATE_REPORTS_S = 0.5
-"""The same when the time was over. Robots that still compute then are left out of the metrics."""
+"""The same after the time limit. Robots that still compute then are not part of the metrics."""
 
 
 class ProcessesRun(Session, MasterLoop):
-    """One team, each robot in a process of its own. No process outlives `close`.
+    """One team, each robot in its own process. No process outlives `close`.
 
     Args:
         team: The team, compiled or not.
         protocol: The protocol that its robots run.
         observer: Receives all events.
         progress: Receives the count of messages now and then.
-        start_method: How processes are started.
-        survive: Robots whose processes end break the search off, and are named in its result. Otherwise
-            `RobotsLostError` is raised.
-        patience_s: A robot whose process is stopped (SIGSTOP) for so many seconds is lost. None: it is waited for.
-        parameters: What robots are given besides the problem.
-        bounds: Whether the observer hears of lower bounds, too.
+        start_method: The start method of processes.
+        survive: The end of a robot's process ends the search, whose result names the lost robots. Otherwise it raises
+            `RobotsLostError`.
+        patience_s: Seconds after which a robot whose process is stopped (SIGSTOP) is lost. None: the team waits.
+        parameters: The robots' parameters besides the problem.
+        bounds: Whether the observer receives lower bounds, too.
     """
 
-    def __init__(  # noqa: PLR0913 - how a session goes, by names
+    def __init__(  # noqa: PLR0913 - keyword options
         self,
         team: Team | CompiledTeam,
         protocol: type[Protocol],
@@ -100,7 +99,7 @@ class ProcessesRun(Session, MasterLoop):
         self._unstarted = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self._drops = parameters.message_loss > 0
         self._behind: set[str] = set()
-        """Robots that have not come to the present epoch: what they tell is of one that is over."""
+        """Robots that have not entered the present epoch: their events belong to a previous one."""
         self.state = self._new_state(0, self.compiled.team.order)
 
     @property
@@ -109,11 +108,11 @@ class ProcessesRun(Session, MasterLoop):
         return self._lossless
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        """See `Session.search`. The limit on messages is checked as often as all robots have answered.
+        """See `Session.search`. The limit on messages is checked after each wave.
 
         Raises:
-            RobotsLostError: when a robot's process ends or fails.
-            UnsupportedError: when a robot's problem is more than this version, or the system, can take.
+            RobotsLostError: if a robot's process ends or fails.
+            UnsupportedError: if a robot's problem is too much for this version or the system.
         """
         began = time.monotonic()
         deadline = self._deadline = None if timeout is None else began + timeout
@@ -123,14 +122,14 @@ class ProcessesRun(Session, MasterLoop):
             self._search_until(deadline)
             if self.state.ordered:
                 self._lossless = self.state.counters.quiescent and not self.state.broken_off and not self._drops
-            return self._finish(began, late=over(deadline) or self.is_to_stop)
+            return self._finish(began, late=is_past(deadline) or self.is_to_stop)
         except RobotsLostError as lost:
             for name, why in lost.robots.items():
                 self._observe(Lost(t=self._now(), robot=name, why=why))
             raise
 
     def change(self, epoch: Epoch) -> None:
-        """See `Session.change`. Robots that are no longer in the team, or begin anew, are dismissed."""
+        """See `Session.change`. Robots that are no longer in the team, or are restarted, are dismissed."""
         self.compiled = epoch.compiled
         before = self.state
         self._pool.reap()
@@ -146,13 +145,13 @@ class ProcessesRun(Session, MasterLoop):
             robot = self._pool.robots.get(name)
             if robot is None:
                 self._unstarted[name] = part
-            elif robot.ended:  # after its report, so that the epoch before could do without it
+            elif robot.ended:  # after its report, so the previous epoch was not affected
                 self._lose(name, robot.describe_end())
             else:
-                self._send(robot, Change(self.state.epoch, sealed(part, epoch.invalidated), left))
+                self._send(robot, Change(self.state.epoch, pack_change(part, epoch.invalidated), left))
 
     def _new_state(self, epoch: int, order: Sequence[str]) -> SearchState:
-        """Return the state of a search that begins."""
+        """Return the state of a new search."""
         state = SearchState(epoch, order, traits=self._protocol.traits)
         state.lossy = self._drops and self._protocol.traits.bears_loss
         return state
@@ -169,7 +168,7 @@ class ProcessesRun(Session, MasterLoop):
     # The start
 
     def _launch(self, deadline: float | None) -> None:
-        """Start the processes, as long as there is time. Raises `UnsupportedError` when the system allows fewer."""
+        """Start the processes until the deadline. Raises `UnsupportedError` if the system allows fewer."""
         unstarted, self._unstarted = self._unstarted, {}
         if not unstarted:
             return
@@ -181,7 +180,7 @@ class ProcessesRun(Session, MasterLoop):
             rehearse(self._protocol, unstarted.values())
         with garbage_frozen():
             parts = iter(unstarted.values())
-            while (some := list(islice(parts, STARTED_AT_ONCE))) and not over(deadline):
+            while (some := list(islice(parts, STARTED_AT_ONCE))) and not is_past(deadline):
                 self._start(some)
                 self._handle_ends()
 
@@ -192,8 +191,8 @@ class ProcessesRun(Session, MasterLoop):
             self._pool.start([RobotStart(part, self._protocol, epoch, observed, bounds) for part in parts])
         except OSError as error:
             raise UnsupportedError(
-                f"the system lets only {len(self._pool.robots)} of {len(parts[0].order)} robots have a process:"
-                f" {error.strerror} (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
+                f"the system allows processes for only {len(self._pool.robots)} of {len(parts[0].order)} robots:"
+                f" {error.strerror}: raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator"
             ) from error
 
     def _order_start(self) -> None:
@@ -205,8 +204,8 @@ class ProcessesRun(Session, MasterLoop):
         for robot in self._pool.readable(patience_s):
             for message in self._pool.receive(robot):
                 self._handle(robot, message)
-            self._handle_ends()  # after each, as robots may have sent much, and the machine may be busy
-            if over(deadline):
+            self._handle_ends()  # after each robot, as reading may take long
+            if is_past(deadline):
                 return
         self._handle_ends()
 
@@ -217,7 +216,7 @@ class ProcessesRun(Session, MasterLoop):
         stopped = [robot.name for robot in found[ProcessStatus.STOPPED] if not self.state.has_reported(robot.name)]
         lost = self._stopped.update(stopped, now)
         if lost and not self._survive:
-            raise RobotsLostError(lost)  # and they are killed, as all are
+            raise RobotsLostError(lost)  # `close` kills them
         for name, why in lost.items():
             self._lose(name, why)
 
@@ -236,7 +235,7 @@ class ProcessesRun(Session, MasterLoop):
         if not dead:
             return
         if not self._survive:
-            # To be gone takes a turn of the processor, which a busy machine gives late; the others make room.
+            # A killed process needs the processor to end; on a busy machine the other robots must release it.
             for robot in self._pool.robots.values():
                 if robot not in dead:
                     robot.process.kill()
@@ -250,7 +249,7 @@ class ProcessesRun(Session, MasterLoop):
             self._lose(name, why)
 
     def _lose(self, name: str, why: str) -> None:
-        """Continue without the robot; what it reported no longer counts."""
+        """Continue without the robot, and discard its report."""
         if name in self.state.lost:
             return
         self.state.lose(name, why)
@@ -260,9 +259,9 @@ class ProcessesRun(Session, MasterLoop):
     def _handle(self, robot: RobotLink, message: FromRobot) -> None:
         match message:
             case OpenQueues(epoch, receivers):
-                if epoch == self.state.epoch:  # else some of them may be gone
+                if epoch == self.state.epoch:  # else some receivers may be gone
                     self._open_queues(robot, receivers)
-            case OfEpoch():
+            case EpochMessage():
                 if fault := self.state.handle(robot.name, message):
                     raise RobotsLostError({robot.name: fault})
                 if isinstance(message, Ready) and message.epoch == self.state.epoch:
@@ -281,22 +280,22 @@ class ProcessesRun(Session, MasterLoop):
         if sender.name not in self._pool.robots:
             return
         known = [name for name in receivers if name in self._pool.robots]
-        strangers = [name for name in receivers if name not in known and name not in self.state.lost]
-        if strangers:
+        unknown = [name for name in receivers if name not in known and name not in self.state.lost]
+        if unknown:
             raise RobotsLostError(
-                {sender.name: f"it wanted to talk to {strangers[0]!r}, which is no robot of the team"}
+                {sender.name: f"it sent a message to {unknown[0]!r}, which is not a robot of the team"}
             )
         self._pool.open_queues(sender, known)
 
     # The end of an epoch
 
     def _finish(self, began: float, *, late: bool) -> RunResult:
-        """End the search, collect all reports, and return the result."""
+        """End the search, collect the reports, and return the result."""
         wall_s = time.monotonic() - began
         self._send_all(Pause())
         self._await_reports(late=late)
         silent = self._silent()
-        if silent and not late and not (self.state.verdict is None and over(self._deadline)):
+        if silent and not late and not (self.state.verdict is None and is_past(self._deadline)):
             if not self._survive:
                 raise RobotsLostError(dict.fromkeys(silent, "it did not report at the end"))
             for name in silent:
@@ -304,11 +303,11 @@ class ProcessesRun(Session, MasterLoop):
         return self.state.result(wall_s)
 
     def _await_reports(self, *, late: bool) -> None:
-        """Wait for reports, as long as some come: where robots are many, those of the last wait to be read.
+        """Wait for reports as long as some arrive, since in a large team many wait to be read.
 
-        A robot that computes while there is no verdict is waited for until the time is over.
-        So is a robot that is stopped, until patience is over. With a verdict the limit is `BUSY_REPORTS_S`.
-        Robots are looked at twice: one that has just reported computes no more either.
+        Without a verdict, a computing robot is awaited until the time limit; with a verdict, for `BUSY_REPORTS_S`. A
+        stopped robot is awaited until the patience is over. Robots are checked twice, as one that has just reported
+        does not compute either.
         """
         began = time.monotonic()
         before, idle = len(self._silent()), False
@@ -319,7 +318,7 @@ class ProcessesRun(Session, MasterLoop):
                 until = min(until, max(self._deadline, now + LATE_REPORTS_S))
             self._serve_until(lambda: not self._silent(), until)
             silent = [self._pool.robots[name] for name in self._silent()]
-            if late or over(self._deadline):
+            if late or is_past(self._deadline):
                 return
             if len(silent) < before or any(robot.status is ProcessStatus.STOPPED for robot in silent):
                 before, idle = len(silent), False
@@ -333,7 +332,7 @@ class ProcessesRun(Session, MasterLoop):
         """Return the robots that have a process, and have not reported."""
         return [name for name in self._pool.robots if not self.state.has_reported(name)]
 
-    # Small things
+    # Helpers
 
     def _send_all(self, order: FromParent) -> None:
         for robot in list(self._pool.robots.values()):

@@ -1,12 +1,14 @@
-"""A robot that talks to others through queues, and to the parent through its control pipe.
+"""A robot that exchanges messages with others through queues, and with the parent through its control pipe.
 
-One loop waits for whatever comes: messages, the parent's orders, room in a pipe that was full, the parent's end. All
-messages that wait when it wakes up are one packet.
+One loop waits for all events: messages, the parent's orders, a full pipe that is writable again, the parent's end. All
+messages that wait when the loop wakes up are one packet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import select
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import assert_never
 
@@ -24,30 +26,30 @@ from robochoc.communication.control import (
     Report,
     TakeSnapshot,
     Wave,
-    unsealed,
+    unpack_change,
 )
 from robochoc.communication.host import Host
 from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queues import LARGEST_BODY, QueueReader, QueueWriter
-from robochoc.communication.processes.watch import Watch
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import IDLE_S, RobotLoop
 from robochoc.model.message import Envelope
 
 MOST_IDLE_S = 0.032
-"""The longest that a robot waits for a message before it reports its counters.
+"""The longest wait for a message, in seconds, before a robot reports its counters.
 
-It begins with `IDLE_S`, and doubles with each report of a search: where many robots share few cores, each of them
-waits for its turn, and what it reports meanwhile is soon out of date.
+The wait begins with `IDLE_S` and doubles with each report of a search: if many robots share few cores, each waits for
+the processor, and early reports are soon outdated.
 """
+Action = Callable[[list[Envelope]], None]
+"""The reaction to an event of a descriptor. Messages that it reads are added to the packet."""
 
 
 class QueueRobot(RobotLoop):
-    """The robot of `host`, in a process of its own, with the control pipe `link`.
+    """The robot of `host`, in its own process, with the control pipe `link`.
 
-    It ends when that ends, or when one of the descriptors `parent` can be read. It reports how much memory it has to
-    itself if it is `measured`.
-    Every message is stamped with its epoch. Messages of an epoch that is over are lost.
+    It ends when the pipe ends, or when one of the descriptors `parent` is readable. If `measured`, it reports its
+    private memory. Every message is stamped with its epoch; outdated messages are dropped.
     """
 
     bundle_bytes = LARGEST_BODY // 4
@@ -72,14 +74,14 @@ class QueueRobot(RobotLoop):
         self._link_is_full = False
         self._running = True
         self._patience_s = IDLE_S
-        self._watch = Watch()
+        self._watch = DescriptorWatch()
         self._watch.add(link.fileno(), self._read_orders)
         for sentinel in parent:
             self._watch.add(sentinel, self._end)
         self.confirm(host)
 
     def run(self) -> None:
-        """Wait and act until the parent hangs up or is gone."""
+        """Handle events until the parent closes the pipe or is gone."""
         while self._running:
             actions = self._watch.wait(self._patience_s if self.is_restless else None)
             if not actions:
@@ -89,7 +91,7 @@ class QueueRobot(RobotLoop):
             packet: list[Envelope] = []
             for act in actions:
                 act(packet)
-            self.take_in(packet)
+            self.receive(packet)
 
     # Messages
 
@@ -104,7 +106,7 @@ class QueueRobot(RobotLoop):
             writer.put_stamped(self.epoch, envelope.clock, envelope.content)
             touched[envelope.receiver] = writer
         for start in range(0, len(unopened), QUEUES_AT_ONCE):
-            self._say(OpenQueues(self.epoch, unopened[start : start + QUEUES_AT_ONCE]))
+            self._send_to_master(OpenQueues(self.epoch, unopened[start : start + QUEUES_AT_ONCE]))
         for writer in touched.values():
             self._flush(writer)
 
@@ -120,18 +122,18 @@ class QueueRobot(RobotLoop):
 
     def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
         if self._readers.get(sender) is not reader:
-            return  # closed by an order that came in the same moment
+            return  # closed by an order in the same iteration
         for epoch, clock, content in reader.get_stamped():
             if epoch == self.epoch:
                 envelope = Envelope(sender, self._name, content, clock)
                 if self.admit(envelope):
                     packet.append(envelope)
-        if reader.ended:  # the sender is gone; the parent decides what that means
+        if reader.ended:  # the sender is gone; the parent decides about the loss
             self._close_reader(reader)
 
     # The parent
 
-    def _say(self, message: FromRobot) -> None:
+    def _send_to_master(self, message: FromRobot) -> None:
         if not self._link.send(message) and not self._link_is_full:
             self._link_is_full = True
             self._watch.watch_writing(self._link.fileno(), wanted=True)
@@ -151,7 +153,7 @@ class QueueRobot(RobotLoop):
     def _obey(self, order: FromParent) -> None:
         match order:
             case Begin(began, lossless):
-                self.begin(began, lossless=lossless)
+                self.start(began, lossless=lossless)
             case QueuesTo(robots):
                 for robot in robots:
                     self._writers[robot].open(self._link.take_fd())
@@ -177,17 +179,17 @@ class QueueRobot(RobotLoop):
             metrics = self._host.metrics()
             if self._measured:
                 metrics = replace(metrics, memory=own_memory())
-            self._say(Report(self.epoch, assignment, metrics, findings))
+            self._send_to_master(Report(self.epoch, assignment, metrics, findings))
 
     def _change(self, order: Change) -> None:
-        """Enter the next epoch, with a changed problem and no message under way."""
-        part, invalidated = unsealed(order.change)
+        """Enter the next epoch, with a changed problem and no message in transit."""
+        part, invalidated = unpack_change(order.change)
         for name in order.gone:
             if name in self._readers:
                 self._close_reader(self._readers[name])
             if name in self._writers:
                 self._close_writer(self._writers.pop(name))
-        # What the parent had not opened before it gave this order, it does not open any more.
+        # The parent ignores requests for queues that it had not opened before this order.
         self._writers = {name: writer for name, writer in self._writers.items() if writer.fd is not None}
         self.epoch = order.epoch
         self._patience_s = IDLE_S
@@ -211,3 +213,47 @@ class QueueRobot(RobotLoop):
         if writer.fd is not None and writer.fd in self._watch:
             self._watch.remove(writer.fd)
         writer.close()
+
+
+class DescriptorWatch:
+    """Watched descriptors, each with an action.
+
+    Simpler than `selectors`, as a robot waits after each message, and memory pages that it runs are copied for it.
+    """
+
+    def __init__(self) -> None:
+        self._actions: dict[int, Action] = {}
+        if sys.platform == "linux":
+            self._poll = select.epoll()
+        else:
+            self._poll = select.poll()
+
+    def __contains__(self, fd: int | None) -> bool:
+        """Return whether `fd` is watched."""
+        return fd in self._actions
+
+    def add(self, fd: int, action: Action, *, write: bool = False) -> None:
+        """Watch `fd`, which is not watched yet, for reading, or with `write` for writing."""
+        self._poll.register(fd, select.POLLOUT if write else select.POLLIN)
+        self._actions[fd] = action
+
+    def watch_writing(self, fd: int, wanted: bool) -> None:  # noqa: FBT001 - the only option
+        """Watch `fd`, which is watched for reading, also for writing, or no longer."""
+        self._poll.modify(fd, select.POLLIN | (select.POLLOUT if wanted else 0))
+
+    def remove(self, fd: int) -> None:
+        """Stop watching `fd`, which must still be open."""
+        self._poll.unregister(fd)
+        del self._actions[fd]
+
+    def wait(self, patience_s: float | None) -> list[Action]:
+        """Wait for events; return their actions, or none after `patience_s` seconds (None: wait without limit).
+
+        A closed end counts as readable and writable.
+        """
+        if sys.platform == "linux":
+            ready = self._poll.poll(patience_s, len(self._actions) or 1)
+        else:
+            ready = self._poll.poll(None if patience_s is None else patience_s * 1000)
+        actions = self._actions
+        return [actions[fd] for fd, _ in ready]

@@ -1,10 +1,10 @@
 """Queues between processes: one for each directed edge, with one writer and one reader.
 
-Such a queue is what `multiprocessing.SimpleQueue` is, a `multiprocessing.Pipe`, less what hangs a team when a robot
-is killed: it has no lock that a dead process can hold, and each end is open in one process only, so that the other
-side sees the end of file at once. `put` never blocks (two robots that fill each other's pipes would wait for ever);
-what does not fit yet waits in memory until the pipe is writable. The wire form is that of
-`multiprocessing.Connection.send_bytes`: the length, four bytes, network order, then the body.
+Like `multiprocessing.SimpleQueue`, such a queue is a `multiprocessing.Pipe`, but a killed robot cannot block it: it has
+no lock that a dead process can hold, and each end is open in one process only, so that the other side sees the end of
+file at once. `put` never blocks (two robots that fill each other's pipes would wait for ever); bytes that do not fit
+wait in memory until the pipe is writable. The wire form is that of `multiprocessing.Connection.send_bytes`: the length,
+four bytes, network order, then the body.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _STAMPED = struct.Struct("!iIQ")
 _STAMP_BYTES = _STAMPED.size - _LENGTH.size
 READ_BYTES = 1 << 16
 LARGEST_BODY = 1 << 26
-"""64 MiB: more than any message of ours, and a bound on what a lying peer can make us allocate."""
+"""64 MiB: larger than any message of ours, and a bound on the memory that an invalid length can allocate."""
 
 
 class CorruptQueueError(Exception):
@@ -27,7 +27,7 @@ class CorruptQueueError(Exception):
 
 
 class Stamped(NamedTuple):
-    """A protocol's message on its way: the epoch in which it was sent, the sender's clock, and the content."""
+    """A protocol's message in transit: the epoch in which it was sent, the sender's clock, and the content."""
 
     epoch: int
     clock: int
@@ -35,9 +35,9 @@ class Stamped(NamedTuple):
 
 
 def unpack_stamped(data: bytes) -> tuple[list[Stamped], bytes]:
-    """Return the whole messages at the front of `data`, and what is left: the beginning of another one.
+    """Return the complete messages at the front of `data`, and the rest: the beginning of another message.
 
-    It does what `unpack` does, for many small messages at once, where each call and each copy counts.
+    A faster `unpack` for many small messages, where each call and each copy counts.
 
     Raises `CorruptQueueError`.
     """
@@ -56,7 +56,7 @@ def unpack_stamped(data: bytes) -> tuple[list[Stamped], bytes]:
 
 
 def unpack(buffer: bytearray) -> Iterator[bytes]:
-    """Take the whole bodies from the front of `buffer`, and leave an unfinished one in it.
+    """Remove the complete bodies from the front of `buffer`, and yield them.
 
     Raises `CorruptQueueError`.
     """
@@ -76,7 +76,7 @@ def unpack(buffer: bytearray) -> Iterator[bytes]:
 
 
 def _missing(beginning: bytes) -> int:
-    """Return how many bytes of a message, or of what goes before it, are missing after this `beginning`."""
+    """Return the number of missing bytes of a message, or of its header, after this `beginning`."""
     if len(beginning) < _STAMPED.size:
         return _STAMPED.size - len(beginning)
     (length,) = _LENGTH.unpack_from(beginning)
@@ -84,7 +84,7 @@ def _missing(beginning: bytes) -> int:
 
 
 class QueueReader:
-    """The end that takes. `fd` is to be watched for readability; it is non-blocking, and owned by this object."""
+    """The read end. `fd` is to be watched for readability; it is non-blocking, and owned by this object."""
 
     def __init__(self, fd: int) -> None:
         self.fd = fd
@@ -95,20 +95,20 @@ class QueueReader:
         os.set_blocking(fd, False)
 
     def get(self) -> list[bytes]:
-        """Return the bodies that one read brings: a writer that never pauses must not keep the reader from others.
+        """Return the bodies of one read (not more, so that a fast writer does not block other queues).
 
-        `ended` tells afterwards whether the writer is gone.
+        Afterwards `ended` is true if the writer is gone.
         """
         self._read()
         return list(unpack(self._buffer))
 
     def get_stamped(self) -> list[Stamped]:
-        """Return the messages that one read brings. See `get`; a queue has either bodies or stamped messages."""
+        """Return the messages of one read. See `get`; a queue has either bodies or stamped messages."""
         chunk = self._chunk()
         if self._left:
             self._left.append(chunk)
             self._missing -= len(chunk)
-            if self._missing > 0:  # the parts of a large message are joined once
+            if self._missing > 0:  # join the parts of a large message only once
                 return []
             chunk = b"".join(self._left)
         found, left = unpack_stamped(chunk)
@@ -117,7 +117,7 @@ class QueueReader:
         return found
 
     def get_all(self) -> list[bytes]:
-        """Return all bodies that are left once the writer has ended."""
+        """Return all remaining bodies after the writer has ended."""
         while self._read():
             pass
         return list(unpack(self._buffer))
@@ -138,43 +138,43 @@ class QueueReader:
         return chunk
 
     def close(self) -> None:
-        """Close the own end."""
+        """Close the read end."""
         os.close(self.fd)
 
 
 class QueueWriter:
-    """The end that puts. Non-blocking: `put` keeps what the pipe does not take, `flush` tries again.
+    """The write end. Non-blocking: `put` stores bytes that the pipe does not accept, `flush` tries again.
 
-    `fd` is None as long as the queue has not been opened; what is put before then waits.
+    `fd` is None until the queue is opened; bodies that are put before wait.
     """
 
     def __init__(self, fd: int | None = None) -> None:
         self.fd: int | None = None
         self.broken = False
-        """The reader is gone; what is put from now on is dropped."""
+        """The reader is gone; further bodies are dropped."""
         self._waiting = bytearray()
         if fd is not None:
             self.open(fd)
 
     def open(self, fd: int) -> None:
-        """Begin to write to `fd`, which this object owns from now on."""
+        """Start to write to `fd`, which this object owns from now on."""
         os.set_blocking(fd, False)
         self.fd = fd
 
     def put(self, body: bytes) -> None:
-        """Add a body; it travels with the next `flush`."""
+        """Add a body, to be sent by the next `flush`."""
         if not self.broken:
             self._waiting += _LENGTH.pack(len(body))
             self._waiting += body
 
     def put_stamped(self, epoch: int, clock: int, content: bytes) -> None:
-        """Add a protocol's message; it travels with the next `flush`, and with all others that wait then."""
+        """Add a protocol's message, to be sent by the next `flush` with all other waiting ones."""
         if not self.broken:
             self._waiting += _STAMPED.pack(_STAMP_BYTES + len(content), epoch, clock)
             self._waiting += content
 
     def flush(self) -> bool:
-        """Write as much as the pipe takes; True when nothing waits any more (for a pipe that is open)."""
+        """Write as much as the pipe accepts; return True if nothing waits any more, or the queue is not open yet."""
         if self.fd is None:
             return True
         try:
@@ -188,7 +188,7 @@ class QueueWriter:
         return True
 
     def close(self) -> None:
-        """Close the own end; the reader sees the end of file after what has been written."""
+        """Close the write end; the reader sees the end of file after all written bytes."""
         if self.fd is not None:
             os.close(self.fd)
             self.fd = None

@@ -23,7 +23,7 @@ _UNRESPONSIVE_S = 10.0
 class RobotLink:
     """The parent's side of the robot `name`: its process, and the parent's end of its control pipe.
 
-    `ended` says whether its process is known to have ended.
+    `ended`: its process is known to have ended.
     """
 
     def __init__(self, name: str, process: ChildProcess, control: socket.socket) -> None:
@@ -34,20 +34,20 @@ class RobotLink:
         self._reader = QueueReader(control.fileno())
 
     def receive(self) -> list[FromRobot]:
-        """Return the messages that one read of the control pipe brings. Afterwards `hung_up` is up to date."""
+        """Return the messages of one read of the control pipe. Afterwards `hung_up` is up to date."""
         return [_DECODER.decode(body) for body in self._reader.get()]
 
     def receive_rest(self) -> list[FromRobot]:
-        """Return all messages that are left in the control pipe of a process that has ended."""
+        """Return all remaining messages in the control pipe of a process that has ended."""
         return [_DECODER.decode(body) for body in self._reader.get_all()]
 
     @property
     def hung_up(self) -> bool:
-        """Return whether the other end of the control pipe is closed."""
+        """Whether the other end of the control pipe is closed."""
         return self._reader.ended
 
     def send(self, order: FromParent, fds: Sequence[int] = ()) -> None:
-        """Send `order`, with the ends of queues if any are given. Nothing is sent to a robot that is gone.
+        """Send `order` with attached queue ends, unless the robot is gone.
 
         Raises `RobotsLostError` when the robot does not read for `_UNRESPONSIVE_S` seconds.
         """
@@ -60,7 +60,7 @@ class RobotLink:
             except (BrokenPipeError, ConnectionResetError):
                 return
             except OSError as error:
-                # Full, or the kernel holds as many descriptors under way as it allows: the robot has to read first.
+                # Full, or too many descriptors are in transit for the kernel: the robot has to read first.
                 if error.errno not in {errno.EAGAIN, errno.ETOOMANYREFS}:
                     raise
                 if time.monotonic() > deadline:
@@ -76,9 +76,9 @@ class RobotLink:
 
     @property
     def is_computing(self) -> bool:
-        """Return whether the process uses the processor, or waits for its turn."""
+        """Whether the process uses the processor, or waits for it."""
         return is_computing(self.process.pid)
 
     def describe_end(self) -> str:
-        """Return in words how the process ended."""
+        """Return a description of the end of the process."""
         return describe_end(self.process)

@@ -1,6 +1,6 @@
-"""A robot's process: what it runs from its start to its end.
+"""The main function of a robot's process.
 
-It ends when the parent says so, and at once when the parent is gone, however that happened.
+The process ends when the parent orders it, and at once when the parent is gone for any reason.
 """
 
 from __future__ import annotations
@@ -29,12 +29,11 @@ from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 LOWEST_NICE = 19
 MEASURED = 128
-"""Of a larger team not every robot measures its memory, but so many, evenly over the order: the system takes a
-millisecond for it."""
+"""The most robots of a team that measure their memory, evenly over the order: each measurement takes a millisecond."""
 REHEARSED = 32
-"""The most robots that are rehearsed. Python 3.11 rewrites a function from its 8th call on, and more now and then."""
+"""The most robots in a rehearsal. Python 3.11 specializes a function from its 8th call on, and later more of it."""
 REHEARSAL_S = 0.05
-"""When the rehearsal is broken off, in seconds."""
+"""The longest rehearsal, in seconds."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
 _prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
@@ -48,8 +47,8 @@ class RobotStart(NamedTuple):
         part: The robot's part of the problem.
         protocol: The protocol that it runs.
         epoch: The number of the current epoch.
-        observed: Its events are wanted.
-        bounds: Among them, its lower bounds.
+        observed: Whether it reports events.
+        bounds: Whether the events include lower bounds.
     """
 
     part: AgentProblem
@@ -60,18 +59,18 @@ class RobotStart(NamedTuple):
 
 
 def rehearse(protocol: type[Protocol], parts: Iterable[AgentProblem]) -> None:
-    """Build a few robots in the parent, and forget them, before all are forked.
+    """Build a few robots in the parent, and discard them, before all are forked.
 
-    Python rewrites what it runs for the first times, to run it faster. What was rewritten before the fork is not
-    copied for each robot. Others' protocols are left alone: whatever is wrong with them is to happen in a robot. So are
-    large domains: they take numpy, which can start threads, and long.
+    Python specializes the bytecode of its first calls. Bytecode that was specialized before the fork is not copied for
+    each robot. Users' protocols are excluded: their errors are to occur in a robot. So are large domains: they need
+    numpy, which can start threads, and take long.
     """
     if not protocol.__module__.startswith("robochoc."):
         return
     until = time.monotonic() + REHEARSAL_S
-    with suppress(UnsupportedError):  # a robot will say so
+    with suppress(UnsupportedError):  # a robot will report it
         for part in islice((part for part in parts if len(part.domain.values) < MIN_TABLE_VALUES), REHEARSED):
-            Host.of(protocol, part)
+            Host.create(protocol, part)
             if time.monotonic() > until:
                 break
 
@@ -82,9 +81,9 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
     Ctrl-C reaches the whole process group, and is left to the parent.
 
     Args:
-        start: What the robot starts with.
+        start: The robot's arguments.
         control: Its end of its control pipe.
-        parent: More descriptors that can be read once the parent is gone.
+        parent: More descriptors that become readable when the parent is gone.
     """
     leave_ctrl_c_to_the_parent()
     _end_with_the_parent()
@@ -94,13 +93,13 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
     _set_niceness(place, robots)
     link = ControlPipe(name, control)
     try:
-        host = Host.of(start.protocol, start.part)
+        host = Host.create(start.protocol, start.part)
         measured = place % -(-robots // MEASURED) == 0
         observed, bounds = start.observed, start.bounds
         QueueRobot(host, link, start.epoch, observed=observed, bounds=bounds, measured=measured, parent=parent).run()
     except UnsupportedError as refusal:
         link.send(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
-    except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
+    except Exception as error:  # noqa: BLE001 - the parent has to know of any error
         where = traceback.extract_tb(error.__traceback__)[-1]
         link.send(Failed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
     link.finish()
@@ -108,7 +107,7 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
 
 def served_robot_process(start: RobotStart, control: socket.socket) -> None:
     """Run one robot in a process that a fork server has started: its parent is that server, not ours."""
-    import multiprocessing  # noqa: PLC0415 - it is there where a fork server has started this, and nobody else needs it
+    import multiprocessing  # noqa: PLC0415 - already imported by the fork server, and needed only here
 
     parent = multiprocessing.parent_process()
     robot_process(start, control, () if parent is None else (parent.sentinel,))
@@ -117,8 +116,8 @@ def served_robot_process(start: RobotStart, control: socket.socket) -> None:
 def _end_with_the_parent() -> None:
     """Have the kernel kill this process when the parent dies (Linux).
 
-    A robot that waits sees its control pipe end. One that computes, or that got no turn on a busy machine, would see it
-    late. Strictly, the thread of the parent counts that runs the team, and waits for its end.
+    A waiting robot sees the end of its control pipe. A robot that computes, or waits for a busy processor, would see it
+    late. Strictly, the signal is sent when the parent's thread that runs the team ends.
     """
     if _prctl is not None:
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -133,7 +132,7 @@ def _set_process_name(name: str) -> None:
 def _set_niceness(place: int, robots: int) -> None:
     """Let the scheduler favour robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
 
-    What a robot decides on the basis of an old view is work for nothing, for all below it. On two cores 121 robots
-    need a tenth of the messages this way (docs/explanation/design.md, "Processes").
+    Decisions from an outdated view waste the work of all robots below. On two cores this reduces the messages of 121
+    robots to a tenth (docs/explanation/design.md, "Processes").
     """
     os.nice(LOWEST_NICE * place // robots)

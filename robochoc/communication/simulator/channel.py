@@ -1,9 +1,9 @@
-"""Channel models: how long a message takes by radio, and why.
+"""Channel models: the time that a message takes by radio.
 
-A message is cut into frames; each takes time on the air by its bytes, may be lost and is then sent again, and what is
-left is latency: queues, access to the medium, relays. The loss of a frame only delays: every message arrives, and none
-overtakes another of the same channel, as protocols require. Only where `message_loss` or a link says so do whole
-messages not arrive (`link_loss.py`). Where the figures come from: docs/guides/channels.md.
+A message is cut into frames. Each frame needs time on the air according to its size, and may be lost and sent again;
+the rest is latency: queues, access to the medium, relays. The loss of a frame only delays a message: every message
+arrives, and none overtakes another one of the same channel, as protocols require. Whole messages are lost only by
+`message_loss` and the models in `loss_models.py`. Sources of the figures: docs/guides/channels.md.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from robochoc.communication.simulator.link_loss import (
+from robochoc.communication.simulator.loss_models import (
     Bursts,
     NamedLink,
     PathLoss,
@@ -33,7 +33,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeE
 from robochoc.formats.toml import convert, toml_tables
 
 LARGEST_FILE = 2**16
-"""A channel's file has no more bytes."""
+"""The largest size of a channel's file, in bytes."""
 NS_PER_MS, NS_PER_US, NS_PER_S = 10**6, 10**3, 10**9
 
 _MOST_MS = 60_000
@@ -53,15 +53,15 @@ _RANGES = {
     "check_ns": (0, NS_PER_S),
     "unit_m": (0.001, 10**6),
 }
-"""The accepted range of each value. Other values are certainly mistakes, and a run might not end with them."""
+"""The accepted range of each value. Other values are certainly mistakes, and might prevent the end of a run."""
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
 
 class Crossing(NamedTuple):
     """The time that one message takes, in nanoseconds.
 
-    `air`: time on the air, of all its frames and of those that were sent again; `waiting`: until it was clear that
-    these were lost; `latency`: all the rest.
+    `air`: time on the air of all its frames, retransmissions included; `waiting`: time until losses of frames were
+    detected; `latency`: the rest.
     """
 
     air: int
@@ -78,13 +78,13 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     second (None: bytes take no time), and `frame_us` besides (preamble, spaces between frames, acknowledgement). Each
     transmission of a frame is lost with the probability `loss`; it is sent again after `timeout_ms`, which is
     multiplied by `backoff` each time up to `longest_timeout_ms`. If the medium is `shared`, one robot is on the air at
-    a time; if not, each robot sends one message at a time, beside the others. `check_ns` is what one constraint check
-    takes a robot.
+    a time; if not, each robot sends one message at a time, independently of the others. `check_ns` is the time of one
+    constraint check in nanoseconds.
 
-    With the probability `message_loss` a message is lost for good: nobody sends it again. On top of that, messages are
+    With the probability `message_loss` a message is lost for good: it is not sent again. In addition, messages are
     lost by the distance of sender and receiver, in units of `unit_m` metres: by `path_loss`, or by `distance_loss`,
-    pairs of a distance in metres and a probability. `positions` say where robots stand. Some are lost in `bursts`.
-    `links` are those with a probability of their own. Raises `ValueError` for what cannot be.
+    pairs of a distance in metres and a probability. `positions` are the places of robots. Messages are also lost in
+    `bursts`. `links` are links with their own probabilities. Raises `ValueError` for invalid values.
     """
 
     name: str
@@ -124,13 +124,13 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         refuse_table(self.distance_loss)
         refuse_positions(self.positions)
         if self.path_loss and self.distance_loss:
-            raise ValueError("distance_loss: path_loss says already what is lost by distance; give one of them")
+            raise ValueError("distance_loss: cannot be combined with path_loss; remove one of them")
         if self.positions and not self.by_distance:
-            raise ValueError("positions: nothing is lost by distance; add path_loss or distance_loss")
+            raise ValueError("positions: requires path_loss or distance_loss; add one of them")
 
     @property
     def by_distance(self) -> bool:
-        """Return whether it depends on the distance of two robots what is lost between them."""
+        """Whether the loss of messages depends on the distance of sender and receiver."""
         return self.path_loss is not None or bool(self.distance_loss)
 
     def loss_at(self, distance: float) -> float:
@@ -141,13 +141,13 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     @property
     def most_loss(self) -> float:
-        """Return the largest probability, in the long run, with which a message of any link is lost for good."""
+        """The largest long-run probability, over all links, that a message is lost for good."""
         far = 1.0 if self.path_loss else max([loss for _, loss in self.distance_loss], default=0.0)
         usual = either(either(self.message_loss, far), self.bursts.mean if self.bursts else 0.0)
         return max([usual, *[link.loss for link in self.links]])
 
     def crossing(self, size: int, chance: Random) -> Crossing:
-        """Return what a message of `size` bytes needs this time; an empty one has a frame, too."""
+        """Draw the times of a message of `size` bytes; an empty message has one frame, too."""
         whole, rest = divmod(size, self.payload_bytes)
         full, last = self._air(self.payload_bytes), self._air(rest)
         frames = whole + 1 if rest or not whole else whole
@@ -167,19 +167,16 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         return bytes_ns + round(self.frame_us * NS_PER_US)
 
     def _latency(self, chance: Random) -> int:
-        """Return a draw from the log-normal distribution.
-
-        One each time, so that other fields do not shift the chance.
-        """
+        """Return one draw from the log-normal distribution (always one, so other fields do not shift later draws)."""
         minimum = round(self.minimum_ms * NS_PER_MS)
         median = round(self.latency_ms * NS_PER_MS) - minimum
         return minimum + round(median * chance.lognormvariate(0, self.sigma))
 
 
 _SHIPPED = (
-    # 802.11, OFDM at 24 Mbit/s, over an access point: each message is on the air twice, so half of that is left.
-    # Latency: measured, median 3 ms, 90th percentile 20 ms (Sui et al. 2016); the link's own retries are in it. What
-    # they leave is TCP's: its timeout begins at 200 ms (Linux) and doubles up to 60 s (RFC 6298).
+    # 802.11, OFDM at 24 Mbit/s, over an access point: each message is on the air twice, so half of the rate is left.
+    # Latency: measured, median 3 ms, 90th percentile 20 ms (Sui et al. 2016), including the link's own retries. TCP
+    # repairs the remaining losses: its timeout begins at 200 ms (Linux) and doubles up to 60 s (RFC 6298).
     ChannelModel(
         name="wlan", latency_ms=3, minimum_ms=0.1, sigma=1.5, bandwidth_bps=12e6, payload_bytes=1448,
         overhead_bytes=90, frame_us=196, loss=0.001, timeout_ms=200, shared=True,
@@ -189,7 +186,7 @@ _SHIPPED = (
         name="wpan", latency_ms=1.44, minimum_ms=0.32, sigma=0.5, bandwidth_bps=250e3, payload_bytes=105,
         overhead_bytes=28, frame_us=1184, loss=0.1, timeout_ms=2, longest_timeout_ms=10, shared=True,
     ),
-    # 802.16, 3.5 MHz, TDD, 16-QAM 1/2, frames of 5 ms, over a base station: ask, be granted, send, be passed on.
+    # 802.16, 3.5 MHz, TDD, 16-QAM 1/2, frames of 5 ms, over a base station: request, grant, transmission, relay.
     ChannelModel(
         name="wman", latency_ms=20, minimum_ms=10, sigma=0.4, bandwidth_bps=2.67e6, payload_bytes=1448,
         overhead_bytes=62, loss=0.001, timeout_ms=200, shared=True,
@@ -208,7 +205,7 @@ _HINT = "docs/guides/channels.md shows all fields"
 
 
 def read_channel(path: Path) -> ChannelModel:
-    """Return the model in the TOML file at `path`, named for the file unless it says otherwise.
+    """Return the model in the TOML file at `path`; its default name is the stem of the path.
 
     Raises `InvalidInputError`.
     """
@@ -219,7 +216,7 @@ def read_channel(path: Path) -> ChannelModel:
         raise _invalid(path, f"is not a valid TOML file: {shortened(str(wrong))}") from None
     fields.setdefault("name", path.stem)
     if fields["name"] in (*CHANNELS,):
-        raise _invalid(path, f"name: {fields['name']} is the name of a shipped model", "name it otherwise")
+        raise _invalid(path, f"name: {fields['name']} is the name of a shipped model", "use another name")
     try:
         return convert(fields, ChannelModel, text, _HINT)
     except MistakeError as wrong:
@@ -228,18 +225,18 @@ def read_channel(path: Path) -> ChannelModel:
 
 def _text(path: Path) -> str:
     if not path.is_file():
-        raise _invalid(path, "is no file", f"name a file, or one of: {', '.join(CHANNELS)}")
+        raise _invalid(path, "is not a file", f"give a file, or one of: {', '.join(CHANNELS)}")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except OSError as error:
-        raise _invalid(path, f"cannot be read: {error.strerror}", "look at its permissions") from None
+        raise _invalid(path, f"cannot be read: {error.strerror}", "check its permissions") from None
     if len(content) > LARGEST_FILE:
         raise _invalid(path, f"is too large for a channel's file, which has up to {LARGEST_FILE:,} bytes")
     try:
         return content.decode()
     except UnicodeDecodeError:
-        raise _invalid(path, "is not UTF-8", "a channel's file is TOML, in UTF-8") from None
+        raise _invalid(path, "is not UTF-8", "save it as TOML in UTF-8") from None
 
 
 def _invalid(path: Path, message: str, hint: str = _HINT) -> InvalidInputError:

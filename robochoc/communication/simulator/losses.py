@@ -1,7 +1,7 @@
-"""Messages that are lost on their way, for good: each with the same probability, drawn from a seed.
+"""Messages that are lost for good in transit: each with the same probability, drawn from a seed.
 
-The next message of the same channel shows its receiver that some are missing, as numbers on messages would. Where none
-follows, robots notice when nothing arrives any more.
+The next message of the same channel shows its receiver the gap, as sequence numbers would. If no message follows,
+robots notice the loss when no more messages arrive.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ class Losses:
         self._chance = random.Random(f"losses {seed}")  # noqa: S311 - a radio is no secret
         self.lost = 0
         self._missing: dict[Link, int] = {}
-        """By channel, the messages lost since the last one that was not."""
+        """By channel, the messages lost since its last message that was not lost."""
         self._under_way: dict[Link, deque[int]] = {}
-        """By channel, for each message under way how many were lost right before it."""
+        """By channel, the number of messages lost right before each message in transit."""
 
     def follow(self, team: Team, values_of: Callable[[str], Mapping[str, int]]) -> None:
-        """Know the `team` from now on, and the values that a robot has at any time."""
+        """Use this `team` from now on; `values_of` returns a robot's present values."""
 
     def _loss_of(self, link: Link) -> float:  # noqa: ARG002 - the same for all links
-        """Return the probability that the next message of `link` is lost. Ask once for each message."""
+        """Return the probability that the next message of `link` is lost. Called once for each message."""
         return self._probability
 
-    def takes(self, envelope: Envelope) -> bool:
-        """Return whether `envelope`, which is being sent, will never arrive."""
+    def loses(self, envelope: Envelope) -> bool:
+        """Draw whether `envelope`, which is being sent, is lost."""
         edge = (envelope.sender, envelope.receiver)
         if self._chance.random() < self._loss_of(edge):
             self.lost += 1
@@ -46,12 +46,12 @@ class Losses:
         self._under_way.setdefault(edge, deque()).append(self._missing.pop(edge, 0))
         return False
 
-    def before(self, envelope: Envelope) -> int:
-        """Return how many messages of its channel were lost right before `envelope`, which has arrived. Ask once."""
+    def missing_before(self, envelope: Envelope) -> int:
+        """Return the number of messages of its channel lost right before `envelope`. Called once, when it arrives."""
         return self._under_way[envelope.sender, envelope.receiver].popleft()
 
-    def end(self) -> int:
-        """End a search: nothing is under way any more. Return how many messages were lost in it."""
+    def reset(self) -> int:
+        """Reset at the end of a search, and return the number of messages lost in it."""
         lost, self.lost = self.lost, 0
         self._missing.clear()
         self._under_way.clear()

@@ -1,6 +1,6 @@
-"""Schedules: the messages that are under way in a simulator, and which of them arrive next.
+"""Schedules: the messages in transit in a simulator, and the order of their arrival.
 
-Channels are FIFO: between two robots no message overtakes another. What reaches a robot together is one packet.
+Channels are FIFO: between two robots no message overtakes another. Messages that reach a robot together are one packet.
 Every schedule is deterministic from its seed.
 """
 
@@ -17,56 +17,56 @@ from robochoc.model.message import Envelope
 from robochoc.system.compiling import mypyc_attr
 
 NEVER: Final = -1
-"""No time of a turn."""
+"""Stands for no turn."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Schedule(ABC):
-    """The messages under way. `now` is the time, in the schedule's own unit."""
+    """The messages in transit. `now` is the time, in the schedule's unit."""
 
     now: int = 0
 
     @abstractmethod
     def put(self, envelope: Envelope, checks: int = 0) -> None:
-        """Send `envelope` on its way: its sender has said it `checks` checks after it had begun with its packet."""
+        """Send `envelope`, written `checks` constraint checks after its sender had started to handle its packet."""
 
     @abstractmethod
     def get(self) -> Sequence[Envelope]:
-        """Return the next packet, all for one robot, oldest first in each channel; empty when nothing is under way."""
+        """Return the next packet, all for one robot, in the order of each channel; empty if none is in transit."""
 
     @abstractmethod
     def clear(self) -> None:
-        """Drop all messages under way, and reset all clocks."""
+        """Drop all messages in transit, and reset all clocks."""
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: B027 - not every schedule has to know
-        """`robot` has finished with its packet (or its start), all it said being put: its NCCC clock stands at `clock`.
+        """Note that `robot` has handled its packet (or its start), and that all its messages are put.
 
-        `checks` is the number of constraint checks that this took.
+        `clock` is its NCCC clock, `checks` the number of constraint checks that this step took.
         """
 
     def lose(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: B027 - not every schedule has to know
-        """Send `envelope`, as in `put`, which will never arrive."""
+        """Send `envelope`, as `put` does, but lose it in transit."""
 
     def wait(self) -> None:  # noqa: B027 - not every schedule has to know
-        """Let the time pass after which robots notice that nothing arrives any more."""
+        """Advance the time until robots notice that no more messages arrive."""
 
     def time(self, checks: int) -> float:  # noqa: ARG002 - not every schedule has to know
-        """Return the time of an event, this number of checks after a robot began with its packet."""
+        """Return the time of an event, this number of checks after a robot started to handle its packet."""
         return float(self.now)
 
     @property
     def elapsed_s(self) -> float:
-        """Simulated seconds until the last robot had finished; 0 where time is not counted in seconds."""
+        """Simulated seconds until the last robot had finished; 0 if time is not counted in seconds."""
         return 0.0
 
     @property
     def cycles(self) -> int:
-        """Cycles that have begun; 0 where time is not counted in cycles."""
+        """The number of started cycles; 0 if time is not counted in cycles."""
         return 0
 
     @property
     def next_cycle(self) -> int:
-        """The cycle in which the next packet arrives; 0 where there is none, or time is not counted in cycles."""
+        """The cycle in which the next packet arrives; 0 if there is none, or time is not counted in cycles."""
         return 0
 
 
@@ -75,11 +75,11 @@ class Concurrent(Schedule):
     """All robots compute at the same time, and time is counted in constraint checks. The default.
 
     The asynchronous message-delaying simulator of Zivan and Meisels (2006): a robot is busy for as long as its
-    checks take, then takes in all that has arrived meanwhile. A message leaves at the check at which it is said,
-    which its clock tells, so it may be there before its sender is free again. It takes a number of checks drawn from
-    0..`longest`, which the receiver's NCCC clock takes up as well. Ties are broken by the seed.
+    checks take, then receives all messages that have arrived meanwhile. A message leaves at the check at which it was
+    written (its clock), so it may arrive before its sender is free again. Its delay is a number of checks drawn from
+    0..`longest`, which also advances the receiver's NCCC clock. Ties are broken by the seed.
 
-    With `one_by_one` a robot takes in one message at a time, and settles after each.
+    With `one_by_one` a robot receives one message at a time, and settles after each.
     """
 
     def __init__(self, seed: int, longest: int = 0, *, one_by_one: bool = False) -> None:
@@ -89,12 +89,12 @@ class Concurrent(Schedule):
         self._said = 0
         self._readers: dict[str, _Reader] = {}
         self._times: list[int] = []
-        """When robots have turns, as a heap: each time once."""
+        """The times of turns, as a heap without duplicates."""
         self._turns: dict[int, list[tuple[float, str]]] = {}
-        """The robots that have a turn at a time, as a heap by lot: many small heaps are faster than a large one."""
+        """For each time, a heap of the robots with a turn, by lot: many small heaps are faster than a large one."""
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
-        """Draw the delay; never earlier than the message before it in the same channel."""
+        """Send `envelope` with a random delay, to arrive not earlier than its predecessor in the same channel."""
         sender, receiver, _, said = envelope
         reader = self._readers.get(receiver)
         if reader is None:
@@ -114,7 +114,7 @@ class Concurrent(Schedule):
             self._note(reader, arrival)
 
     def get(self) -> Sequence[Envelope]:
-        """Return all messages in the inbox of the robot that reads its inbox next, or the first of them."""
+        """Return all messages (or the first one) in the inbox of the robot with the next turn."""
         while self._times:
             due = self._times[0]
             turns = self._turns[due]
@@ -134,14 +134,14 @@ class Concurrent(Schedule):
         return ()
 
     def clear(self) -> None:
-        """Drop all messages under way. No robot is busy afterwards."""
+        """Drop all messages in transit, and free all robots."""
         self._readers.clear()
         self._times.clear()
         self._turns.clear()
         self.now = 0
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - they are in the clock
-        """Note that the robot is free from `clock` on."""
+        """Note that the robot is busy until `clock`."""
         reader = self._readers.get(robot)
         if reader is None:
             reader = self._readers[robot] = _Reader(robot)
@@ -150,7 +150,7 @@ class Concurrent(Schedule):
             self._note(reader, reader.inbox[0][0])
 
     def _note(self, reader: _Reader, arrival: int) -> None:
-        """Give a robot its turn when its first message has arrived and it is not busy; it has one turn at most."""
+        """Schedule the robot's turn: once its first message has arrived and it is not busy. It has at most one turn."""
         due, free = arrival, reader.busy_until
         if free > due:  # noqa: PLR1730 - faster
             due = free
@@ -167,7 +167,7 @@ class Concurrent(Schedule):
 
 
 class _Reader:
-    """A robot as `Concurrent` sees it: what is under way to it, until when it is busy, and when it has its turn."""
+    """The state of a robot in `Concurrent`: its inbox, until when it is busy, and the time of its turn."""
 
     __slots__ = ("busy_until", "due", "inbox", "last_arrival", "name")
 
@@ -181,11 +181,11 @@ class _Reader:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Cycles(Schedule):
-    """All robots go in step: in each cycle, each takes in all that was sent to it in the cycle before.
+    """All robots work in step: in each cycle, each receives all messages sent to it in the previous cycle.
 
     The synchronous simulator by which Yokoo, Durfee, Ishida and Kuwabara (1998, section 6) and Modi, Shen, Tambe and
-    Yokoo (2005, section 6) count cycles. The start is no cycle. Within a cycle robots are drawn by the seed; no
-    protocol can tell.
+    Yokoo (2005, section 6) count cycles. The start is not a cycle. The order of robots within a cycle is drawn from the
+    seed; it does not influence any protocol.
     """
 
     def __init__(self, seed: int) -> None:
@@ -195,20 +195,20 @@ class Cycles(Schedule):
 
     @property
     def cycles(self) -> int:
-        """Cycles that have begun."""
+        """The number of started cycles."""
         return self.now
 
     @property
     def next_cycle(self) -> int:
-        """The cycle in which the next packet arrives; 0 where there is none."""
+        """The cycle in which the next packet arrives; 0 if there is none."""
         return self.now if self._packets else self.now + 1 if self._sent else 0
 
-    def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - a cycle is as long as it takes
-        """Send `envelope`: it arrives in the next cycle."""
+    def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - a cycle has no length
+        """Send `envelope` to arrive in the next cycle."""
         self._sent.setdefault(envelope.receiver, []).append(envelope)
 
     def get(self) -> Sequence[Envelope]:
-        """Return what has been sent to a robot that has not had its turn in this cycle."""
+        """Return the messages to a robot that has not had its turn in this cycle."""
         if not self._packets and self._sent:
             self.now += 1
             self._packets = list(self._sent.values())
@@ -217,7 +217,7 @@ class Cycles(Schedule):
         return self._packets.pop() if self._packets else ()
 
     def clear(self) -> None:
-        """Drop all messages under way; cycles are counted from 0 again."""
+        """Drop all messages in transit, and count cycles from 0 again."""
         self._packets.clear()
         self._sent.clear()
         self.now = 0
@@ -225,10 +225,10 @@ class Cycles(Schedule):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class RandomChannels(Schedule):
-    """Any channel may come next, so any message may be slow for any time: a hard test, not a model. A packet a step.
+    """Any channel may be next, so any message may be delayed for any time: a hard test, not a model. A packet a step.
 
-    A packet is the head of a channel drawn from all, and, each time with the chance of one half, the head of
-    another channel to the same robot.
+    A packet is the head of a channel drawn from all, and, repeatedly with probability one half, the head of another
+    channel to the same robot.
     """
 
     def __init__(self, seed: int) -> None:
@@ -245,7 +245,7 @@ class RandomChannels(Schedule):
         channel.append(envelope)
 
     def get(self) -> Sequence[Envelope]:
-        """Draw a channel, then perhaps more that lead to the same robot."""
+        """Draw a channel, and perhaps more channels to the same robot."""
         if not self._waiting:
             return ()
         self.now += 1
@@ -258,12 +258,12 @@ class RandomChannels(Schedule):
         return packet
 
     def clear(self) -> None:
-        """Drop all messages under way."""
+        """Drop all messages in transit."""
         self._channels.clear()
         self._waiting.clear()
 
     def _take(self, place: int) -> Envelope:
-        """Return the head of the waiting channel at `place`; an empty channel leaves the list, unordered."""
+        """Remove and return the head of the waiting channel at `place`; an empty channel is removed from the list."""
         edge = self._waiting[place]
         channel = self._channels[edge]
         head = channel.popleft()

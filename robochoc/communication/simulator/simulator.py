@@ -1,7 +1,7 @@
 """The simulator: the whole team in one thread, deterministic from a seed.
 
-A schedule says which messages arrive next (`communication/simulator/schedule.py`). The search is over when it is empty
-and no robot has anything to say.
+A schedule decides which messages arrive next (`communication/simulator/schedule.py`). The search is over when no
+message is in transit and no robot sends one.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
+from robochoc.communication.host import Host, MessageCache, may_be_shared, order_of
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.search_watch import SearchWatch, snapshot_of
-from robochoc.communication.session import Epoch, Session, over
+from robochoc.communication.session import Epoch, Session, is_past
 from robochoc.communication.simulator.losses import Losses
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
@@ -34,14 +34,14 @@ from robochoc.system.time_limit import TimeLimitError, computed_by
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
 PROGRESS_S = 0.25
-"""Seconds after which there is one in any case: some packets are much work."""
+"""Seconds after which the progress is reported in any case, as some packets take long."""
 LONGEST_STEP_S = 0.3
-"""A step is interrupted if it continues for this many seconds after the time limit."""
+"""Seconds after the time limit at which a step is interrupted."""
 
 
 @dataclass(frozen=True)
 class EffortLimits:
-    """Limits on what all searches of a simulation take together. None: no limit.
+    """Limits on the total effort of all searches of a simulation. None: no limit.
 
     Attributes:
         ncccs: Non-concurrent constraint checks.
@@ -65,17 +65,17 @@ class Simulation(Session):
         schedule: Decides which messages arrive next.
         observer: Receives all events, with the schedule's time.
         progress: Receives the count of messages now and then.
-        parameters: What robots are given besides the problem.
-        limits: On what the searches take. They are looked at after each packet.
-        deadline: When the time of the run is over, on the monotonic clock.
-        bounds: Whether the observer hears of lower bounds, too.
-        losses: Draws which messages are lost. None: none is.
+        parameters: The robots' parameters besides the problem.
+        limits: The limits of the searches' effort, checked after each packet.
+        deadline: The end of the run's time, on the monotonic clock.
+        bounds: Whether the observer receives lower bounds, too.
+        losses: Draws which messages are lost; None if no message is.
 
     Raises:
-        OutOfTimeError: when the deadline comes before all robots are set up; `change` as well.
+        OutOfTimeError: if the deadline comes before all robots are set up; `change` raises it as well.
     """
 
-    def __init__(  # noqa: PLR0913 - how a session goes, by names
+    def __init__(  # noqa: PLR0913 - keyword options
         self,
         team: Team | CompiledTeam,
         protocol: type[Protocol],
@@ -103,7 +103,7 @@ class Simulation(Session):
         self._verdict: Verdict | None = None
         self._witness: str | None = None
         self._order: PriorityOrder | None = None
-        self._under_way = UnderWay() if may_be_shared(protocol.messages) else None
+        self._message_cache = MessageCache() if may_be_shared(protocol.messages) else None
         with collection_paused():
             parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
             self._hosts: dict[str, Host] = {}
@@ -121,11 +121,11 @@ class Simulation(Session):
         return self._lossless
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        """See `Session.search`; a limit on messages is looked at after each packet."""
+        """See `Session.search`; a limit on messages is checked after each packet."""
         began = time.monotonic()
         if self._verdict is None:
             end = None if timeout is None else began + timeout + LONGEST_STEP_S
-            # Robots' problems are no garbage, and they are most of what there is.
+            # Robots' problems are most of all objects, and are not garbage.
             with garbage_frozen(), collection_seldom(), suppress(TimeLimitError):
                 computed_by(end, self._play, began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
@@ -137,7 +137,7 @@ class Simulation(Session):
             [host.metrics() for host in self._hosts.values()],
             time.monotonic() - began,
         )
-        lost = 0 if self._losses is None else self._losses.end()
+        lost = 0 if self._losses is None else self._losses.reset()
         metrics = replace(result.metrics, simulated_s=simulated_s, cycles=cycles, lost_messages=lost)
         self._limits = _left(self._limits, metrics)
         findings = {name: host.protocol.findings for name, host in self._hosts.items()}
@@ -162,11 +162,11 @@ class Simulation(Session):
             self._losses.follow(self.compiled.team, self._values_of)
 
     def close(self) -> None:
-        """Do nothing: there is nothing to release."""
+        """Do nothing: a simulation has no resources to release."""
 
     def _check_time(self, name: str) -> None:
         """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
-        if over(self._deadline):
+        if is_past(self._deadline):
             raise OutOfTimeError(f"the time was over before {name} knew its problem")
 
     def _set_up(self, parts: Mapping[str, AgentProblem]) -> None:
@@ -176,20 +176,20 @@ class Simulation(Session):
 
     def _host(self, part: AgentProblem) -> Host:
         self._check_time(part.robot.name)
-        host = Host.of(self._protocol, part, self._order_of(part))
-        host.under_way = self._under_way
+        host = Host.create(self._protocol, part, self._order_of(part))
+        host.message_cache = self._message_cache
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time, bounds=self._bounds)
         return host
 
     def _order_of(self, part: AgentProblem) -> PriorityOrder:
-        """Return the order of an epoch's robots: one object for all of them, as its tree is as large as the team."""
+        """Return the order of an epoch's robots: one shared object, as its tree is as large as the team."""
         if self._order is None or self._order.rank is not part.known.rank:
             self._order = order_of(part)
         return self._order
 
     def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
-        """Every robot starts before any message arrives; then packet by packet."""
+        """Start every robot, then deliver packet by packet."""
         lossless, self._lossless = self._lossless, False
         for host in self._hosts.values():
             self._checks = host.checks
@@ -225,18 +225,18 @@ class Simulation(Session):
                 self._verdict, self._lossless = Verdict.SOLUTION, self._losses is None or not self._losses.lost
 
     def _handle(self, host: Host, packet: Sequence[Envelope], losses: Losses) -> list[Envelope]:
-        """Let `host` handle a packet, before which messages may be missing; return what it says.
+        """Let `host` handle a packet after possibly lost messages; return its messages.
 
-        Where its protocol cannot go on without these, the search is over.
+        If its protocol cannot continue without the lost messages, the search is over.
         """
-        said = host.handle_lossy(packet, losses.before, lost=losses.lost > 0)
+        said = host.handle_lossy(packet, losses.missing_before, lost=losses.lost > 0)
         if said is None:
             self._verdict = Verdict.UNKNOWN
             return []
         return said
 
     def _go_on(self) -> bool:
-        """Let all robots continue without what they wait for; return whether one does."""
+        """Let all robots continue without the messages they wait for; return whether one does."""
         if self._losses is None or not self._protocol.traits.bears_loss:
             return False
         self._schedule.wait()
@@ -250,16 +250,16 @@ class Simulation(Session):
         return went
 
     def _is_to_stop(self, elapsed_s: float) -> bool:
-        """Report the progress; return whether somebody has asked to stop."""
+        """Report the progress; return whether a stop was requested."""
         if self._progress:
             self._progress(Progress(self._sent, elapsed_s))
         return stop_requested()
 
     def _watched(self, watch: SearchWatch) -> bool:
-        """Let `watch` have a snapshot if it wants one; return whether the search need not go on."""
+        """Give `watch` a snapshot if it is due; return whether the search may stop."""
         if watch.wants_snapshot(time.monotonic()):
             hosts, losses = self._hosts, self._losses
-            watch.take(
+            watch.receive(
                 snapshot_of(
                     {name: host.protocol.assignment for name, host in hosts.items()},
                     {name: host.protocol.findings for name, host in hosts.items()},
@@ -269,13 +269,13 @@ class Simulation(Session):
         return watch.satisfied
 
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
-        """Send what `host` has said in its step on its way."""
+        """Pass the messages of `host`'s step to the schedule."""
         schedule, before, clock = self._schedule, self._checks, host.clock
         if envelopes:
             self._sent += len(envelopes)
             losses = self._losses
             for envelope, checks in zip(envelopes, host.said_at, strict=True):
-                if losses is not None and losses.takes(envelope):
+                if losses is not None and losses.loses(envelope):
                     schedule.lose(envelope, checks - before)
                 else:
                     schedule.put(envelope, checks - before)
@@ -285,7 +285,7 @@ class Simulation(Session):
         self._note_verdict(host)
 
     def _values_of(self, name: str) -> dict[str, int]:
-        """Return the values that a robot has now; none as long as it has not decided."""
+        """Return a robot's present values; empty until it has decided."""
         return self._hosts[name].protocol.assignment
 
     def _time(self, checks: int) -> float:
@@ -299,7 +299,7 @@ class Simulation(Session):
 
 
 def _left(limits: EffortLimits, spent: Metrics) -> EffortLimits:
-    """Return what is left of `limits` after a search."""
+    """Return the rest of `limits` after a search."""
     ncccs = None if limits.ncccs is None else max(0, limits.ncccs - spent.ncccs)
     cycles = None if limits.cycles is None else max(0, limits.cycles - spent.cycles)
     return EffortLimits(ncccs, cycles)

@@ -1,9 +1,9 @@
 """The schedule of a channel model: simulated time, in seconds, in which robots compute and messages travel by radio.
 
-Discrete events, in whole nanoseconds, so that sums are exact and a seed is a run. Time is counted as by Sultanik, Lass
-and Regli (2007, DCOPolis), who add up computing and communication; but computing is counted in constraint checks of a
-stated length, not in the processor's time, which no run repeats. NCCCs are what they are without delays: the clocks in
-envelopes stay untouched.
+Discrete events, in whole nanoseconds, so that sums are exact and a seed determines a run. Time is counted as by
+Sultanik, Lass and Regli (2007, DCOPolis), who add up computation and communication; but computation is counted in
+constraint checks of a fixed duration, as processor time is not reproducible. NCCCs are the same as without delays: the
+clocks in envelopes are not changed.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _SEND, _WAKE = 0, 1
 
 
 class Timed(Schedule):
-    """All robots compute at the same time, and share the air as `channel` has it.
+    """All robots compute at the same time, and share the medium of `channel`.
 
     `now` is in nanoseconds. Ties are broken by the seed.
 
-    A robot takes in all that has arrived, and is busy for as long as its checks take. What it says it hands to its
-    radio at the check at which it says it, and computes on. Messages get the medium in the order in which they are
-    ready.
+    A robot receives all messages that have arrived, and is busy for as long as its checks take. It passes each message
+    to its radio at the check at which the message is written, and computes on. Messages get the medium in the order in
+    which they are ready.
     """
 
     def __init__(self, seed: int, channel: ChannelModel) -> None:
@@ -46,23 +46,23 @@ class Timed(Schedule):
 
     @property
     def elapsed_s(self) -> float:
-        """Simulated seconds until the last robot had finished."""
+        """See `Schedule.elapsed_s`."""
         return self._end_ns / NS_PER_S
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:
-        """Keep `envelope` until all messages of its sender are known. Its time is the time of sending."""
+        """Store `envelope`, with its time of sending, until all messages of its sender are known."""
         self._said.append((self.now + checks * self._channel.check_ns, envelope))
 
     def lose(self, envelope: Envelope, checks: int = 0) -> None:
-        """Keep `envelope` as in `put`: it takes its time on the air, and reaches nobody."""
+        """Store `envelope` as `put` does: it needs time on the air, but does not arrive."""
         self.put(envelope._replace(receiver=""), checks)
 
     def wait(self) -> None:
-        """Let the first timeout of the channel pass, from when the last robot had finished."""
+        """Advance to the first timeout of the channel after the last robot had finished."""
         self.now = self._end_ns + round(self._channel.timeout_ms * NS_PER_MS)
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
-        """Note that the robot has done this number of checks since it began, and is free again."""
+        """Note that the robot is free again, `checks` constraint checks after the start of its step."""
         free = self.now + checks * self._channel.check_ns
         self._end_ns = max(self._end_ns, free)
         self._busy_until[robot] = free
@@ -74,7 +74,7 @@ class Timed(Schedule):
             self._wake(robot)
 
     def get(self) -> Sequence[Envelope]:
-        """Return all messages in the inbox of the robot that reads its inbox next."""
+        """Return all messages in the inbox of the robot with the next turn."""
         while self._agenda:
             due, _, _, _, what = heapq.heappop(self._agenda)
             if isinstance(what, Envelope):
@@ -92,7 +92,7 @@ class Timed(Schedule):
         return ()
 
     def clear(self) -> None:
-        """Drop all messages under way, and reset the time. No robot is busy afterwards."""
+        """Drop all messages in transit, reset the time, and free all robots."""
         states = (self._busy_until, self._free_at, self._inboxes, self._last_arrival, self._turns)
         for state in states:
             state.clear()
@@ -101,11 +101,11 @@ class Timed(Schedule):
         self.now = self._end_ns = 0
 
     def time(self, checks: int) -> float:
-        """Return the simulated time in seconds, this number of checks after the present work began."""
+        """Return the simulated time in seconds, this number of checks after the start of the present step."""
         return (self.now + checks * self._channel.check_ns) / NS_PER_S
 
     def _transmit(self, ready: int, envelope: Envelope) -> None:
-        """Send when the medium is free; arrive never earlier than the message before it in the same channel."""
+        """Send `envelope` once the medium is free; it arrives not earlier than its predecessor in the same channel."""
         edge = (envelope.sender, envelope.receiver)
         medium = "" if self._channel.shared else envelope.sender
         crossing = self._channel.crossing(len(envelope.content), self._chance)
@@ -122,12 +122,12 @@ class Timed(Schedule):
             self._wake(envelope.receiver)
 
     def _wake(self, robot: str) -> None:
-        """Give `robot` its turn at the time when something has arrived and it is not busy; a robot has one at most."""
+        """Schedule the turn of `robot`: once a message has arrived and it is not busy. It has at most one turn."""
         due = max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
         if self._turns.get(robot) != due:
             self._turns[robot] = due
             self._note(due, _WAKE, self._chance.random(), robot)
 
     def _note(self, due: int, kind: int, lot: float, what: Envelope | str) -> None:
-        """Add to the agenda. Robots that are ready at the same time draw lots. Each one's messages keep their order."""
+        """Add an event to the agenda. At equal times, lots decide between robots; messages of a robot stay in order."""
         heapq.heappush(self._agenda, (due, kind, lot, next(self._count), what))

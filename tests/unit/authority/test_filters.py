@@ -325,7 +325,7 @@ def test_what_others_offer_may_be_broken(monkeypatch: pytest.MonkeyPatch) -> Non
     for name, why in {
         "half": "does not define open",
         "gone": "cannot be imported: ModuleNotFoundError",
-        "function": "is no subclass of ChannelFilter",
+        "function": "is not a subclass of ChannelFilter",
         "twice": "several packages",
     }.items():
         with pytest.raises(UnknownFilterError, match=why):

@@ -362,8 +362,8 @@ def test_nobody_reads_the_output(tmp_path: Path) -> None:
 @looped(
     ("module", "refusal"),
     [
-        ("forked_process", r"only 0 of 4 robots have a process: Too many open files .*ulimit -n"),
-        ("pool", r"does not let \S+ have a queue to \S+: Too many open files .*ulimit -n"),
+        ("forked_process", r"processes for only 0 of 4 robots: Too many open files.*ulimit -n"),
+        ("pool", r"does not allow a queue from \S+ to \S+: Too many open files.*ulimit -n"),
     ],
 )
 def test_without_more_open_files_a_run_says_which_limit_to_raise(
@@ -385,7 +385,7 @@ def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> Non
     with running(solving(crowd), tmp_path / "run", open_files=open_files) as run:
         run.end()
         assert run.status() == 2
-        assert re.search(r"only \d+ of 64 robots .* Too many open files .*ulimit -n", run.errors())
+        assert re.search(r"only \d+ of 64 robots .* Too many open files.*ulimit -n", run.errors())
         assert len(run.errors().splitlines()) == 1
         nothing_is_left(run)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robochoc.communication.host import BadMessageError, Host, UnderWay
+from robochoc.communication.host import BadMessageError, Host, MessageCache
 from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -132,7 +132,7 @@ def test_a_verdict_is_an_event_once() -> None:
 
 
 def test_of_large_messages_only_the_last_ones_are_kept_to_be_shared() -> None:
-    under_way, message = UnderWay(), Ok((1,))
+    under_way, message = MessageCache(), Ok((1,))
     contents = [bytes([number]) * 1_000_000 for number in range(8)]
     for content in contents:
         under_way.keep(content, message)

@@ -34,11 +34,11 @@ def with_files(tmp_path: Path) -> Team:
 def test_each_is_due_once_after_the_search_began() -> None:
     schedule = KillSchedule([Kill("B", 2), Kill("A", 0.5)])
     assert (schedule.wait_s(7), schedule.due(7)) == (None, [])
-    schedule.begin(10)
+    schedule.start(10)
     assert schedule.wait_s(10.25) == 0.25
     assert schedule.due(10.25) == []
     assert schedule.due(10.5) == ["A"]
-    schedule.begin(11)  # a later search
+    schedule.start(11)  # a later search
     assert schedule.wait_s(11) == 1
     assert schedule.due(20) == ["B"]
     assert schedule.wait_s(20) is None
@@ -46,7 +46,7 @@ def test_each_is_due_once_after_the_search_began() -> None:
 
 def test_a_search_that_was_over_before_is_reported(caplog: pytest.LogCaptureFixture) -> None:
     schedule = KillSchedule([Kill("A", 5)])
-    schedule.begin(10)
+    schedule.start(10)
     schedule.end(10.3)
     schedule.warn_of_pending()
     assert caplog.messages == ["A was to be killed after 5 s; the search took 0.3 s"]

@@ -56,7 +56,7 @@ class EndsThen(SearchWatch):
         del now
         return False
 
-    def take(self, snapshot: RunResult) -> None:
+    def receive(self, snapshot: RunResult) -> None:
         raise AssertionError(snapshot)
 
 

@@ -66,18 +66,18 @@ class _Sure(Losses):
         self._places = set(places)
         self._number = -1
 
-    def takes(self, envelope: Envelope) -> bool:
+    def loses(self, envelope: Envelope) -> bool:
         self._number += 1
         self._probability = float(self._number in self._places)
-        return super().takes(envelope)
+        return super().loses(envelope)
 
 
 def test_what_comes_next_on_a_channel_shows_how_many_are_missing_before_it() -> None:
     losses = _Sure(1, 2, 4)
     sent = [Envelope("A", receiver, b"", 0) for receiver in "BBBBCC"]
-    assert [losses.takes(one) for one in sent] == [False, True, True, False, True, False]
-    assert [losses.before(sent[place]) for place in (0, 3, 5)] == [0, 2, 1]
-    assert (losses.end(), losses.end()) == (3, 0)
+    assert [losses.loses(one) for one in sent] == [False, True, True, False, True, False]
+    assert [losses.missing_before(sent[place]) for place in (0, 3, 5)] == [0, 2, 1]
+    assert (losses.reset(), losses.reset()) == (3, 0)
 
 
 @looped("protocol", [DSA, MGM, MaxSum])

@@ -50,7 +50,7 @@ class Network:
             case _:
                 pass
         if counters.due and not counters.quiescent:
-            wave = counters.begin_wave()
+            wave = counters.start_wave()
             for orders in self.orders.values():
                 orders.append(wave)
 
@@ -69,27 +69,27 @@ def test_quiet_is_declared_when_it_is_true_and_only_then(seed: int, budget: int)
 
 def test_nobody_is_quiet_before_all_have_been_heard() -> None:
     counters = FourCounters(("A", "B"))
-    counters.hear("A", Counts(0, 0))
+    counters.update("A", Counts(0, 0))
     assert not counters.due
 
 
 def test_the_silent_are_those_of_whom_nothing_is_known_then_those_that_owe_an_answer() -> None:
     counters = FourCounters(("B", "A", "C"))
-    counters.hear("B", Counts(2, 1))
+    counters.update("B", Counts(2, 1))
     assert (counters.silent, counters.latest("A"), counters.latest("B")) == (("A", "C"), None, Counts(2, 1))
     assert (counters.total, counters.sent) == (None, 2)
-    counters.hear("A", Counts(0, 1))
-    counters.hear("C", Counts(1, 1))
-    assert (counters.silent, counters.waving) == ((), False)
+    counters.update("A", Counts(0, 1))
+    counters.update("C", Counts(1, 1))
+    assert (counters.silent, counters.is_wave_open) == ((), False)
     assert (counters.total, counters.sent) == (Counts(3, 3), 3)
-    wave = counters.begin_wave()
+    wave = counters.start_wave()
     counters.answer("A", wave, Counts(0, 1))
-    assert (counters.silent, counters.waving) == (("B", "C"), True)
+    assert (counters.silent, counters.is_wave_open) == (("B", "C"), True)
 
 
 def waved(counters: FourCounters, a: Counts, b: Counts) -> int:
     """Ask A and B, who have counted this; return the number of the wave."""
-    wave = counters.begin_wave()
+    wave = counters.start_wave()
     counters.answer("A", wave, a)
     counters.answer("B", wave, b)
     return wave
@@ -98,8 +98,8 @@ def waved(counters: FourCounters, a: Counts, b: Counts) -> int:
 def heard(a: Counts, b: Counts) -> FourCounters:
     """Return the counters once A and B have reported this by themselves."""
     counters = FourCounters(("A", "B"))
-    counters.hear("A", a)
-    counters.hear("B", b)
+    counters.update("A", a)
+    counters.update("B", b)
     return counters
 
 
@@ -107,9 +107,9 @@ def test_an_answer_to_an_older_wave_is_counted_and_ends_nothing() -> None:
     counters = heard(Counts(1, 1), Counts(1, 1))
     older = waved(counters, Counts(2, 1), Counts(2, 1))
     assert not counters.quiescent
-    counters.hear("A", Counts(2, 2))
-    counters.hear("B", Counts(2, 2))
-    newer = counters.begin_wave()
+    counters.update("A", Counts(2, 2))
+    counters.update("B", Counts(2, 2))
+    newer = counters.start_wave()
     assert newer == older + 1
     counters.answer("A", newer, Counts(2, 2))
     counters.answer("B", older, Counts(2, 2))

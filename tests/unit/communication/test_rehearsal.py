@@ -18,12 +18,12 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list[AgentProblem]:
     """Return the parts of which a host is built."""
     found: list[AgentProblem] = []
 
-    def of(protocol: type[Protocol], part: AgentProblem) -> Host:
+    def create(protocol: type[Protocol], part: AgentProblem) -> Host:
         found.append(part)
-        return true_of(protocol, part)
+        return true_create(protocol, part)
 
-    true_of = Host.of
-    monkeypatch.setattr(Host, "of", of)
+    true_create = Host.create
+    monkeypatch.setattr(Host, "create", create)
     return found
 
 

@@ -20,31 +20,31 @@ def has(value: int, number: int = 1, *, epoch: int = 0, lost: int = 0, findings:
 
 def test_a_snapshot_is_what_all_robots_have_answered() -> None:
     state = SearchState(0, NAMES)
-    assert state.end_snapshot() is None
-    assert state.begin_snapshot() == 1
-    assert state.begin_snapshot() is None, "one at a time"
+    assert state.completed_snapshot() is None
+    assert state.start_snapshot() == 1
+    assert state.start_snapshot() is None, "one at a time"
     assert state.handle("A", has(1, lost=2)) == ""
-    assert state.end_snapshot() is None
+    assert state.completed_snapshot() is None
     assert state.handle("B", has(2, findings=Findings(bound=3))) == ""
-    found = state.end_snapshot()
+    found = state.completed_snapshot()
     assert found is not None
     assert (found.verdict, found.witness) == (Verdict.UNKNOWN, None)
     assert found.assignments == {"A": {"x1": 1}, "B": {"x2": 2}}
     assert found.findings["B"].bound == 3
     assert found.metrics.lost_messages == 2
-    assert state.end_snapshot() is None, "once"
-    assert state.begin_snapshot() == 2
+    assert state.completed_snapshot() is None, "once"
+    assert state.start_snapshot() == 2
 
 
 def test_what_was_not_asked_for_is_a_fault_and_of_another_epoch_it_is_nothing() -> None:
     state = SearchState(3, NAMES)
-    assert state.handle("A", has(1, epoch=3)) == "it was not asked what it has"
-    state.begin_snapshot()
-    assert state.handle("A", has(1, 7, epoch=3)) == "it was not asked what it has"
+    assert state.handle("A", has(1, epoch=3)) == "it sent a snapshot that was not requested"
+    state.start_snapshot()
+    assert state.handle("A", has(1, 7, epoch=3)) == "it sent a snapshot that was not requested"
     assert state.handle("A", has(1, epoch=2)) == ""
     assert state.handle("A", has(1, epoch=3)) == ""
-    assert state.handle("A", has(1, epoch=3)) == "it was not asked what it has"
-    assert state.end_snapshot() is None
+    assert state.handle("A", has(1, epoch=3)) == "it sent a snapshot that was not requested"
+    assert state.completed_snapshot() is None
 
 
 @looped(
@@ -60,6 +60,6 @@ def test_what_was_not_asked_for_is_a_fault_and_of_another_epoch_it_is_nothing() 
 def test_what_a_robot_across_machines_cannot_have_is_refused(said: Snapshot, fault: str) -> None:
     shown = {name: {variable: Domain(variable, (range(1, 3),))} for name, variable in (("A", "x1"), ("B", "x2"))}
     state = AuditedSearchState(0, NAMES, None, Declarations(shown=shown))
-    state.begin_snapshot()
+    state.start_snapshot()
     assert state.handle("A", said) == fault
     assert state.handle("A", has(1)) == ""

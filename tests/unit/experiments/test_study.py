@@ -124,7 +124,7 @@ WRONG = {
     "unknown runtime": (f'{SMALL}runtime = "threads"\n', 12, "expected processes, simulator, network, arrays"),
     "options apart": (f'{SMALL}runtime = "processes"\ndelay = 3\n', 10, "--delay and --schedule are the simulator's"),
     "unknown setting": (f"{SMALL}settings = {{ cycles = 3 }}\n", 10, "--set:"),
-    "unknown channel": (f'{SMALL}channel = "lan"\n', 0, "lan: is no file"),
+    "unknown channel": (f'{SMALL}channel = "lan"\n', 0, "lan: is not a file"),
     "negative seed": (f"{SMALL}seed = -1\n", 12, "expected integers of 0 or more"),
     "limit of nothing": (f"{SMALL}[limits]\ntimeout = 0\n", 13, "expected more than 0"),
     "limit without end": (f"{SMALL}[limits]\ntimeout = inf\n", 13, "no more than 2^53, got inf"),

@@ -43,7 +43,7 @@ class Bench:
         self.now = at_s
         if self.made.wants_snapshot(at_s) and given is not None:
             self._given = given
-            self.made.take(None)  # type: ignore[arg-type]
+            self.made.receive(None)  # type: ignore[arg-type]
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 
-from robochoc.communication.control import sealed, unsealed
+from robochoc.communication.control import pack_change, unpack_change
 from robochoc.communication.host import Host
 from robochoc.generators.coloring import coloring
 from robochoc.protocols.satisfaction.abt import ABT
@@ -19,7 +19,7 @@ def parts(robots: int) -> list[AgentProblem]:
 
 def test_all_robots_of_a_process_look_into_the_same() -> None:
     first, *others = parts(20)
-    hosts = [Host.of(ABT, part) for part in others]
+    hosts = [Host.create(ABT, part) for part in others]
     assert all(part.known is first.known for part in others)
     assert all(host.protocol.order.rank is first.known.rank for host in hosts)
     assert all(host.protocol.order.names is first.known.order for host in hosts)
@@ -49,7 +49,7 @@ def test_ranks_and_owners_are_not_sent() -> None:
 def test_it_is_the_same_after_it_was_sent() -> None:
     part = parts(20)[7]
     nothing = Invalidated(frozenset(), frozenset())
-    sent, _ = unsealed(sealed(part, nothing))
+    sent, _ = unpack_change(pack_change(part, nothing))
     assert sent == part
     assert sent.known.rank == part.known.rank
     assert sent.known.owners == part.known.owners

@@ -11,7 +11,8 @@ from itertools import pairwise
 import pytest
 
 from robochoc.communication.simulator.channel import ChannelModel
-from robochoc.communication.simulator.link_loss import (
+from robochoc.communication.simulator.channel_losses import ChannelLosses
+from robochoc.communication.simulator.loss_models import (
     SPEED_OF_LIGHT,
     Bursts,
     NamedLink,
@@ -20,7 +21,6 @@ from robochoc.communication.simulator.link_loss import (
     loss_by_table,
     place_of,
 )
-from robochoc.communication.simulator.link_losses import LinkLosses
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.communication.simulator.timed import Timed
 from robochoc.generators.queens3d import queens3d
@@ -50,8 +50,8 @@ def lossy(model: ChannelModel, protocol: str = "dsa", seed: int = 0) -> Options:
 
 def lost_share(model: ChannelModel, link: tuple[str, str] = ("A", "B"), many: int = 20_000) -> float:
     """The part of the messages of a link that is lost."""
-    losses = LinkLosses(model, 3)
-    return sum(losses.takes(Envelope(*link, b"", 0)) for _ in range(many)) / many
+    losses = ChannelLosses(model, 3)
+    return sum(losses.loses(Envelope(*link, b"", 0)) for _ in range(many)) / many
 
 
 # What is lost at which distance
@@ -135,9 +135,9 @@ def test_the_values_that_robots_have_now_decide_and_positions_come_before_them()
     one = Envelope("RA", "RB", b"", 0)
 
     def takes(model: ChannelModel) -> bool:
-        losses = LinkLosses(model, 0)
+        losses = ChannelLosses(model, 0)
         losses.follow(team, values.__getitem__)
-        return losses.takes(one)
+        return losses.loses(one)
 
     model = channel(distance_loss=STEP)
     assert not takes(model)
@@ -149,12 +149,12 @@ def test_the_values_that_robots_have_now_decide_and_positions_come_before_them()
 
 
 def test_a_robot_that_goes_elsewhere_again_and_again_takes_no_more_memory() -> None:
-    losses = LinkLosses(channel(distance_loss=STEP), 0)
+    losses = ChannelLosses(channel(distance_loss=STEP), 0)
     values = {"RA": {"A": 0}, "RB": {"B": 0}}
     losses.follow(on_the_diagonal(), values.__getitem__)
     for place in (*range(8), *range(20, 100), *range(8)):
         values["RB"]["B"] = place
-        assert losses.takes(Envelope("RA", "RB", b"", 0)) == (place >= 20)
+        assert losses.loses(Envelope("RA", "RB", b"", 0)) == (place >= 20)
     assert len(losses._places) == 2  # noqa: SLF001 - what is kept
 
 
@@ -196,8 +196,8 @@ def test_bursts_lose_their_part_in_the_long_run_and_come_one_after_the_other() -
     bursts = Bursts(begin=0.02, end=0.25, loss=0.8)
     assert bursts.mean == pytest.approx(0.0593, abs=1e-4)
     assert lost_share(channel(bursts=bursts)) == pytest.approx(bursts.mean, abs=0.01)
-    losses = LinkLosses(channel(bursts=replace_bursts(bursts, loss=1)), 0)
-    drawn = [losses.takes(Envelope("A", "B", b"", 0)) for _ in range(20_000)]
+    losses = ChannelLosses(channel(bursts=replace_bursts(bursts, loss=1)), 0)
+    drawn = [losses.loses(Envelope("A", "B", b"", 0)) for _ in range(20_000)]
     begun = sum(now and not before for before, now in pairwise([False, *drawn]))
     assert sum(drawn) / begun == pytest.approx(1 / bursts.end, rel=0.1)
 
@@ -207,9 +207,9 @@ def replace_bursts(bursts: Bursts, loss: float) -> Bursts:
 
 
 def test_each_link_has_bursts_of_its_own() -> None:
-    losses = LinkLosses(channel(bursts=Bursts(begin=0.5, end=0.5, loss=1)), 0)
+    losses = ChannelLosses(channel(bursts=Bursts(begin=0.5, end=0.5, loss=1)), 0)
     drawn = {
-        link: [losses.takes(Envelope(*link, b"", 0)) for _ in range(40)]
+        link: [losses.loses(Envelope(*link, b"", 0)) for _ in range(40)]
         for link in (("A", "B"), ("B", "A"), ("A", "C"))
     }
     assert len({tuple(one) for one in drawn.values()}) == 3
@@ -243,7 +243,7 @@ def test_of_each_link_so_many_messages_arrive_as_its_distance_says() -> None:
     model = channel(distance_loss=((1, 0.0), (5, 0.8)))
     events: list[AnyEvent] = []
     team = queens3d(3)
-    run = Simulation(team, DSA, Timed(1, model), losses=LinkLosses(model, 1), observer=events.append)
+    run = Simulation(team, DSA, Timed(1, model), losses=ChannelLosses(model, 1), observer=events.append)
     result = run.search()
     sent = Counter((one.sender, one.receiver) for one in events if isinstance(one, Sent))
     received = Counter((one.sender, one.receiver) for one in events if isinstance(one, Received))

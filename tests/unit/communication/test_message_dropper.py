@@ -10,9 +10,9 @@ from random import Random
 import pytest
 
 from robochoc.communication.control import Counters, RobotMessage, WentOn
-from robochoc.communication.dropped import Dropped
 from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.kill_schedule import Kill
+from robochoc.communication.message_dropper import MessageDropper
 from robochoc.communication.robot_loop import RobotLoop
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import Epoch
@@ -54,17 +54,21 @@ def quiet(names: str) -> SearchState:
 
 
 def test_each_sender_is_told_apart_and_told_once() -> None:
-    dropped = Dropped(0.5, 3, "A")
-    taken = [(sender, dropped.takes(sender)) for sender in "BCBCBCBCBC"]
+    dropper = MessageDropper(0.5, 3, "A")
+    taken = [(sender, dropper.drops(sender)) for sender in "BCBCBCBCBC"]
     lost = {name: sum(was for sender, was in taken if sender == name) for name in "BC"}
-    assert dropped.many == sum(lost.values()) > 0
-    assert [dropped.before("B"), dropped.before("B"), dropped.before("C")] == [lost["B"], 0, lost["C"]]
+    assert dropper.count == sum(lost.values()) > 0
+    assert [dropper.missing_before("B"), dropper.missing_before("B"), dropper.missing_before("C")] == [
+        lost["B"],
+        0,
+        lost["C"],
+    ]
 
 
 def test_the_same_seed_drops_the_same_and_each_robot_others() -> None:
     def drawn(seed: int, robot: str) -> list[bool]:
-        dropped = Dropped(0.5, seed, robot)
-        return [dropped.takes("B") for _ in range(50)]
+        dropper = MessageDropper(0.5, seed, robot)
+        return [dropper.drops("B") for _ in range(50)]
 
     assert drawn(1, "A") == drawn(1, "A")
     assert drawn(1, "A") != drawn(2, "A")
@@ -81,7 +85,7 @@ class Recorded(RobotLoop):
         self.said: list[RobotMessage] = []
         self.transmitted: list[Envelope] = []
 
-    def _say(self, message: RobotMessage) -> None:
+    def _send_to_master(self, message: RobotMessage) -> None:
         self.said.append(message)
 
     def _transmit(self, envelopes: Sequence[Envelope]) -> None:
@@ -108,10 +112,10 @@ class RefusingDSA(DSA):
 def sent_what_it_refuses(protocol: type[Protocol]) -> tuple[Recorded, Host, list[Envelope]]:
     """A robot that drops next to nothing, and what another one has sent it."""
     parts = Epoch(ensure_compiled(queens3d(2)), parameters=RunParameters(message_loss=1e-12)).parts(protocol)
-    first, second = (Host.of(protocol, part) for part in list(parts.values())[:2])
+    first, second = (Host.create(protocol, part) for part in list(parts.values())[:2])
     robot = Recorded()
     robot.confirm(second)
-    robot.begin(0.0)
+    robot.start(0.0)
     return robot, second, [one for one in first.start() if one.receiver == second.name]
 
 
@@ -120,7 +124,7 @@ def test_what_a_robot_cannot_use_as_others_have_lost_messages_counts_as_lost() -
     before = len(robot.transmitted)
     assert packet
     for _ in range(2):
-        robot.take_in(packet)
+        robot.receive(packet)
     assert len(robot.transmitted) == before
     assert host.metrics().lost_messages == 1
 
@@ -128,13 +132,13 @@ def test_what_a_robot_cannot_use_as_others_have_lost_messages_counts_as_lost() -
 def test_what_bears_loss_may_not_refuse_anything() -> None:
     robot, _, packet = sent_what_it_refuses(RefusingDSA)
     with pytest.raises(BadMessageError):
-        robot.take_in(packet)
+        robot.receive(packet)
 
 
 def test_where_nothing_is_under_way_all_are_told_to_go_on_and_the_search_ends_when_none_does() -> None:
     state = quiet("ABC")
-    assert state.begin_going_on()
-    assert not state.begin_going_on()
+    assert state.start_continuation()
+    assert not state.start_continuation()
     assert [state.handle(name, WentOn(0, went=False)) for name in "AB"] == ["", ""]
     assert state.next_wave(wanted=True) is None
     assert state.verdict is None
@@ -144,7 +148,7 @@ def test_where_nothing_is_under_way_all_are_told_to_go_on_and_the_search_ends_wh
 
 def test_where_one_has_gone_on_the_search_does_too() -> None:
     state = quiet("AB")
-    assert state.begin_going_on()
+    assert state.start_continuation()
     state.handle("A", WentOn(0, went=True))
     state.handle("B", WentOn(0, went=False))
     assert state.verdict is None
@@ -153,8 +157,8 @@ def test_where_one_has_gone_on_the_search_does_too() -> None:
 
 def test_who_was_not_asked_is_not_heard_and_who_is_lost_is_not_waited_for() -> None:
     state = quiet("AB")
-    assert state.handle("A", WentOn(0, went=True)) == "it was not asked whether it goes on"
-    assert state.begin_going_on()
+    assert state.handle("A", WentOn(0, went=True)) == "it answered whether it continues, without having been asked"
+    assert state.start_continuation()
     state.handle("A", WentOn(0, went=False))
     state.lose("B", "gone")
     assert state.ended
@@ -163,7 +167,7 @@ def test_who_was_not_asked_is_not_heard_and_who_is_lost_is_not_waited_for() -> N
 def test_without_losses_quiescence_is_the_end() -> None:
     state = quiet("AB")
     state.lossy = False
-    assert not state.begin_going_on()
+    assert not state.start_continuation()
     assert state.next_wave() is None
     assert state.verdict is Verdict.SOLUTION
 

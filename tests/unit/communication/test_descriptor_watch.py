@@ -9,7 +9,7 @@ from contextlib import suppress
 
 import pytest
 
-from robochoc.communication.processes.watch import Action, Watch
+from robochoc.communication.processes.queue_robot import Action, DescriptorWatch
 from robochoc.model.message import Envelope
 
 Pipe = tuple[int, int]
@@ -32,7 +32,7 @@ def action() -> Action:
 
 
 def test_what_can_be_read_is_told_until_it_is_read(pipe: Pipe) -> None:
-    watch, act = Watch(), action()
+    watch, act = DescriptorWatch(), action()
     watch.add(pipe[0], act)
     assert watch.wait(0) == []
     os.write(pipe[1], b"something")
@@ -43,7 +43,7 @@ def test_what_can_be_read_is_told_until_it_is_read(pipe: Pipe) -> None:
 
 
 def test_all_that_is_ready_comes_at_once() -> None:
-    watch = Watch()
+    watch = DescriptorWatch()
     pipes = [os.pipe() for _ in range(40)]
     actions = [action() for _ in pipes]
     for (reader, writer), act in zip(pipes, actions, strict=True):
@@ -58,7 +58,7 @@ def test_all_that_is_ready_comes_at_once() -> None:
 
 
 def test_a_closed_end_can_be_read(pipe: Pipe) -> None:
-    watch, act = Watch(), action()
+    watch, act = DescriptorWatch(), action()
     watch.add(pipe[0], act)
     os.close(pipe[1])
     assert watch.wait(None) == [act]
@@ -70,7 +70,7 @@ def test_a_full_pipe_is_waited_for_and_one_without_a_reader_too(pipe: Pipe) -> N
     with suppress(BlockingIOError):
         while True:
             os.write(writer, bytes(4096))
-    watch, act = Watch(), action()
+    watch, act = DescriptorWatch(), action()
     watch.add(writer, act, write=True)
     assert watch.wait(0) == []
     os.read(reader, 1 << 16)
@@ -83,7 +83,7 @@ def test_writing_is_watched_besides_reading() -> None:
 
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        watch, act = Watch(), action()
+        watch, act = DescriptorWatch(), action()
         watch.add(ours.fileno(), act)
         watch.watch_writing(ours.fileno(), wanted=True)
         assert watch.wait(0) == [act]
@@ -94,7 +94,7 @@ def test_writing_is_watched_besides_reading() -> None:
 
 
 def test_what_is_removed_is_not_told(pipe: Pipe) -> None:
-    watch = Watch()
+    watch = DescriptorWatch()
     watch.add(pipe[0], action())
     assert pipe[0] in watch
     os.write(pipe[1], b"1")

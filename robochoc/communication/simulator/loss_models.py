@@ -1,6 +1,6 @@
-"""Losses of messages by link: by the distance of two robots, in bursts, and on links that are named.
+"""Loss models of links: by the distance of two robots, in bursts, and on named links.
 
-All of it is what a channel model's file says (docs/guides/channels.md); `link_losses.py` draws by it.
+They are the fields of a channel model's file (docs/guides/channels.md); `channel_losses.py` draws losses by them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Point = tuple[float, ...]
 SPEED_OF_LIGHT = 299_792_458.0
 """Metres a second."""
 FARTHEST = 10**9
-"""Coordinates and distances are not larger: others are certainly mistakes."""
+"""The largest accepted coordinate or distance: larger ones are certainly mistakes."""
 
 _PATH_LOSS = {
     "power_dbm": (-100, 100),
@@ -35,11 +35,11 @@ _MOST_PAIRS = 1000
 class PathLoss(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Log-distance path loss with log-normal shadowing, and a receiver with a threshold (Rappaport 2002, section 4.9).
 
-    The sender radiates `power_dbm` towards the receiver, the gains of both antennas included. On the way as much is
-    lost as in free space up to `reference_m` at `frequency_hz` (Friis), and beyond it 10 `exponent` dB for each factor
-    of 10; an `exponent` of 2 is free space. Obstacles add a normally distributed number of dB with the standard
-    deviation `shadowing_db`, drawn for each message. What arrives with less than `sensitivity_dbm` is lost. Raises
-    `ValueError` for what cannot be.
+    The sender radiates `power_dbm` towards the receiver, the gains of both antennas included. The loss is that of free
+    space up to `reference_m` at `frequency_hz` (Friis), and beyond it 10 `exponent` dB for each factor of 10; an
+    `exponent` of 2 is free space. Obstacles add a normally distributed number of dB with the standard deviation
+    `shadowing_db`, drawn for each message. A message that arrives with less than `sensitivity_dbm` is lost. Raises
+    `ValueError` for invalid values.
     """
 
     power_dbm: float
@@ -55,7 +55,7 @@ class PathLoss(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             refuse_beyond(field, getattr(self, field), least, most)
 
     def margin_db(self, distance_m: float) -> float:
-        """Return how far above the receiver's threshold a signal arrives at this distance, in the mean."""
+        """Return the mean margin of a signal above the receiver's threshold at this distance."""
         near = 20 * math.log10(4 * math.pi * self.reference_m * self.frequency_hz / SPEED_OF_LIGHT)
         beyond = 10 * self.exponent * math.log10(max(distance_m / self.reference_m, 1))
         return self.power_dbm - near - beyond - self.sensitivity_dbm
@@ -72,8 +72,8 @@ class Bursts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Losses in bursts: a channel with two states (Gilbert 1960; Elliott 1963), of which each link has its own.
 
     Before each message of a link a burst begins with the probability `begin`, or ends with the probability `end`. In a
-    burst a message is lost with the probability `loss`, on top of what is lost anyway. All begin without a burst.
-    Raises `ValueError` for what cannot be.
+    burst a message is lost with the probability `loss`, in addition to other losses. All links begin without a burst.
+    Raises `ValueError` for invalid values.
     """
 
     begin: float
@@ -81,21 +81,21 @@ class Bursts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     loss: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range; a burst ends at some time."""
+        """Refuse values out of range; every burst must end at some time."""
         refuse_beyond("begin", self.begin, 0, 1)
         refuse_beyond("end", self.end, 0.001, 1)
         refuse_beyond("loss", self.loss, 0, 1)
 
     @property
     def mean(self) -> float:
-        """Return which part of all messages bursts lose in the long run."""
+        """The long-run share of messages that are lost in bursts."""
         return self.loss * self.begin / (self.begin + self.end)
 
 
 class NamedLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A link with a loss of its own, whatever else the model says: `between` two robots, in both directions.
+    """A link with its own loss, which replaces all others: `between` two robots, in both directions.
 
-    `one_way`: from the first to the second only. Raises `ValueError` for what cannot be.
+    `one_way`: only from the first to the second. Raises `ValueError` for invalid values.
     """
 
     between: tuple[str, str]
@@ -103,14 +103,14 @@ class NamedLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     one_way: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse a link of a robot with itself, and what is no probability."""
+        """Refuse a link of a robot with itself, and an invalid probability."""
         if self.between[0] == self.between[1]:
             raise ValueError(f"between: expected two robots, got {shortened(self.between[0])} twice")
         refuse_beyond("loss", self.loss, 0, 1)
 
     @property
     def directions(self) -> tuple[tuple[str, str], ...]:
-        """Return sender and receiver, for each direction."""
+        """The pairs of sender and receiver."""
         return (self.between,) if self.one_way else (self.between, self.between[::-1])
 
 
@@ -126,7 +126,7 @@ def refuse_beyond(field: str, value: float, least: float, most: float) -> None:
 
 
 def refuse_table(pairs: Sequence[tuple[float, float]]) -> None:
-    """Raise `ValueError` for a table of distances and losses that is none."""
+    """Raise `ValueError` for an invalid table of distances and losses."""
     if len(pairs) > _MOST_PAIRS:
         raise ValueError(f"distance_loss: expected up to {_MOST_PAIRS:,} pairs, got {len(pairs):,}")
     for distance, loss in pairs:
@@ -138,14 +138,14 @@ def refuse_table(pairs: Sequence[tuple[float, float]]) -> None:
 
 
 def refuse_positions(positions: Mapping[str, Point]) -> None:
-    """Raise `ValueError` for positions that are none."""
+    """Raise `ValueError` for invalid positions."""
     for robot, point in positions.items():
         if len(point) not in {2, 3} or not all(abs(one) <= FARTHEST for one in point):
             raise ValueError(f"positions: {shortened(robot)}: expected [x, y] or [x, y, z], up to {FARTHEST:,} each")
 
 
 def loss_by_table(pairs: Sequence[tuple[float, float]], distance: float) -> float:
-    """Return the loss at a distance, on straight lines between the `pairs` and constant before and after them."""
+    """Return the loss at a distance: linear between the `pairs`, constant before and after them."""
     before, loss_before = pairs[0]
     for after, loss in pairs[1:]:
         if distance <= after:
@@ -156,9 +156,9 @@ def loss_by_table(pairs: Sequence[tuple[float, float]], distance: float) -> floa
 
 
 def place_of(robot: Robot, values: Mapping[str, int]) -> Point | None:
-    """Return where the first topic of `robot` that has x and y puts it with these `values`; None: nowhere.
+    """Return the position of `robot` under `values`, from its first topic with x and y; None if it has no position.
 
-    A variable without a value counts as if it had the first one of its domain.
+    A variable without a value counts as having the first value of its domain.
     """
     first = {variable.name: next(iter(variable.domain), 0) for variable in robot.variables}
     values = {**first, **values}
@@ -170,7 +170,7 @@ def place_of(robot: Robot, values: Mapping[str, int]) -> Point | None:
 
 
 def has_place(robot: Robot) -> bool:
-    """Return whether a topic of `robot` says where it is."""
+    """Return whether a topic of `robot` has x and y."""
     return any(topic.x is not None and topic.y is not None for topic in robot.topics)
 
 
@@ -182,5 +182,5 @@ def _evaluated(axes: Sequence[Expression], values: Mapping[str, int]) -> Point |
 
 
 def distance(one: Point, other: Point) -> float:
-    """Return the distance of two points; where one has no third coordinate, it is 0."""
+    """Return the distance of two points; a missing third coordinate is 0."""
     return math.dist((*one, 0.0)[:3], (*other, 0.0)[:3])

@@ -1,4 +1,4 @@
-"""Messages that a channel model loses for good by link: by distance, in bursts, and on named links."""
+"""Draws which messages are lost for good under a channel model: by distance, in bursts, and on named links."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import random
 from collections.abc import Callable, Mapping
 
 from robochoc.communication.simulator.channel import ChannelModel
-from robochoc.communication.simulator.link_loss import Point, distance, either, place_of
+from robochoc.communication.simulator.loss_models import Point, distance, either, place_of
 from robochoc.communication.simulator.losses import Link, Losses
 from robochoc.model.problem import Team
 
 
-class LinkLosses(Losses):
-    """Draws which messages are lost by what `channel` says of each link."""
+class ChannelLosses(Losses):
+    """Draws which messages are lost by the loss models of `channel`."""
 
     def __init__(self, channel: ChannelModel, seed: int) -> None:
         super().__init__(channel.message_loss, seed)
@@ -23,7 +23,7 @@ class LinkLosses(Losses):
         self._team: Team | None = None
         self._values_of: Callable[[str], Mapping[str, int]] = lambda _: {}
         self._places: dict[str, tuple[Mapping[str, int], Point | None]] = {}
-        """By robot the values that it had when it was last asked where it is, and the place to which they lead."""
+        """The latest known values of each robot, and the resulting position."""
 
     def follow(self, team: Team, values_of: Callable[[str], Mapping[str, int]]) -> None:
         """See `Losses.follow`."""
@@ -31,21 +31,21 @@ class LinkLosses(Losses):
         self._places.clear()
 
     def _loss_of(self, link: Link) -> float:
-        """Return what `Losses._loss_of` returns: all causes of a loss are independent of each other."""
+        """See `Losses._loss_of`: all causes of a loss are independent of each other."""
         if link in self._named:
             return self._named[link]
         usual = either(self._probability, self._loss_by_distance(link))
         return usual if self._channel.bursts is None else either(usual, self._burst_of(link).next())
 
     def _loss_by_distance(self, link: Link) -> float:
-        """Return what is lost by distance. If a robot is nowhere, as its values lead to no place, that is nothing."""
+        """Return the loss by distance; 0 if a robot has no position."""
         if not self._channel.by_distance:
             return 0.0
         sender, receiver = map(self._place_of, link)
         return 0.0 if sender is None or receiver is None else self._channel.loss_at(distance(sender, receiver))
 
     def _place_of(self, name: str) -> Point | None:
-        """Return where a robot is: where it stands, or where the values that it has now lead to."""
+        """Return the position of a robot: the channel's, or the one that follows from its present values."""
         place = self._channel.positions.get(name)
         if place is not None or self._team is None or name not in self._team:
             return place
@@ -70,7 +70,7 @@ class _Burst:
         self._is_on = False
 
     def next(self) -> float:
-        """Go on to the next message; return with which probability a burst takes it."""
+        """Advance to the next message; return the probability that a burst loses it."""
         if self._bursts is None:
             return 0.0
         drawn = self._chance.random()

@@ -12,9 +12,8 @@ from threading import Thread
 
 import pytest
 
-from robochoc.communication.processes.process_status import ProcessStatus
+from robochoc.communication.processes.process_status import REPORT_AFTER_S, ProcessStatus, StoppedRobots
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.processes.stopped import REPORT_AFTER_S, StoppedRobots
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
@@ -53,7 +52,7 @@ def test_it_is_told_once_and_again_when_it_goes_on(caplog: pytest.LogCaptureFixt
     assert caplog.messages[0].startswith("R1 has been stopped (SIGSTOP) for 5 s; the others wait for it")
     assert caplog.records[0].levelno == logging.WARNING
     assert looks(stopped, start=200, seconds=1) == {}
-    assert caplog.messages[1:] == ["R1 goes on"]
+    assert caplog.messages[1:] == ["R1 continues"]
 
 
 def test_patience_is_for_each_and_begins_anew_when_it_goes_on(caplog: pytest.LogCaptureFixture) -> None:
@@ -151,7 +150,7 @@ def test_one_that_goes_on_in_time_is_told_of_and_not_lost(team: Path, tmp_path: 
         run.strike(signal.SIGCONT, robot)
         run.end()
         assert run.status() in {0, 3}
-        assert run.errors().splitlines()[1:2] in (["Robot3.7 goes on"], [])
+        assert run.errors().splitlines()[1:2] in (["Robot3.7 continues"], [])
         assert "lost" not in run.output()
 
 
