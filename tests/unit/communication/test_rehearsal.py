@@ -61,6 +61,6 @@ def test_what_a_robot_cannot_take_is_left_to_it_to_say(monkeypatch: pytest.Monke
         asked.append(part)
         raise UnsupportedError(part.robot.name)
 
-    monkeypatch.setattr(Host, "of", refuses)
+    monkeypatch.setattr(Host, "create", refuses)
     rehearse(ABT, agent_problems(queens3d(4, "planar")).values())
     assert len(asked) == 1
