@@ -18,7 +18,7 @@ import time
 
 import numpy as np
 
-from robochoc.communication.arrays.cycle_run import walk
+from robochoc.communication.arrays.cycle_run import cycles_of
 from robochoc.modelling.array_problem import ArrayProblem
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
@@ -47,7 +47,7 @@ def measured(robots: int, way: str, cycles: int, *, own_tables: bool) -> dict[st
     times = []
     before = time.process_time()
     setup_s = before - began
-    for _ in walk(run):
+    for _ in cycles_of(run):
         now = time.process_time()
         times.append(now - before)
         before = now

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, walk
-from robochoc.communication.arrays.description import Description, Held
-from robochoc.communication.arrays.forms import form_of
-from robochoc.communication.arrays.kinds import Floats, Integers
+from robochoc.communication.arrays.array_runs import array_run_for
+from robochoc.communication.arrays.array_types import Floats, Integers
+from robochoc.communication.arrays.cycle_run import CycleRun, cycles_of, exact_sum
+from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import Layout
 from robochoc.model.message import encode
 from robochoc.model.outcome import Metrics, Verdict
@@ -146,18 +146,18 @@ class ArrayProblem:
         limit_s = Options(timeout=timeout).timeout
         began = time.monotonic()
         run = self.run(protocol, seed=seed, ncccs=ncccs, **settings)
-        for _ in walk(run):
-            if limit_s is not None and time.monotonic() - began > limit_s and not run.over:
+        for _ in cycles_of(run):
+            if limit_s is not None and time.monotonic() - began > limit_s and not run.is_over:
                 run.end()
                 break
         return self._solution(run, time.monotonic() - began)
 
     def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
-        """Return a run that has not started, for callers that need each cycle (`walk`). Arguments as in `solve`."""
+        """Return an unstarted run, for callers that need each cycle (`cycles_of`). Arguments as in `solve`."""
         options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
         kind = protocol_named(options.protocol)
         refuse_settings(options.protocol, kind, options.settings)
-        form = form_of(kind)
+        form = array_run_for(kind)
         if not issubclass(kind, CycleProtocol):
             raise UnsupportedError(f"{options.protocol} does not work in cycles")
         known = settings_of(kind, options.settings)
@@ -200,7 +200,7 @@ class ArrayProblem:
             domain_bytes=len(encode(Domain([(value,) for value in range(self.values)]))),
         )
 
-    def _held(self) -> Held:
+    def _held(self) -> KnownConstraints:
         """Return the constraints of both robots of each edge."""
         first, second = self.edges.T
         turned = self.tables.swapaxes(1, 2)
@@ -210,7 +210,7 @@ class ArrayProblem:
         owners, others = np.divmod(keys[order], self.robots)
         which = np.concatenate([self.which, self.which if alike else self.which + len(self.tables)])[order]
         tables: Floats = self.tables if alike else np.concatenate([self.tables, turned])
-        return Held(owners, others[:, None], tables, which, np.arange(len(owners)))
+        return KnownConstraints(owners, others[:, None], tables, which, np.arange(len(owners)))
 
     def _solution(self, run: CycleRun, wall_s: float) -> ArraySolution:
         last = not run.costs or run.costs[-1] <= min(run.costs)

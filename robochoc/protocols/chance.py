@@ -4,7 +4,7 @@ Draw n (1, 2, ...) is a hash of key + n * step, modulo 2**64: SplitMix64 (Steele
 pseudorandom number generators", OOPSLA 2014), with Stafford's 13th variant of its mixing function. Key and step are two
 halves of a BLAKE2b digest of seed and name, so similar names have independent streams. A robot's n-th number depends on
 nothing else: not on the runtime, nor on what others draw. Plain Python computes a number in a third of a microsecond,
-from two words of state; numpy computes the same ones for all robots at once (`communication/arrays/chance.py`).
+from two words of state; numpy computes the same ones for all robots at once (`communication/arrays/cycle_run.py`).
 
 No secret may depend on it.
 """

@@ -36,6 +36,7 @@ from robochoc.authority.frames import (
 from robochoc.authority.keyring import KeyCard, KeyCardError
 from robochoc.communication.control import Conclusion, Counters, Events, Failed, Pause, Ready, Wave
 from robochoc.communication.network import control_messages as words
+from robochoc.communication.network.constraint_records import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.profile import (
     Profile,
@@ -48,7 +49,6 @@ from robochoc.communication.network.profile import (
     profile_of,
     visible_robot,
 )
-from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.formats import on_one_line
 from robochoc.journal.events import AnyEvent, Decided, Sent
 from robochoc.model.communicative_acts import Performative
@@ -157,7 +157,7 @@ def check_frame(receiver: str, content: bytes) -> bool:
             try:
                 number = msgspec.msgpack.decode(content)[1]
                 if isinstance(number, int) and 1 < number < 1 << 62:
-                    reader.take(sender, number - 1)
+                    reader.accept(sender, number - 1)
             except Exception:  # noqa: BLE001, S110 - then it expects the first one
                 pass
             try:

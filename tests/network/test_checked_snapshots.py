@@ -10,7 +10,7 @@ from robochoc.communication.network.checked_snapshots import CheckedSnapshots
 from robochoc.communication.network.control_messages import CheckRequest, CheckResult, Recall, ToRobot
 from robochoc.communication.network.framing import FrameRefusedError
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.recalled import Recalled, values_asked_for
+from robochoc.communication.network.searcher import SnapshotValues, values_for_recall
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
@@ -132,7 +132,7 @@ def test_nobody_checks_what_it_was_not_asked_to() -> None:
 
 
 def test_a_robot_keeps_the_last_snapshot_and_the_one_that_counts() -> None:
-    kept = Recalled()
+    kept = SnapshotValues()
     kept.note(1, {"A": 1})
     kept.adopt(1, published=False)
     kept.note(2, {"A": 2})
@@ -153,7 +153,7 @@ def test_what_a_robot_had_in_a_cycle() -> None:
     agent._trail, agent.cycle = [(0, 1), (4, 0)], 6  # noqa: SLF001 - as if it had come so far
 
     def asked(cycle: int | None = None, value: tuple[int | None, ...] | None = None) -> dict[str, int]:
-        return values_asked_for(Recall(1, 1, cycle, value), agent, compiled["RB"])
+        return values_for_recall(Recall(1, 1, cycle, value), agent, compiled["RB"])
 
     assert [asked(cycle) for cycle in (-1, 0, 3, 4, 6)] == [{}, {"B": 2}, {"B": 2}, {"B": 1}, {"B": 1}]
     assert (asked(), asked(value=(2,)), asked(value=(None,))) == ({"B": 1}, {"B": 2}, {})

@@ -154,7 +154,7 @@ def test_frames_are_numbered_by_pair_and_come_once() -> None:
     for number, content in enumerate(contents, 1):
         opened = reader.read("R1", content)
         assert opened == Opened(number, said(number))
-        reader.take("R1", opened.number)
+        reader.accept("R1", opened.number)
         with pytest.raises(FrameRefusedError, match=f"replay: frame {number} has come before"):
             reader.read("R1", content)
 
@@ -163,7 +163,7 @@ def test_what_was_not_taken_may_come_again() -> None:
     writer, reader = pair()
     content = writer.write("R2", said(1))
     assert [reader.read("R1", content) for _ in range(2)] == [(1, said(1))] * 2
-    reader.take("R1", 1)
+    reader.accept("R1", 1)
     with pytest.raises(FrameRefusedError, match="replay"):
         reader.read("R1", content)
 
@@ -173,7 +173,7 @@ def test_a_missing_frame_is_missed() -> None:
     first, second = (writer.write("R2", said(n)) for n in (1, 2))
     with pytest.raises(FrameRefusedError, match="frame 1 is missing before frame 2"):
         reader.read("R1", second)
-    reader.take("R1", reader.read("R1", first).number)
+    reader.accept("R1", reader.read("R1", first).number)
     assert reader.read("R1", second).message == said(2)
 
 
@@ -181,7 +181,7 @@ def test_senders_do_not_use_up_each_others_numbers() -> None:
     reader = Framing("R9", "run")
     for sender in ("R1", "R2"):
         opened = reader.read(sender, Framing(sender, "run").write("R9", said(1)))
-        reader.take(sender, opened.number)
+        reader.accept(sender, opened.number)
     with pytest.raises(FrameRefusedError, match="frame 2 is missing before frame 3"):
         reader.read("R2", msgspec.msgpack.encode(Frame("run", 3, said(3))))
 
@@ -205,16 +205,16 @@ def test_frames_of_another_run_are_replays() -> None:
 
 def test_a_new_run_begins_at_1() -> None:
     writer, reader = pair()
-    reader.take("R1", reader.read("R1", writer.write("R2", said(1))).number)
+    reader.accept("R1", reader.read("R1", writer.write("R2", said(1))).number)
     for one in (writer, reader):
-        one.begin("next")
+        one.start_run("next")
     assert reader.read("R1", writer.write("R2", said(2))) == (1, said(2))
 
 
 def test_another_life_begins_at_1_for_that_robot_only() -> None:
     master = Framing(MASTER, "run")
     for name in ("R1", "R2"):
-        master.take(name, master.read(name, Framing(name, "run").write(MASTER, Ready(1))).number)
+        master.accept(name, master.read(name, Framing(name, "run").write(MASTER, Ready(1))).number)
         master.write(name, Wave(1))
     master.forget("R1")
     master.forget("R7")
@@ -230,7 +230,7 @@ def test_words_before_a_run_have_no_number() -> None:
     for _ in range(2):
         opened = master.read("R1", content)
         assert opened == Opened(0, Register(PROFILE, "incarnation"))
-        master.take("R1", opened.number)
+        master.accept("R1", opened.number)
     assert robot.next_number(MASTER) == 1
     answer = master.write("R1", Welcome("incarnation", "run", (), observed=False, private=False))
     assert robot.read(MASTER, answer).number == 0

@@ -7,7 +7,7 @@ from queue import Empty
 import pytest
 
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Inbox, Item, WakeUp
-from robochoc.communication.network.quotas import BURST_S, OF_A_ROBOT, OF_AN_OBSERVER, Allowance, Share
+from robochoc.communication.network.quotas import BURST_S, OBSERVER_SHARE, ROBOT_SHARE, Allowance, Share
 
 
 def all_in(inbox: Inbox) -> list[Item]:
@@ -55,7 +55,7 @@ def test_bytes_that_wait_are_bounded() -> None:
 
 def test_so_many_a_second_in_the_long_run() -> None:
     now = 0.0
-    inbox = Inbox(lambda _sender: OF_AN_OBSERVER, clock=lambda: now)
+    inbox = Inbox(lambda _sender: OBSERVER_SHARE, clock=lambda: now)
 
     def taken(frames: int) -> int:
         count = 0
@@ -64,10 +64,10 @@ def test_so_many_a_second_in_the_long_run() -> None:
             count += isinstance(inbox.get_nowait(), FrameArrived)
         return count
 
-    burst = BURST_S * OF_AN_OBSERVER.frames_a_second
+    burst = BURST_S * OBSERVER_SHARE.frames_a_second
     assert taken(10_000) == burst
     now += 2
-    assert taken(10_000) == 2 * OF_AN_OBSERVER.frames_a_second
+    assert taken(10_000) == 2 * OBSERVER_SHARE.frames_a_second
     now += 10_000
     assert taken(10_000) == burst
 
@@ -77,7 +77,7 @@ def test_what_a_sender_may_have_is_asked_once() -> None:
 
     def share_of(sender: str) -> Share:
         asked.append(sender)
-        return OF_A_ROBOT
+        return ROBOT_SHARE
 
     inbox = Inbox(share_of)
     for sender in ("A", "B", "A", "B"):

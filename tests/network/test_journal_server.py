@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from robochoc.communication.network import journal_server as module
 from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.journal_server import (
-    ANSWERED_AT_MOST,
+    MAX_ANSWERS_PER_S,
     PIECE_BYTES,
     SNIFF,
     JournalServer,
@@ -101,7 +101,7 @@ def test_one_who_asks_without_end_is_not_answered_and_others_are(
 ) -> None:
     now = 100.0
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now))
-    for _ in range(ANSWERED_AT_MOST):
+    for _ in range(MAX_ANSWERS_PER_S):
         piece(publication, 0)
     with pytest.raises(NotAnsweredError, match="questions a second"):
         piece(publication, 0)

@@ -28,7 +28,7 @@ def test_times_are_since_the_search_began(monkeypatch: pytest.MonkeyPatch) -> No
     told: list[AnyEvent] = []
     chronicle = MasterEvents(told.append)
     chronicle.registered("A")
-    chronicle.begin()
+    chronicle.start_search()
     chronicle.lost("A", "gone")
     chronicle.granted("Eye", "sniff")
     chronicle.relay(Granted(t=1e9, who="B", what="renew a certificate", origin="here:1"))

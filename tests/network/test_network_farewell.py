@@ -40,7 +40,7 @@ def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> No
         run.give_up()
         welcomes = [heard(transport, framing) for _ in range(2)]  # until it answers
         assert {type(opened.message) for opened in welcomes} == {Welcome}
-        framing.begin(run.master.run)
+        framing.start_run(run.master.run)
         transport.send(MASTER, framing.write(MASTER, Joined("a life", b"")))
         while isinstance((opened := heard(transport, framing)).message, Welcome):
             pass

@@ -115,7 +115,7 @@ def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
             join(household.identity("A")) as a,
             join(household.identity("B")) as b,
             join(household.identity("C")) as c,
-            join(household.identity("C"), heard=("A", "B")) as careful,
+            join(household.identity("C"), senders=("A", "B")) as careful,
         ):
             a.send("C", b"1")
             b.send("C", b"1")  # until it has come, the router may not know who hears B, and nobody asks for puts again

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from robochoc.communication.control import Failed, Pause, Ready
+from robochoc.communication.network.constraint_records import PredicateRecord, SharedRecord
 from robochoc.communication.network.control_messages import (
     Bye,
     CheckRequest,
@@ -30,7 +31,6 @@ from robochoc.communication.network.framing import MASTER, Frame, Framing
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item
 from robochoc.communication.network.quotas import Backlog, Share
 from robochoc.communication.network.robot import Ending, NetworkRobot
-from robochoc.communication.network.shared import PredicateRecord, SharedRecord
 from robochoc.communication.network.transport import Transport
 from robochoc.model.problem import INFINITE, ConstraintModel
 from robochoc.protocols.protocol import Protocol

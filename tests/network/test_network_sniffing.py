@@ -22,7 +22,7 @@ from robochoc.communication.network.access import ALL, journal_key
 from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import FrameArrived
-from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
+from robochoc.communication.network.journal_server import MAX_ANSWERS_PER_S, Publication, piece_in, question
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import CannotConnectError
@@ -37,7 +37,7 @@ from tests.support.network_runs import NetworkRun
 pytestmark = pytest.mark.more
 
 BLOCK = 1000
-FLOOD = 10 * ANSWERED_AT_MOST
+FLOOD = 10 * MAX_ANSWERS_PER_S
 HUGE = 200 * 60_000
 WATCHED = 20
 LEASE_MS = 3_600_000
@@ -251,7 +251,7 @@ def test_revoked_in_mid_run(
 def test_who_asks_without_end_and_reads_nothing(
     run: NetworkRun, publication: Publication, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(journal_server, "ANSWERED_AT_MOST", ANSWERED_AT_MOST // 10)  # a busy master answers slowly
+    monkeypatch.setattr(journal_server, "MAX_ANSWERS_PER_S", MAX_ANSWERS_PER_S // 10)  # a busy master answers slowly
     for each in BLOCKS:
         publication.write(each)
     run.household.enrol("Eye", sniffs=True)

@@ -10,6 +10,7 @@ import pytest
 from robochoc.communication.control import Conclusion, Counters, Events, Ready, Snapshot
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.audited_state import AuditedSearchState
+from robochoc.communication.network.constraint_records import SharedRecord, record_of
 from robochoc.communication.network.control_messages import (
     LATEST,
     Charge,
@@ -24,7 +25,6 @@ from robochoc.communication.network.control_messages import (
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.quotas import MIB
 from robochoc.communication.network.searcher import RobotContext, Searcher
-from robochoc.communication.network.shared import SharedRecord, record_of
 from robochoc.communication.robot_loop import EVENTS_AT_ONCE
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Received

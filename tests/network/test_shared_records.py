@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.network.shared import (
+from robochoc.communication.network.constraint_records import (
     MOST_TERMS,
     PredicateRecord,
     RelationRecord,

@@ -266,7 +266,7 @@ def test_who_cannot_refuses_the_setting(protocol: str, value: str, why: str) -> 
 
 
 def test_arrays_refuse_it() -> None:
-    with pytest.raises(UnsupportedError, match="anytime=yes is for robots that send messages"):
+    with pytest.raises(UnsupportedError, match="anytime=yes cannot be used with --runtime arrays"):
         ArraysRun(path(3), DSA, parameters=RunParameters(0, {"anytime": "yes"}))
 
 

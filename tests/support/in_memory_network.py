@@ -59,7 +59,7 @@ class ScriptedTransport:
             return
         framing = self._framing[MASTER]
         opened = framing.read(self._name, content)
-        framing.take(self._name, opened.number)
+        framing.accept(self._name, opened.number)
         self.heard.append(opened.message)
         for item in self._script(opened.message):
             self.inbox.put(item)
@@ -176,7 +176,7 @@ class InMemoryNetwork:
 
     def _hear(self, name: str, content: bytes) -> None:
         opened = self._framing.read(name, content)
-        self._framing.take(name, opened.number)
+        self._framing.accept(name, opened.number)
         match opened.message:
             case Register(profile, incarnation):
                 self.members.register(name, profile, incarnation)

@@ -1,28 +1,31 @@
-"""The common base of synchronous protocols as arrays: what `protocols/shared/cycles.py` is for robots that are objects.
+"""The common base of synchronous protocols as arrays, like `protocols/shared/cycles.py` for robots as objects.
 
-One `step` is a cycle of all robots. Each method has the name of what it does for all of them in `protocols`.
+One `step` is a cycle of all robots. Comments name the corresponding methods in `protocols`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
-from robochoc.communication.arrays.chance import Draws
-from robochoc.communication.arrays.kinds import FEW, Flags, Floats, Integers
+from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
 from robochoc.communication.arrays.layout import Group, Layout
-from robochoc.communication.arrays.tally import Tally
+from robochoc.communication.arrays.tally import MessageTally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.chance import FIRST_FACTOR, SECOND_FACTOR, UNIT, key_and_step
 from robochoc.protocols.shared.cycles import CycleCount, CycleSettings, Value
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 
-WITHOUT_ANYTIME = "as arrays, the best cycle is the answer without it"
+WITHOUT_ANYTIME = "remove it, as arrays always return the best cycle"
+_FIRST, _SECOND = np.uint64(FIRST_FACTOR), np.uint64(SECOND_FACTOR)
+_FLOAT_BITS = np.uint64(11)
 Costs = TypeVar("Costs", Integers, Floats)
 
 
@@ -33,19 +36,44 @@ class Change(NamedTuple):
     values: Integers
 
 
+class Draws:
+    """The random numbers of all robots, equal to those of `protocols/chance.py`: two words for each robot."""
+
+    def __init__(self, seed: int, names: Iterable[str], many: int) -> None:
+        words = (word for name in names for word in key_and_step(seed, name))
+        pairs = np.fromiter(words, np.uint64, 2 * many).reshape(many, 2)
+        self._states, self._steps = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+
+    def draw(self, robots: Index) -> NDArray[np.float64]:
+        """Return the next number of each of `robots`, which contain no duplicates."""
+        bits = self._states[robots] + self._steps[robots]
+        self._states[robots] = bits
+        mixed = (bits ^ bits >> np.uint64(30)) * _FIRST
+        mixed = (mixed ^ mixed >> np.uint64(27)) * _SECOND
+        mixed ^= mixed >> np.uint64(31)
+        return (mixed >> _FLOAT_BITS).astype(np.float64) * UNIT
+
+    def choose(self, robots: Places, many: Integers) -> Integers:
+        """Return, for each of `robots`, a random number below `many`; nothing is drawn for a single choice."""
+        chosen = np.zeros(len(robots), np.int64)
+        several = np.flatnonzero(many > 1)
+        chosen[several] = (self.draw(robots[several]) * many[several]).astype(np.int64)
+        return chosen
+
+
 class CycleRun(ABC):
     """A run of one protocol on one team.
 
     Attributes:
         values: The place of each row's value in its domain.
-        cycle: The cycle of these values; -1 before the first.
-        costs: The cost of the values of each cycle; `inf` where a hard constraint is broken.
-        changes: Of each cycle, where they are kept.
-        best: The values of the cheapest cycle, the first of several; the last one if all cost `inf`.
-        verdict: Set when one robot has proven that there is no solution: `witness`.
-        tally: What was sent.
+        cycle: The cycle of these values; -1 before the start.
+        costs: The cost of the values of each cycle; `inf` if a hard constraint is broken.
+        changes: The changes of each cycle; None if they are not recorded.
+        best: The values of the first cheapest cycle; of the last cycle if all cost `inf`.
+        verdict: Set when the robot `witness` has proven that there is no solution.
+        tally: The counts of sent messages.
         checks: Constraint checks of all robots.
-        clocks: The NCCC clock of each row. None: they are not kept.
+        clocks: The NCCC clock of each row; None if clocks are not computed.
     """
 
     settings: CycleCount
@@ -54,7 +82,7 @@ class CycleRun(ABC):
         self, layout: Layout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         if isinstance(settings, CycleSettings) and settings.anytime == "yes":
-            raise UnsupportedError(f"anytime=yes is for robots that send messages; {WITHOUT_ANYTIME}")
+            raise UnsupportedError(f"anytime=yes cannot be used with --runtime arrays: {WITHOUT_ANYTIME}")
         self.layout = layout
         self.settings = settings
         self.values: Integers = np.zeros(layout.many, layout.kind)
@@ -64,7 +92,7 @@ class CycleRun(ABC):
         self.best: Integers = self.values
         self.verdict: Verdict | None = None
         self.witness: int | None = None
-        self.tally = Tally()
+        self.tally = MessageTally()
         self.checks = 0
         self.clocks: Integers | None = np.zeros(layout.many, np.int64) if clocks else None
         names = layout.description.names
@@ -72,21 +100,21 @@ class CycleRun(ABC):
         self._firsts = [np.arange(group.active) * group.size for group in layout.groups]
         self._active = sum(group.active for group in layout.groups)
         self.all_checks = np.zeros(layout.many, np.int64)
-        """What it takes each row with neighbours to evaluate its values; 0 for the others."""
+        """The constraint checks with which each row evaluates its values; 0 for rows without neighbours."""
         for group in layout.groups:
             self.all_checks[group.first : group.first + group.active] = group.checks[: group.active]
 
     @property
-    def over(self) -> bool:
-        """Whether no cycle is left."""
+    def is_over(self) -> bool:
+        """Whether the run has ended."""
         return self.verdict is not None or self.cycle >= self.settings.cycles or not self._active
 
-    def begin(self) -> None:
-        """Let all robots start: cycle 0."""
+    def start(self) -> None:
+        """Start all robots: cycle 0."""
         for group in self.layout.groups:
             self._settle_alone(group)
         if self._active:
-            self._begin()
+            self._start_active()
         self.cycle = 0
         if self.layout.empty.size:
             self.verdict, self.witness = Verdict.NO_SOLUTION, int(self.layout.empty[-1])
@@ -94,7 +122,7 @@ class CycleRun(ABC):
             self.changes.append(Change(np.arange(self.layout.many), self.values.copy()))
 
     def step(self) -> None:
-        """Go through one cycle."""
+        """Run one cycle."""
         before = self.values.copy()
         self._step()
         if self.verdict is not None:
@@ -105,13 +133,13 @@ class CycleRun(ABC):
             self.changes.append(Change(rows, self.values[rows]))
 
     def end(self) -> None:
-        """Weigh the values of the last cycle."""
+        """Compute the cost of the last cycle's values."""
         if self.layout.empty.size or len(self.costs) > self.cycle:
             return
         self._weigh()
 
     def metrics(self, wall_s: float) -> Metrics:
-        """Return what the run has taken so far, `wall_s` seconds."""
+        """Return the metrics of the run so far, which has taken `wall_s` seconds."""
         return Metrics(
             messages=dict(sorted(self.tally.messages.items())),
             bytes=self.tally.bytes,
@@ -122,28 +150,28 @@ class CycleRun(ABC):
         )
 
     @abstractmethod
-    def _begin(self) -> None:
-        """Give robots with neighbours their first values, and let them speak."""
+    def _start_active(self) -> None:
+        """Give robots with neighbours their first values, and send their first messages."""
 
     @abstractmethod
     def _step(self) -> None:
-        """Weigh the present values, and take those of the next cycle."""
+        """Compute the cost of the present values, and choose those of the next cycle."""
 
     @abstractmethod
     def _weigh(self) -> None:
-        """Weigh the present values."""
+        """Compute the cost of the present values."""
 
     # Values
 
-    def take_any(self) -> None:
-        """Take a random value of the whole domain."""
+    def choose_random_values(self) -> None:
+        """Choose a random value of the domain for each robot with neighbours."""
         for group in self.layout.groups:
             rows = np.arange(group.first, group.first + group.active)
-            chosen = self.draws.any_of(rows, np.full(group.active, group.size))
+            chosen = self.draws.choose(rows, np.full(group.active, group.size))
             self.values[rows] = chosen.astype(self.layout.kind)
 
-    def burdens(self) -> list[Integers]:
-        """Return the cost of each value of the robots with neighbours, by group, and weigh the present values."""
+    def value_costs(self) -> list[Integers]:
+        """Return the cost of each value of robots with neighbours, by group; note the cost of the present values."""
         found, sums = [], _Sums()
         for group, firsts in zip(self.layout.groups, self._firsts, strict=True):
             own = group.values(self.values)
@@ -169,34 +197,34 @@ class CycleRun(ABC):
             self.best = self.values.copy()
         self.costs.append(cost)
 
-    def present(self, number: int, burdens: Integers) -> Integers:
-        """Return what the present values of the group of this `number` cost, of the robots with neighbours."""
+    def present(self, number: int, value_costs: Integers) -> Integers:
+        """Return the costs of the present values of the robots with neighbours in the group `number`."""
         group = self.layout.groups[number]
-        chosen: Integers = burdens.ravel().take(self._firsts[number] + group.values(self.values)[: group.active])
+        chosen: Integers = value_costs.ravel().take(self._firsts[number] + group.values(self.values)[: group.active])
         return chosen
 
     # Messages, checks and clocks
 
-    def tell_values(self) -> None:
-        """Let robots tell all neighbours their values."""
+    def send_values(self) -> None:
+        """Send all robots' values to their neighbours."""
         lengths = self.layout.description.value_bytes
         if isinstance(lengths, np.ndarray):
             lengths = lengths[self._first_entries + self.values]
         self.tally.add(Value.__name__, lengths, self.layout.degrees)
 
     def count_checks(self, checks: Integers, times: int = 1) -> None:
-        """Count `checks` of each row, made by all of them at once."""
+        """Count `checks` constraint checks of each row, made at the same time."""
         self.checks += times * int(checks.sum())
         if self.clocks is not None:
             self.clocks += times * checks
 
-    def hear(self) -> None:
-        """Take in a message of each neighbour: clocks rise to theirs."""
+    def receive(self) -> None:
+        """Receive a message of each neighbour: raise clocks to theirs."""
         if self.clocks is not None:
             self.clocks = self.greatest(self.clocks, self.clocks.copy())
 
     def greatest(self, told: Integers, heard: Integers) -> Integers:
-        """Raise `heard` to the greatest that the neighbours of each row have `told`, and return it."""
+        """Raise `heard` to the largest `told` number of the neighbours of each row, and return it."""
         for group, lists, neighbours, _ in self.layout.links:
             part = heard[group.first : group.last]
             if isinstance(lists, slice):
@@ -206,7 +234,7 @@ class CycleRun(ABC):
         return heard
 
     def _settle_alone(self, group: Group) -> None:
-        """Let robots without neighbours take their cheapest values."""
+        """Give robots without neighbours their cheapest values."""
         alone = slice(group.first + group.active, group.last)
         if group.fixed is not None:
             self.values[alone] = group.fixed[group.active :].argmin(axis=1).astype(self.layout.kind)
@@ -222,14 +250,14 @@ class CycleRun(ABC):
 
 
 class _Sums:
-    """A sum of costs, each of which several robots have counted."""
+    """A sum of costs, each of which several robots count."""
 
     def __init__(self) -> None:
         self._broken: dict[int, int] = {}
         self._paid: dict[int, int] = {}
 
     def add(self, layout: Layout, costs: Integers, times: int) -> None:
-        """Add `costs`, which `times` robots count."""
+        """Add `costs`, each counted by `times` robots."""
         broken = int(layout.costs.broken(costs).sum())
         self._broken[times] = self._broken.get(times, 0) + broken
         self._paid[times] = self._paid.get(times, 0) + layout.costs.sum(costs) - (broken << layout.costs.bits)
@@ -243,7 +271,7 @@ class _Sums:
 
 
 def _fixed(group: Group) -> Integers:
-    """Return a copy of what values cost whatever others do, for the robots with neighbours."""
+    """Return a copy of the fixed costs of the values of robots with neighbours."""
     if group.fixed is not None:
         return group.fixed[: group.active].copy()
     kind = group.blocks[0].rows.dtype if group.blocks else np.dtype(np.int32)
@@ -251,13 +279,13 @@ def _fixed(group: Group) -> Integers:
 
 
 def exact_sum(costs: Floats) -> float:
-    """Return the sum of `costs`, whole numbers or `inf`: an integer where floats do not hold it exactly."""
+    """Return the sum of `costs`, whole numbers or `inf`: an integer if a float is not exact."""
     total = float(costs.sum())
     return total if total < EXACT or total == INFINITE else sum(map(int, costs.ravel().tolist()))
 
 
 def least(costs: Costs) -> Costs:
-    """Return the least of each row."""
+    """Return the minimum of each row."""
     if costs.shape[1] > FEW:
         return cast("Costs", costs.min(axis=1))
     found = costs[:, 0].copy()
@@ -267,7 +295,7 @@ def least(costs: Costs) -> Costs:
 
 
 def count(flags: Flags) -> Integers:
-    """Return how many flags of each row are set."""
+    """Return the number of set flags in each row."""
     if flags.shape[1] > FEW:
         many: Integers = flags.sum(axis=1)
         return many
@@ -278,16 +306,16 @@ def count(flags: Flags) -> Integers:
 
 
 def nth(flags: Flags, numbers: Integers) -> Integers:
-    """Return, for each row, the place of the flag of this number (from 0) among those that are set."""
+    """Return, for each row, the place of the set flag with this number (from 0)."""
     found: Integers = (flags.cumsum(axis=1) > numbers[:, None]).argmax(axis=1)
     return found
 
 
-def walk(run: CycleRun) -> Iterator[CycleRun]:
-    """Yield `run` before it begins its next cycle, and once more when it is over."""
-    run.begin()
+def cycles_of(run: CycleRun) -> Iterator[CycleRun]:
+    """Run all cycles; yield `run` before each next cycle, and once more at the end."""
+    run.start()
     yield run
-    while not run.over:
+    while not run.is_over:
         run.step()
         yield run
     run.end()

@@ -1,4 +1,4 @@
-"""A team as arrays describe it, before it is laid out for a run: robots are numbers, in priority order."""
+"""The description of a team by arrays, before its layout for a run: robots are numbers, in priority order."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robochoc.communication.arrays.kinds import Floats, Integers
+from robochoc.communication.arrays.array_types import Floats, Integers
 from robochoc.model.message import Value, encode
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
@@ -16,16 +16,16 @@ from robochoc.solver.compiled import LocalProblem
 
 
 @dataclass(frozen=True)
-class Held:
-    """Constraints of one shape, each as one of its robots knows it.
+class KnownConstraints:
+    """Constraints of one shape, each as known by one of its robots.
 
     Attributes:
-        owners: The robots that know them.
+        owners: The robot that knows each constraint.
         others: The other robots of each scope, a column for each, the highest first.
-        tables: Different tables of costs: an axis for each of the others, then one for the owner's values. `inf`
+        tables: Distinct tables of costs: an axis for each of the others, then one for the owner's values. `inf`
             forbids.
-        which: The table of each.
-        numbers: The place of each among all that its owner knows.
+        which: The number of each constraint's table.
+        numbers: The place of each constraint among all that its owner knows.
     """
 
     owners: Integers
@@ -40,15 +40,15 @@ class Description:
     """A team: robot 0 is the highest in the order.
 
     Attributes:
-        names: The robots' names: their random numbers follow from these.
-        sizes: How many values each robot has.
-        degrees: How many neighbours each robot has.
-        neighbours: The neighbours of robot 0, then of robot 1, and so on, each in the order.
-        charges: What each value of robot 0 costs it alone, then of robot 1, and so on. None: nothing.
-        held: The constraints, as each robot knows them.
-        value_bytes: How long a message is that tells a value, in the order of `charges`; a number if all are as long.
-        domain_bytes: How long a message is that tells all values, by robot; a number if all are as long.
-        table_checks: How many checks it takes to make the tables of each robot. None: an entry is a check.
+        names: The robots' names, from which their random numbers follow.
+        sizes: The number of values of each robot.
+        degrees: The number of neighbours of each robot.
+        neighbours: The neighbours of robot 0, then of robot 1, and so on, each list in priority order.
+        charges: The unary cost of each value of robot 0, then of robot 1, and so on. None: no unary costs.
+        held: The constraints, as known by each robot.
+        value_bytes: The size of the message with each value, in the order of `charges`; one number if all are equal.
+        domain_bytes: The size of the message with all values, by robot; one number if all are equal.
+        table_checks: The constraint checks that build each robot's tables. None: one check for each entry.
     """
 
     names: Sequence[str]
@@ -56,14 +56,14 @@ class Description:
     degrees: Integers
     neighbours: Integers
     charges: Floats | None
-    held: Sequence[Held]
+    held: Sequence[KnownConstraints]
     value_bytes: Integers | int
     domain_bytes: Integers | int
     table_checks: Integers | None = None
 
 
-def described(parts: Mapping[str, AgentProblem]) -> Description:
-    """Return the team whose robots are given `parts`, in priority order.
+def describe_team(parts: Mapping[str, AgentProblem]) -> Description:
+    """Return the description of the team with these `parts`, in priority order.
 
     Raises:
         UnsupportedError: when a constraint's table is too large.
@@ -81,13 +81,13 @@ def described(parts: Mapping[str, AgentProblem]) -> Description:
         neighbours=np.array([rank[name] for problem in problems for name in problem.neighbours], np.int64),
         charges=np.array([charge for problem in problems for charge in problem.charges], np.float64),
         held=draft.held(),
-        value_bytes=np.array([_told(value) for problem in problems for value in problem.values], np.int64),
+        value_bytes=np.array([_value_bytes(value) for problem in problems for value in problem.values], np.int64),
         domain_bytes=np.array([len(encode(Domain(list(problem.values)))) for problem in problems], np.int64),
         table_checks=np.array([problem.checks for problem in problems], np.int64),
     )
 
 
-def _told(value: Value) -> int:
+def _value_bytes(value: Value) -> int:
     return len(encode(ValueMessage(value)))
 
 
@@ -113,7 +113,7 @@ class _Shape:
 
 
 class _Draft:
-    """Constraints by the shape of their tables; equal tables are kept once."""
+    """Constraints by the shape of their tables; equal tables are stored once."""
 
     def __init__(self) -> None:
         self._shapes: dict[tuple[int, ...], _Shape] = {}
@@ -121,15 +121,15 @@ class _Draft:
     def add(
         self, place: int, problem: LocalProblem, rank: Mapping[str, int], domains: Mapping[str, Sequence[Value]]
     ) -> None:
-        """Add what the robot at `place` knows."""
+        """Add the constraints that the robot at `place` knows."""
         for number, table in enumerate(problem.tables(domains)):
             shape = self._shapes.setdefault(table.charges.shape, _Shape())
             shape.add(place, [rank[name] for name in table.agents], table.charges, number)
 
-    def held(self) -> list[Held]:
+    def held(self) -> list[KnownConstraints]:
         """Return the constraints."""
         return [
-            Held(
+            KnownConstraints(
                 np.array(shape.owners, np.int64),
                 np.array(shape.others, np.int64).reshape(len(shape.owners), len(size) - 1),
                 np.stack(shape.tables),

@@ -6,8 +6,8 @@ from typing import cast
 
 import numpy as np
 
+from robochoc.communication.arrays.array_types import Flags, Floats, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
-from robochoc.communication.arrays.kinds import Flags, Floats, Integers
 from robochoc.communication.arrays.layout import Group
 from robochoc.protocols.local_search.dsa import DSASettings
 
@@ -15,43 +15,43 @@ from robochoc.protocols.local_search.dsa import DSASettings
 class ArrayDSA(CycleRun):
     """A run of DSA."""
 
-    def _begin(self) -> None:
-        self.take_any()
-        self.tell_values()
+    def _start_active(self) -> None:
+        self.choose_random_values()
+        self.send_values()
 
     def _step(self) -> None:
         """Move or stay (`StochasticSearch.choice`)."""
-        found = self.burdens()
-        self.hear()
+        found = self.value_costs()
+        self.receive()
         self.count_checks(self.all_checks)
-        for number, (group, burdens) in enumerate(zip(self.layout.groups, found, strict=True)):
-            self._choose(number, group, burdens)
+        for number, (group, value_costs) in enumerate(zip(self.layout.groups, found, strict=True)):
+            self._choose(number, group, value_costs)
         if self.cycle + 1 < self.settings.cycles:
-            self.tell_values()
+            self.send_values()
 
     def _weigh(self) -> None:
-        self.burdens()
+        self.value_costs()
 
-    def _choose(self, number: int, group: Group, burdens: Integers) -> None:
+    def _choose(self, number: int, group: Group, value_costs: Integers) -> None:
         own = group.values(self.values)[: group.active]
-        now, lowest = self.present(number, burdens), least(burdens)
-        cheapest = burdens == lowest[:, None]
+        now, lowest = self.present(number, value_costs), least(value_costs)
+        cheapest = value_costs == lowest[:, None]
         gains = now > lowest
         others = count(cheapest) - ~gains
         able = np.flatnonzero((gains | self._sideways(number, group, now)) & (others > 0))
         moving = able[self.draws.draw(able + group.first) < self._probability(gains[able])]
         choices = cheapest[moving]
         choices[np.arange(len(moving)), own[moving]] = False
-        chosen = self.draws.any_of(moving + group.first, others[moving])
+        chosen = self.draws.choose(moving + group.first, others[moving])
         own[moving] = nth(choices, chosen).astype(own.dtype)
 
     def _probability(self, gains: Flags) -> Floats | float:
-        """Return with what probability each robot moves, where those that gain do as `gains` says."""
+        """Return the probability of a move for each robot; `gains` marks robots whose move is a gain."""
         settings = cast("DSASettings", self.settings)
         return np.where(gains, 1.0, settings.probability) if settings.variant in "DE" else settings.probability
 
     def _sideways(self, number: int, group: Group, now: Integers) -> Flags | bool:
-        """Return where the variant allows a move that gains nothing (`DSA._probability`)."""
+        """Return the robots whose moves without a gain the variant allows (`DSA._probability`)."""
         variant = cast("DSASettings", self.settings).variant
         if variant not in "BD":
             return variant in "CE"

@@ -9,22 +9,22 @@ from typing import cast
 
 import numpy as np
 
+from robochoc.communication.arrays.array_types import FEW, Floats, Index, Integers
 from robochoc.communication.arrays.cycle_run import exact_sum
-from robochoc.communication.arrays.description import Held
+from robochoc.communication.arrays.description import KnownConstraints
 from robochoc.communication.arrays.jagged import columns
-from robochoc.communication.arrays.kinds import FEW, Floats, Index, Integers
 from robochoc.communication.arrays.layout import Group, Layout
 
 _CHUNK = 1 << 20
-"""Entries of tables that are worked on at a time: they stay in the processor's cache, and take little memory."""
+"""The number of table entries in one step: they fit into the processor's cache."""
 
 
 @dataclass(frozen=True)
 class Factors:
     """Functions of one shape: each is the sum of all constraints over the same robots.
 
-    `rows` are their robots, a column for each, the one that holds them last; `numbers` their places among all
-    functions of that robot; `which` is the table of each.
+    `rows` are their robots, a column for each place, the holder last; `numbers` are their places among all functions of
+    the holder; `which` is the number of each one's table.
     """
 
     rows: Integers
@@ -51,16 +51,16 @@ class Factors:
         return found
 
     def cost(self, values: Integers) -> float:
-        """Return what all functions cost, where robots have these `values`."""
+        """Return the sum of all functions under these `values`."""
         return exact_sum(self.tables[(self.which, *(values[column] for column in self.rows.T))])
 
 
 def factors_of(layout: Layout) -> list[Factors]:
-    """Return the functions of a team: the lowest robot of a scope holds it."""
+    """Return the functions of a team. The lowest robot of a scope holds its function."""
     return [found for held in layout.description.held if (found := _joined(layout, held)) is not None]
 
 
-def _joined(layout: Layout, held: Held) -> Factors | None:
+def _joined(layout: Layout, held: KnownConstraints) -> Factors | None:
     """Return the functions of the constraints in `held` whose owner is the lowest; None if there are none."""
     if not held.others.shape[1]:
         return None
@@ -82,7 +82,7 @@ def _joined(layout: Layout, held: Held) -> Factors | None:
 
 
 def _least(costs: Floats, axis: int) -> Floats:
-    """Return the least along `axis`; a loop over a short one is faster than numpy's."""
+    """Return the minimum along `axis`; for a short axis, a loop is faster than numpy's."""
     if costs.shape[axis] > FEW:
         return cast("Floats", costs.min(axis=axis))
     rows = np.moveaxis(costs, axis, 0)
@@ -94,10 +94,10 @@ def _least(costs: Floats, axis: int) -> Floats:
 
 @dataclass
 class Ports:
-    """Where variables of robots with equally many values meet functions: a row for each meeting.
+    """The edges between functions and the variables of one group of robots: a row for each edge.
 
-    `r` and `q` are the last messages from and to the functions. `owners` are the robots (counted in their group),
-    `slots` the meetings of each robot, one robot after the other, in the order in which their costs are added up.
+    `r` and `q` are the last messages from and to the functions. `owners` are the robots (numbered in their group),
+    `slots` the edges of each robot, one robot after the other, in the order in which their costs are added up.
     """
 
     group: Group
@@ -108,12 +108,12 @@ class Ports:
     q: Floats
 
     def columns(self) -> Iterator[tuple[Index, Integers]]:
-        """Yield robots and meetings, column by column."""
+        """Yield robots and edges, column by column."""
         for lists, places in columns(self.lengths):
             yield lists, self.slots[places]
 
     def without(self, rows: Integers, preferred: Floats) -> Iterator[tuple[Integers, Floats]]:
-        """Yield meetings of `rows`, and the cost of their values by all other functions, added up one by one."""
+        """Yield edges of `rows`, with the sum of the costs of their values by all other functions."""
         starts, lengths = (np.cumsum(self.lengths) - self.lengths)[rows], self.lengths[rows]
         for left_out in range(int(lengths.max(initial=0))):
             there = lengths > left_out
@@ -126,7 +126,7 @@ class Ports:
 
 
 def ports_of(layout: Layout, factors: list[Factors]) -> tuple[list[Ports], list[list[tuple[Ports, slice]]]]:
-    """Return the ports of each group, and for each of `factors` those of its robots: which ports, and which rows."""
+    """Return the ports of each group, and for each of `factors` the ports and rows of its robots."""
     found: list[Ports] = []
     sides: list[list[tuple[Ports, slice]]] = [[] for _ in factors]
     for group in layout.groups:
@@ -144,14 +144,14 @@ def ports_of(layout: Layout, factors: list[Factors]) -> tuple[list[Ports], list[
 
 
 def _by_place(factors: Factors, sides: list[tuple[Ports, slice]]) -> list[tuple[Ports, slice]]:
-    """Return `sides`, which are in the order of their sizes, in the order of the robots."""
+    """Return `sides`, which are sorted by size, in the order of the robots."""
     sizes = factors.tables.shape[1:]
     order = sorted(range(len(sizes)), key=lambda place: sizes[place])
     return [side for _, side in sorted(zip(order, sides, strict=True), key=lambda pair: pair[0])]
 
 
 def _ports(layout: Layout, group: Group, ends: list[tuple[Factors, int]]) -> tuple[Ports, list[slice]]:
-    """Return the ports of `group`, at the `ends` of functions: with which robot of theirs."""
+    """Return the ports of `group` at `ends`: functions with the places of their robots."""
     owners = [one.rows[:, place] - group.first for one, place in ends]
     holders = [np.where(place == one.rows.shape[1] - 1, -1, layout.robots[one.rows[:, -1]]) for one, place in ends]
     bounds = np.cumsum([0, *(len(one.rows) for one, _ in ends)])

@@ -1,8 +1,8 @@
 """Lists of different lengths, column by column: the first entries of all lists, then the second ones, and so on.
 
-A column is one array, so a sum over each list is as many additions of whole arrays as the longest list has entries,
-one after the other in the order of the list: no sum rounds otherwise than a loop would. (Jagged diagonals, as sparse
-matrices are stored on vector machines: Saad, "Krylov subspace methods on supercomputers", 1989.)
+A column is one array, so a sum over each list takes as many additions of arrays as the longest list has entries, in the
+order of the list: the sum is rounded as in a loop. (Jagged diagonals, the storage of sparse matrices on vector
+machines: Saad, "Krylov subspace methods on supercomputers", 1989.)
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robochoc.communication.arrays.kinds import Index, Integers
+from robochoc.communication.arrays.array_types import Index, Integers
 
 
 def columns(lengths: Integers) -> Iterator[tuple[Index, Integers]]:
-    """Yield, for each column, the lists that reach it, and where their entries stand if lists follow each other.
+    """Yield, for each column, the lists that reach it, and the places of their entries if lists are concatenated.
 
-    Lists are a slice where none is longer than the one before it.
+    The lists are a slice if they are sorted by descending length.
     """
     starts = np.cumsum(lengths) - lengths
     order = np.argsort(-lengths, kind="stable")
@@ -30,12 +30,12 @@ def columns(lengths: Integers) -> Iterator[tuple[Index, Integers]]:
 
 
 def segments(lengths: Integers) -> Integers:
-    """Return the number of its list for each entry, if lists follow each other."""
+    """Return the number of its list for each entry of concatenated lists."""
     return np.repeat(np.arange(len(lengths)), lengths)
 
 
 def narrowest(largest: int) -> np.dtype[np.integer]:
-    """Return the smallest type of integers that holds 0 to `largest`, and -1."""
+    """Return the smallest integer type for -1 to `largest`."""
     for kind in (np.int8, np.int16, np.int32):
         if largest <= np.iinfo(kind).max:
             return np.dtype(kind)

@@ -1,7 +1,8 @@
-"""How the robots of a team lie in arrays: those with equally many values together, those with most neighbours first.
+"""The layout of a team in arrays: robots with equally many values form a group, sorted by descending degree.
 
-Robots are numbered anew for this; `Layout.robots` says who is where. Costs of a value are one whole number: what it
-breaks comes first, what it pays second (`Costs`), so that numbers compare as `LexicographicCost` does.
+Rows number the robots in this order; `Layout.robots` maps rows to robots. The cost of a value is one integer: the
+number of broken constraints in the high bits, the other costs in the low bits (`Costs`), so that integers compare as
+`LexicographicCost` does.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from robochoc.communication.arrays.description import Description, Held
+from robochoc.communication.arrays.array_types import Flags, Floats, Index, Integers
+from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.jagged import columns, narrowest, segments
-from robochoc.communication.arrays.kinds import Flags, Floats, Index, Integers
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact
 
@@ -25,9 +26,9 @@ _LOW = (1 << _LOW_BITS) - 1
 
 @dataclass(frozen=True)
 class Costs:
-    """How costs are whole numbers: the number of broken constraints, shifted by `bits`, and all other costs.
+    """Costs as integers: the number of broken constraints, shifted by `bits`, plus all other costs.
 
-    A difference of two sums has the same form; its costs may be negative, and are less than half of the unit.
+    A difference of two sums has the same form; its other costs may be negative, and are less than half of the unit.
     """
 
     bits: int
@@ -35,28 +36,28 @@ class Costs:
 
     @classmethod
     def up_to(cls, total: float, constraints: int) -> Costs:
-        """Return the form for robots with so many constraints, whose costs come to `total` at most.
+        """Return the form for robots with at most `constraints` constraints and costs of at most `total`.
 
         Raises:
-            TooLargeError: when there is none.
+            TooLargeError: if the costs do not fit into 64 bits.
         """
         check_exact(total)
         bits = (4 * int(total) + 1).bit_length()
         largest = 4 * (constraints + 1) << bits
         if largest >= 1 << 62:
             raise TooLargeError(
-                f"costs could add up to {int(total):,}, and {constraints:,} constraints of a robot could be broken:"
-                " together more than 64 bits hold"
+                f"costs of up to {int(total):,} and up to {constraints:,} broken constraints of a robot do not fit into"
+                " 64 bits"
             )
         return cls(bits, np.dtype(np.int32 if largest < 1 << 31 else np.int64))
 
     def of(self, costs: Floats) -> Integers:
-        """Return `costs`, in which `inf` stands for a broken constraint."""
+        """Return `costs` in this form; `inf` stands for a broken constraint."""
         broken = np.isinf(costs)
         return (np.where(broken, 0, costs).astype(np.int64) + (broken.astype(np.int64) << self.bits)).astype(self.kind)
 
     def sum(self, costs: Integers) -> int:
-        """Return the sum of `costs`; where none is broken, it need not fit into 64 bits."""
+        """Return the sum of `costs`, which may exceed 64 bits."""
         if len(costs) << self.bits < 1 << _SIGNED_BITS:
             return int(costs.sum(dtype=np.int64))
         low = int((costs & _LOW).sum(dtype=np.int64))
@@ -68,13 +69,13 @@ class Costs:
         return (costs.astype(np.int64) + half) >> self.bits
 
     def paid(self, costs: Integers) -> Integers:
-        """Return what the others cost."""
+        """Return the other costs."""
         return costs.astype(np.int64) - (self.broken(costs) << self.bits)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A constraint of each of many robots (`lists`, counted within their group).
+    """A constraint of each of many robots (`lists`, numbered within their group).
 
     The costs of the robot's values are in the row `base` + the sum of `strides` times the others' values.
     """
@@ -85,7 +86,7 @@ class Column:
     strides: tuple[int, ...]
 
     def rows(self, values: Integers) -> Integers:
-        """Return the number of the row of each, where robots have these `values`."""
+        """Return the row of each robot's constraint under these `values`."""
         if isinstance(self.base, int) and not self.base and self.strides == (1,):
             return values.take(self.others[0])
         total = np.zeros(len(self.others[0]), np.int64) + self.base
@@ -98,7 +99,7 @@ class Column:
 class Block:
     """Constraints of one shape that robots of one group know: a row of costs for each combination of others' values."""
 
-    held: Held
+    held: KnownConstraints
     rows: Integers
     columns: tuple[Column, ...]
 
@@ -107,8 +108,8 @@ class Block:
 class Group:
     """The robots with `size` values: rows `first` to `last` of the team's arrays, the first `active` with neighbours.
 
-    `charges` is what each value costs the robot alone; None: nothing. `fixed` is the same with constraints that look
-    at no other robot. `checks` is what it takes to evaluate all values of each robot.
+    `charges` is the unary cost of each value; None: no unary costs. `fixed` also includes constraints over no other
+    robot. `checks` is the number of constraint checks that evaluate all values of each robot.
     """
 
     size: int
@@ -138,8 +139,8 @@ class Layout:
         costs: The form of its costs.
         robots: The robot in each row.
         places: The row of each robot; -1 for those without values.
-        groups: The robots with equally many values, the fewest first.
-        degrees: How many neighbours the robot in each row has.
+        groups: The groups of robots with equally many values, in ascending order of this number.
+        degrees: The number of neighbours of the robot in each row.
     """
 
     def __init__(self, description: Description) -> None:
@@ -168,7 +169,7 @@ class Layout:
 
     @cached_property
     def starts(self) -> Integers:
-        """Where the neighbours of each row begin in `neighbours`."""
+        """The place of each row's first neighbour in `neighbours`."""
         return np.cumsum(self.degrees) - self.degrees
 
     @cached_property
@@ -217,7 +218,7 @@ class Layout:
     def _start(self, group: Group) -> int:
         return int(self.starts[group.first]) if group.many else 0
 
-    def _groups(self, held: list[Held]) -> Iterator[Group]:
+    def _groups(self, held: list[KnownConstraints]) -> Iterator[Group]:
         sizes = self.description.sizes[self.robots]
         of = [(one, one.owners.size and one.tables.shape[-1]) for one in held]
         for size in np.unique(sizes):
@@ -234,7 +235,7 @@ class Layout:
         starts = (np.cumsum(given.sizes) - given.sizes)[self.robots[first:last]]
         return self.costs.of(given.charges[starts[:, None] + np.arange(size)])
 
-    def _fill(self, group: Group, held: list[Held]) -> None:
+    def _fill(self, group: Group, held: list[KnownConstraints]) -> None:
         """Give the group its constraints."""
         group.checks = np.zeros(group.many, np.int64)
         group.fixed = group.charges
@@ -249,7 +250,7 @@ class Layout:
                 group.fixed = fixed.copy()
                 np.add.at(group.fixed, own, rows[one.which])
 
-    def _block(self, group: Group, held: Held, own: Integers, rows: Integers) -> Block:
+    def _block(self, group: Group, held: KnownConstraints, own: Integers, rows: Integers) -> Block:
         order = np.argsort(own, kind="stable")
         shape = held.tables.shape[1:-1]
         strides = tuple(int(np.prod(shape[place + 1 :])) for place in range(len(shape)))
@@ -263,8 +264,8 @@ class Layout:
         return Block(held, rows, tuple(found))
 
 
-def _largest(description: Description, held: list[Held]) -> tuple[float, int]:
-    """Return what the costs of a robot's value could add up to, and how many constraints it could break."""
+def _largest(description: Description, held: list[KnownConstraints]) -> tuple[float, int]:
+    """Return the largest possible sum of a robot's costs, and of its broken constraints."""
     many = len(description.sizes)
     total, constraints = np.zeros(many), np.zeros(many, np.int64)
     if description.charges is not None and len(description.charges):

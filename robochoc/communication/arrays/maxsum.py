@@ -1,6 +1,6 @@
 """Max-Sum for all robots at once: `protocols/inference/maxsum.py`, where the algorithm is explained.
 
-Sums are added up in the order in which the objects do, so that they are rounded alike.
+Sums are computed in the same order as by the objects, so that they are rounded alike.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from typing import cast
 
 import numpy as np
 
+from robochoc.communication.arrays.array_types import Floats, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, least
 from robochoc.communication.arrays.factors import Ports, factors_of, ports_of
-from robochoc.communication.arrays.kinds import Floats, Integers
 from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import list_bytes
 from robochoc.model.message import encode
@@ -23,7 +23,7 @@ from robochoc.protocols.shared.cycles import CycleCount, Domain
 from robochoc.solver.encoding import UnsupportedError
 
 _REST = len(encode(R([]))) - 1
-"""Bytes of a message but for its list of rows."""
+"""Bytes of a message without its list of rows."""
 _FLOAT = 9
 
 
@@ -31,22 +31,22 @@ class ArrayMaxSum(CycleRun):
     """A run of Max-Sum.
 
     Raises:
-        UnsupportedError: when functions are to be split.
+        UnsupportedError: if functions are to be split.
     """
 
     def __init__(
         self, layout: Layout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         if cast("MaxSumSettings", settings).split:
-            raise UnsupportedError("maxsum with --set split has no form as arrays; --runtime simulator takes it")
+            raise UnsupportedError("maxsum with --set split has no form as arrays: use --runtime simulator")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
         self._alone = [self._cost_alone(group) for group in layout.groups]
         self._factors = [] if layout.empty.size else factors_of(layout)
         self._ports, self._sides = ports_of(layout, self._factors)
         self._preferred: list[Floats] = []
 
-    def _begin(self) -> None:
-        """Take the cheapest values, tell domains, and make functions (`MaxSum.begin`, `MaxSum._build`)."""
+    def _start_active(self) -> None:
+        """Choose the cheapest values, send domains, and build functions (`MaxSum.begin`, `MaxSum._build`)."""
         self._preferred = [self._prefer(group) for group in self.layout.groups]
         for group, preferred in zip(self.layout.groups, self._preferred, strict=True):
             active = slice(group.first, group.first + group.active)
@@ -59,9 +59,9 @@ class ArrayMaxSum(CycleRun):
         self._count_tables()
 
     def _step(self) -> None:
-        """Tell R, take values, tell Q (`MaxSum._tell_r`, `MaxSum._decide`)."""
+        """Tell R, take values, tell Q (`MaxSum._send_r`, `MaxSum._decide`)."""
         self._weigh()
-        self._tell_r()
+        self._send_r()
         z = self._z()
         if self.verdict is not None:
             return
@@ -69,7 +69,7 @@ class ArrayMaxSum(CycleRun):
             active = slice(group.first, group.first + group.active)
             self.values[active] = costs[: group.active].argmin(axis=1).astype(self.layout.kind)
         if self.cycle + 1 < self.settings.cycles:
-            self._tell_q(z)
+            self._send_q(z)
 
     def _weigh(self) -> None:
         total = sum(factors.cost(self.values) for factors in self._factors)
@@ -81,7 +81,7 @@ class ArrayMaxSum(CycleRun):
     # Equations
 
     def _prefer(self, group: Group) -> Floats:
-        """Return the cost of each value alone, with its preference (gamma)."""
+        """Return the unary cost of each value, with its preference (gamma)."""
         rows = np.arange(group.first, group.first + group.active)
         preferred = np.zeros((group.many, group.size))
         preference = cast("MaxSumSettings", self.settings).preference
@@ -90,14 +90,14 @@ class ArrayMaxSum(CycleRun):
         alone = self._cost_alone(group)
         return preferred if alone is None else alone + preferred
 
-    def _tell_r(self) -> None:
+    def _send_r(self) -> None:
         """Compute R of all functions (2)."""
         for factors, sides in zip(self._factors, self._sides, strict=True):
             told = [ports.q[rows] for ports, rows in sides]
             for place, (ports, rows) in enumerate(sides):
                 ports.r[rows] = factors.least(told, place)
         self.tally.add(R.__name__, self._link_bytes, np.ones_like(self._link_bytes))
-        self._hear(below=True)
+        self._raise_clocks(below=True)
 
     def _z(self) -> list[Floats]:
         """Return the cost of each value (3)."""
@@ -113,7 +113,7 @@ class ArrayMaxSum(CycleRun):
                 self.witness = int(self.layout.robots[ports.group.first + hopeless[0]])
         return found
 
-    def _tell_q(self, z: list[Floats]) -> None:
+    def _send_q(self, z: list[Floats]) -> None:
         """Compute Q of all variables (1), normalised and damped."""
         damping = cast("MaxSumSettings", self.settings).damping
         for ports, preferred, costs in zip(self._ports, self._preferred, z, strict=True):
@@ -122,7 +122,7 @@ class ArrayMaxSum(CycleRun):
             np.minimum(fresh, MOST, out=fresh, where=fresh < INFINITE)
             ports.q = damping * ports.q + (1 - damping) * fresh if self.cycle and damping else fresh
         self.tally.add(Q.__name__, self._link_bytes, np.ones_like(self._link_bytes))
-        self._hear(below=False)
+        self._raise_clocks(below=False)
 
     # Counts
 
@@ -133,7 +133,7 @@ class ArrayMaxSum(CycleRun):
         return np.where(broken > 0, INFINITE, paid.astype(np.float64))
 
     def _count_links(self) -> None:
-        """Count which robots are above and below each, and how long messages between two are."""
+        """Count the robots above and below each robot, and the sizes of messages between two."""
         layout = self.layout
         self._below = np.zeros(layout.many, np.int64)
         higher = np.zeros(len(layout.neighbours), bool)
@@ -157,7 +157,7 @@ class ArrayMaxSum(CycleRun):
                 alone += np.bincount(layout.places[held.owners], minlength=layout.many) * held.tables.shape[-1]
         alone[layout.degrees == 0] = 0
         self.count_checks(alone)
-        self._hear(below=False)
+        self._raise_clocks(below=False)
         made = layout.description.table_checks
         if made is None:
             made = alone
@@ -169,8 +169,8 @@ class ArrayMaxSum(CycleRun):
         else:
             self.count_checks(np.where(layout.degrees > 0, made[layout.robots], 0))
 
-    def _hear(self, *, below: bool) -> None:
-        """Let clocks rise to those of the robots below, or above, that have spoken."""
+    def _raise_clocks(self, *, below: bool) -> None:
+        """Raise clocks to those of the robots below, or above, that have sent a message."""
         if self.clocks is not None:
             heard = self.clocks.copy()
             for (group, lists, neighbours, _), higher in zip(self.layout.links, self.layout.higher, strict=True):
@@ -181,7 +181,7 @@ class ArrayMaxSum(CycleRun):
 
 
 def _fresh(ports: Ports, preferred: Floats, costs: Floats) -> Floats:
-    """Return, for each meeting, the cost of each value without its function: nothing is subtracted from infinity."""
+    """Return, for each edge, the cost of each value without its function, without subtraction from infinity."""
     endless = np.flatnonzero(np.isinf(costs).any(axis=1))
     with np.errstate(invalid="ignore"):
         fresh: Floats = costs.take(ports.owners, axis=0) - ports.r

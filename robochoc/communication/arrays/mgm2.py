@@ -8,10 +8,10 @@ from typing import cast
 
 import numpy as np
 
+from robochoc.communication.arrays.array_types import Flags, Integers
 from robochoc.communication.arrays.cycle_run import nth
-from robochoc.communication.arrays.kinds import Flags, Integers
 from robochoc.communication.arrays.mgm import ArrayGainers
-from robochoc.communication.arrays.shared import Shared
+from robochoc.communication.arrays.pair_constraints import PairConstraints
 from robochoc.communication.arrays.tally import integer_bytes, list_bytes
 from robochoc.model.message import encode
 from robochoc.protocols.local_search.mgm2 import Accept, Go, MGM2Settings, Offer, Reject
@@ -19,12 +19,12 @@ from robochoc.protocols.shared.cycles import Domain
 
 _NO_OFFER = len(encode(Offer(None)))
 _ACCEPT = len(encode(Accept(0, 0, 0))) - 3
-"""Bytes of an acceptance but for its three numbers."""
+"""Bytes of an acceptance without its three numbers."""
 
 
 @dataclass
 class _Offers:
-    """The offers of one cycle: rows of those who make them and of their receivers, and links in both directions."""
+    """The offers of one cycle: rows of makers and receivers, and links in both directions."""
 
     makers: Integers
     receivers: Integers
@@ -34,9 +34,9 @@ class _Offers:
 
 @dataclass
 class _Joint:
-    """Offers between robots of two sizes that reach a robot that makes none: the gain of each joint move, in a row.
+    """Offers between two groups whose receivers make no offer: the gain of each joint move, a row for each offer.
 
-    `offers` are their numbers. A row goes through the receiver's values, and for each through the maker's (`width`).
+    `offers` are their numbers. A row lists, for each value of the receiver, the maker's values (`width`).
     """
 
     offers: Integers
@@ -47,34 +47,34 @@ class _Joint:
 class ArrayMGM2(ArrayGainers):
     """A run of MGM-2."""
 
-    def _begin(self) -> None:
-        self.take_any()
+    def _start_active(self) -> None:
+        self.choose_random_values()
         lengths = self.layout.description.domain_bytes
         if isinstance(lengths, np.ndarray):
             lengths = lengths[self.layout.robots]
         self.tally.add(Domain.__name__, lengths, self.layout.degrees)
         if not self.layout.empty.size:
-            self.tell_values()
+            self.send_values()
 
     def _step(self) -> None:
         """Go through all phases of a cycle, from values to joint moves."""
-        found = self.burdens()
-        self.hear()
+        found = self.value_costs()
+        self.receive()
         offers = self._offer()
         joint = self._gains(offers, found)
-        self._hear_offers(offers)
+        self._receive_offers(offers)
         partners, targets, gains = self._answer(offers, joint)
         committed = partners >= 0
         self.count_checks(np.where(committed, 0, self.all_checks))
         alone, own = self.best_unilateral(found, ~committed)
         targets, gains = np.where(committed, targets, alone), np.where(committed, gains, own)
-        self.tell_gains(gains)
-        self.hear()
+        self.send_gains(gains)
+        self.receive()
         moves = self.wins(gains, partners)
         self._go(np.flatnonzero(committed), partners, moves)
         self.values = np.where(moves, targets, self.values).astype(self.layout.kind)
         if self.cycle + 1 < self.settings.cycles:
-            self.tell_values()
+            self.send_values()
 
     # Phases
 
@@ -89,7 +89,7 @@ class ArrayMGM2(ArrayGainers):
         return _Offers(makers, receivers, links, layout.back[links].astype(np.int64))
 
     def _gains(self, offers: _Offers, found: list[Integers]) -> list[_Joint]:
-        """Compute what offers say, and what their receivers make of them (`MGM2._gains`, `MGM2._joint`)."""
+        """Compute the offered gains, and the receivers' joint gains (`MGM2._gains`, `MGM2._joint`)."""
         making = self._flags(offers.makers)
         sizes, joint = np.full(len(offers.makers), _NO_OFFER), []
         for number, group in enumerate(self.layout.groups):
@@ -98,7 +98,7 @@ class ArrayMGM2(ArrayGainers):
                 chosen = np.flatnonzero(inside)
                 if not chosen.size:
                     continue
-                told = self._told(offers, chosen, number, found[number], met.size)
+                told = self._offered_gains(offers, chosen, number, found[number], met.size)
                 sizes[chosen] += self._offer_bytes(told) - 1
                 open_ = ~making[offers.receivers[chosen]]
                 gains = self._joint(offers, chosen[open_], other, found[other])[:, :, None] + told[open_]
@@ -108,18 +108,20 @@ class ArrayMGM2(ArrayGainers):
         self.tally.add(Offer.__name__, _NO_OFFER, links - len(sizes))
         return joint
 
-    def _told(self, offers: _Offers, chosen: Integers, number: int, burdens: Integers, many: int) -> Integers:
-        """Return the gains in the `chosen` offers, which robots of the group of this `number` make."""
+    def _offered_gains(
+        self, offers: _Offers, chosen: Integers, number: int, value_costs: Integers, many: int
+    ) -> Integers:
+        """Return the gains in the `chosen` offers, made by robots of the group `number`."""
         group = self.layout.groups[number]
         makers, receivers = offers.makers[chosen] - group.first, self.values[offers.receivers[chosen]]
-        rows = self._shared[number].with_any(offers.links[chosen], self.values, burdens[makers], receivers, many)
-        return self.present(number, burdens)[makers][:, None, None] - rows
+        rows = self._shared[number].with_any(offers.links[chosen], self.values, value_costs[makers], receivers, many)
+        return self.present(number, value_costs)[makers][:, None, None] - rows
 
-    def _joint(self, offers: _Offers, chosen: Integers, number: int, burdens: Integers) -> Integers:
-        """Return what receivers, of the group of this `number`, gain on constraints without the maker."""
+    def _joint(self, offers: _Offers, chosen: Integers, number: int, value_costs: Integers) -> Integers:
+        """Return the gains of receivers, of the group `number`, on constraints without the maker."""
         group = self.layout.groups[number]
         receivers = offers.receivers[chosen] - group.first
-        left = self._shared[number].without(offers.back[chosen], self.values, burdens[receivers])
+        left = self._shared[number].without(offers.back[chosen], self.values, value_costs[receivers])
         now = left[np.arange(len(left)), group.values(self.values)[receivers]]
         gains: Integers = now[:, None] - left
         return gains
@@ -142,11 +144,11 @@ class ArrayMGM2(ArrayGainers):
             flags = one.gains[rows] == best[accepted[mine]][:, None]
             own, place = np.divmod(nth(flags, places[mine]), one.width)
             targets[receivers[mine]], targets[makers[mine]] = own, place
-        self._tell_answers(offers, makers, targets, gains)
+        self._send_answers(offers, makers, targets, gains)
         return partners, targets, gains
 
     def _choose(self, offers: _Offers, best: Integers, ties: Integers) -> tuple[Integers, Integers]:
-        """Return the offers that are accepted, and which of its best moves is taken of each."""
+        """Return the accepted offers, and for each the number of the chosen one among its best moves."""
         making = self._flags(offers.makers)
         order = np.argsort(offers.back, kind="stable")
         order = order[~making[offers.receivers[order]]]  # by receiver, and there in priority order
@@ -161,12 +163,12 @@ class ArrayMGM2(ArrayGainers):
         takes = np.flatnonzero(most > 0)
         total = np.add.reduceat(counted, starts)[takes]
         before = (sums[starts] - counted[starts])[takes]
-        wanted = before + self.draws.any_of(receivers[starts[takes]], total)
+        wanted = before + self.draws.choose(receivers[starts[takes]], total)
         found = np.searchsorted(sums, wanted, side="right")
         return order[found], wanted - (sums[found] - counted[found])
 
     def _go(self, committed: Integers, partners: Integers, moves: Flags) -> None:
-        """Let partners tell each other whether they gain most; both have to (`MGM2._decide`, `MGM2._go`)."""
+        """Exchange between partners whether they gain most; both must (`MGM2._decide`, `MGM2._go`)."""
         self.tally.add(Go.__name__, len(encode(Go(True))), len(committed))
         if self.clocks is not None:
             self.clocks[committed] = np.maximum(self.clocks[committed], self.clocks[partners[committed]])
@@ -181,8 +183,8 @@ class ArrayMGM2(ArrayGainers):
         total: Integers = numbers.sum(axis=(1, 2)) + heads
         return total
 
-    def _tell_answers(self, offers: _Offers, makers: Integers, targets: Integers, gains: Integers) -> None:
-        """Count answers, and let those who made offers hear them."""
+    def _send_answers(self, offers: _Offers, makers: Integers, targets: Integers, gains: Integers) -> None:
+        """Count the answers, and raise the clocks of the makers of offers to them."""
         costs, told = self.layout.costs, gains[makers]
         numbers = integer_bytes(targets[makers]) + integer_bytes(costs.broken(told)) + integer_bytes(costs.paid(told))
         self.tally.add(Accept.__name__, _ACCEPT + numbers, np.ones_like(numbers))
@@ -193,7 +195,7 @@ class ArrayMGM2(ArrayGainers):
             self.clocks[offers.makers] = np.maximum(self.clocks[offers.makers], answered)
 
     def _joint_checks(self, offers: _Offers) -> Integers:
-        """Return how many checks receivers have made: on all constraints without the maker, for each offer."""
+        """Return the receivers' constraint checks: on all constraints without the maker, for each offer."""
         making = self._flags(offers.makers)
         checks = np.zeros(self.layout.many, np.int64)
         for number, shared in enumerate(self._shared):
@@ -203,8 +205,8 @@ class ArrayMGM2(ArrayGainers):
             np.add.at(checks, receivers, made)
         return checks
 
-    def _hear_offers(self, offers: _Offers) -> None:
-        """Let clocks rise to those of offers: an offer to a robot before the partner is made before it is computed."""
+    def _receive_offers(self, offers: _Offers) -> None:
+        """Raise clocks to those of offers: an empty offer to a robot before the partner precedes the computation."""
         layout = self.layout
         made = np.zeros(layout.many, np.int64)
         made[offers.makers] = self._sizes[offers.receivers] * self.all_checks[offers.makers]
@@ -222,7 +224,7 @@ class ArrayMGM2(ArrayGainers):
             part[lists] = np.maximum(part[lists], said[neighbours] + late)
         self.clocks = heard
 
-    # What does not change
+    # Constant data
 
     def _flags(self, rows: Integers) -> Flags:
         flags = np.zeros(self.layout.many, bool)
@@ -230,8 +232,8 @@ class ArrayMGM2(ArrayGainers):
         return flags
 
     @cached_property
-    def _shared(self) -> list[Shared]:
-        return [Shared(self.layout, group) for group in self.layout.groups]
+    def _shared(self) -> list[PairConstraints]:
+        return [PairConstraints(self.layout, group) for group in self.layout.groups]
 
     @cached_property
     def _groups(self) -> Integers:
@@ -240,5 +242,5 @@ class ArrayMGM2(ArrayGainers):
 
     @cached_property
     def _sizes(self) -> Integers:
-        """How many values the robot in each row has."""
+        """The number of values of the robot in each row."""
         return self.layout.description.sizes[self.layout.robots]

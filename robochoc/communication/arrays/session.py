@@ -1,4 +1,4 @@
-"""A team as arrays, in one thread: a session for protocols that have such a form."""
+"""The session of the runtime of arrays, in one thread: for the protocols in `array_runs.py`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from robochoc.communication.arrays.cycle_run import walk
-from robochoc.communication.arrays.description import described
-from robochoc.communication.arrays.forms import form_of
+from robochoc.communication.arrays.array_runs import array_run_for
+from robochoc.communication.arrays.cycle_run import cycles_of
+from robochoc.communication.arrays.description import describe_team
 from robochoc.communication.arrays.layout import Layout
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.search_watch import snapshot_of
@@ -28,17 +28,17 @@ from robochoc.system.stopping import stop_requested
 
 
 class ArraysRun(Session):
-    """One team as arrays. Its problem does not change.
+    """One team as arrays. Its problem cannot change.
 
     Args:
         team: The team, compiled or not.
         protocol: The protocol that its robots run.
-        observer: Receives what robots decide, cycle by cycle (its time), and no messages.
+        observer: Receives the robots' decisions, with the cycle as their time, and no messages.
         progress: Receives the count of messages after each cycle, before its decisions.
-        parameters: What robots are given besides the problem.
+        parameters: The robots' parameters besides the problem.
 
     Raises:
-        UnsupportedError: when the protocol has no form as arrays, or costs or tables are too large.
+        UnsupportedError: if the protocol cannot run as arrays, or costs or tables are too large.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ArraysRun(Session):
         super().__init__(team)
         self._observer = observer
         self._progress = progress
-        form = form_of(protocol)
+        form = array_run_for(protocol)
         assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
         given = settings_of(protocol, parameters.settings)
         settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
@@ -67,15 +67,15 @@ class ArraysRun(Session):
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        """See `Session.search`; limits are looked at after each cycle."""
+        """See `Session.search`; limits are checked after each cycle."""
         began = time.monotonic()
         run = self._run
         verdict = Verdict.UNKNOWN
-        for _ in walk(run):
+        for _ in cycles_of(run):
             elapsed_s = time.monotonic() - began
             self._report(elapsed_s)
             self._watched()
-            if not run.over and (
+            if not run.is_over and (
                 self._is_to_stop
                 or (timeout is not None and elapsed_s > timeout)
                 or (messages is not None and self._sent >= messages)
@@ -91,7 +91,7 @@ class ArraysRun(Session):
         )
 
     def _watched(self) -> None:
-        """Give those who watch a snapshot, if they want one."""
+        """Give the watch a snapshot, if it is due."""
         if self.watch is not None and self.watch.wants_snapshot(time.monotonic()):
             self.watch.receive(snapshot_of(self._assignments(), self._findings()))
 
@@ -101,14 +101,14 @@ class ArraysRun(Session):
 
     def change(self, epoch: Epoch) -> None:  # noqa: ARG002 - of `Session`
         """Refuse: see `robochoc.run.compatibility`."""
-        raise UnsupportedError("--runtime arrays is for problems that do not change")
+        raise UnsupportedError("--runtime arrays is for problems that do not change: use --runtime simulator")
 
     def close(self) -> None:
-        """Do nothing: there is nothing to release."""
+        """Do nothing: arrays have no resources to release."""
 
     @property
     def costs(self) -> list[float]:
-        """The cost of the team's values in every cycle so far; `inf` where a hard constraint is broken."""
+        """The cost of the team's values in every cycle so far; `inf` if a hard constraint is broken."""
         return list(self._run.costs)
 
     @property
@@ -116,7 +116,7 @@ class ArraysRun(Session):
         return sum(self._run.tally.messages.values())
 
     def _report(self, elapsed_s: float) -> None:
-        """Report the progress, and what robots have decided in the cycle."""
+        """Report the progress, and the robots' decisions in the cycle."""
         run = self._run
         if self._progress:
             self._progress(Progress(self._sent, elapsed_s))
@@ -135,7 +135,7 @@ class ArraysRun(Session):
         return found
 
     def _findings(self) -> dict[str, Findings]:
-        """Return the own values of each robot in every cycle."""
+        """Return each robot's values in every cycle."""
         run = self._run
         entries: list[list[tuple[int, int]]] = [[] for _ in range(self._layout.many)]
         for cycle, (rows, values) in enumerate(run.changes or ()):
@@ -149,8 +149,8 @@ class ArraysRun(Session):
 
 
 def _laid_out(parts: Mapping[str, AgentProblem]) -> Layout:
-    """Return the team's arrays. Raises `UnsupportedError` when its costs or tables are too large."""
+    """Return the team's arrays. Raises `UnsupportedError` if its costs or tables are too large."""
     try:
-        return Layout(described(parts))
+        return Layout(describe_team(parts))
     except UnsupportedError as large:
-        raise UnsupportedError(f"{large}; --runtime simulator computes without arrays") from None
+        raise UnsupportedError(f"{large}: use --runtime simulator") from None

@@ -1,19 +1,19 @@
-"""What robots have said in a run of arrays: messages by type, bytes, the largest."""
+"""The counts of messages in a run of arrays: messages by type, bytes, the largest size."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from robochoc.communication.arrays.kinds import Integers
+from robochoc.communication.arrays.array_types import Integers
 
 _SHORT_LIST, _LONG_LIST = 16, 65_536
-"""Lists of so many entries have longer heads in msgpack."""
+"""The lengths from which lists have longer heads in msgpack."""
 _LEAST_BYTE, _LARGEST_BYTE = -32, 127
-"""Integers from the one to the other have one byte."""
+"""The range of integers of one byte."""
 _SIZES = ((-(2**31), 9), (-(2**15), 5), (-(2**7), 3), (-(2**5), 2), (128, 1), (256, 2), (65_536, 3), (2**32, 5))
 
 
-class Tally:
+class MessageTally:
     """Counts of messages."""
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class Tally:
         self.bytes = self.largest = 0
 
     def add(self, kind: str, sizes: Integers | int, copies: Integers | int) -> None:
-        """Count messages of `kind`: of each of `sizes` in bytes, as many `copies`. Numbers stand for equal ones."""
+        """Count messages of `kind`: `copies` of each of `sizes` in bytes. A number stands for an array of it."""
         many = int(np.sum(copies))
         if not many:
             return
@@ -32,7 +32,7 @@ class Tally:
 
 
 def integer_bytes(numbers: Integers) -> Integers:
-    """Return how many bytes each of `numbers` has in msgpack."""
+    """Return the bytes of each of `numbers` in msgpack."""
     if not numbers.size or (numbers.min() >= _LEAST_BYTE and numbers.max() <= _LARGEST_BYTE):
         return np.ones(numbers.shape, np.int64)
     bounds = np.array([bound for bound, _ in _SIZES])
@@ -42,6 +42,6 @@ def integer_bytes(numbers: Integers) -> Integers:
 
 
 def list_bytes(length: Integers | int) -> Integers:
-    """Return how many bytes the head of a list of this `length` has in msgpack."""
+    """Return the bytes of the head of a list of this `length` in msgpack."""
     lengths = np.asarray(length)
     return np.where(lengths < _SHORT_LIST, 1, np.where(lengths < _LONG_LIST, 3, 5))

@@ -70,7 +70,7 @@ def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str]
     }
 
 
-def yielding() -> dict[str, Any]:
+def journal_qos() -> dict[str, Any]:
     """Zenoh's `qos` for the journal: it yields to frames, and what a slow sniffer does not take is dropped.
 
     Answers are sent as the question is, and a sniffer might ask for one that is waited for, and stop to read.

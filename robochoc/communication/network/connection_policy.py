@@ -9,7 +9,7 @@ from types import MappingProxyType
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
 from robochoc.authority.registry import Right, Role
-from robochoc.communication.network.quotas import OF_A_ROBOT, OF_AN_OBSERVER, Share
+from robochoc.communication.network.quotas import OBSERVER_SHARE, ROBOT_SHARE, Share
 from robochoc.communication.network.router import RefusalObserver, Router
 from robochoc.communication.network.settings import PATIENCE_S
 
@@ -87,7 +87,7 @@ class ConnectionPolicy:
 
     def share_of(self, name: str) -> Share:
         """Return what `name` may send to the master."""
-        return OF_A_ROBOT if self.is_robot(name) else OF_AN_OBSERVER
+        return ROBOT_SHARE if self.is_robot(name) else OBSERVER_SHARE
 
     def revoked(self, names: Collection[str]) -> list[str]:
         """Return those of `names` that are refused now."""

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
-from robochoc.communication.network.control_messages import DirectoryAnswer, DirectoryRequest
+from robochoc.communication.network.control_messages import (
+    DirectoryAnswer,
+    DirectoryRequest,
+    JournalAnswer,
+    JournalRequest,
+)
+from robochoc.communication.network.journal_server import JournalServer
 from robochoc.communication.network.profile import Profile
 from robochoc.model.communicative_acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
@@ -14,7 +20,7 @@ from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, notification, subscribe
 from robochoc.services.sl import df_on
 
-ASKED_AT_MOST = 20
+MAX_REQUESTS_PER_S = 20
 """Requests that a participant may make in a second."""
 
 
@@ -67,8 +73,8 @@ class DirectoryFacilitator:
         """`requester` asks for something, of the directory or of the master. Raises `TooManyRequestsError`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
-        if len(recent) >= ASKED_AT_MOST:
-            raise TooManyRequestsError(f"more than {ASKED_AT_MOST} requests a second")
+        if len(recent) >= MAX_REQUESTS_PER_S:
+            raise TooManyRequestsError(f"more than {MAX_REQUESTS_PER_S} requests a second")
         self._asked[requester] = [*recent, now]
 
     def answer(self, requester: str, ask: DirectoryRequest) -> DirectoryAnswer:
@@ -92,6 +98,36 @@ class DirectoryFacilitator:
     def _aid(self, name: str) -> str:
         """Return the name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
         return f"{name}@{self._endpoint}/robochoc"
+
+
+class RequestHandler:
+    """Answers requests, up to a rate for each member: `send` sends answers, and `refuse` reports refusals."""
+
+    def __init__(
+        self,
+        journal_server: JournalServer,
+        facilitator: DirectoryFacilitator,
+        send: Callable[[str, DirectoryAnswer | JournalAnswer], None],
+        refuse: Callable[[str, str, str], None],
+    ) -> None:
+        self._journal_server = journal_server
+        self._facilitator = facilitator
+        self._send = send
+        self._refuse = refuse
+
+    def answer(self, sender: str, request: DirectoryRequest | JournalRequest) -> None:
+        """Answer `sender`, unless it asks too often."""
+        try:
+            self._facilitator.count(sender)
+        except TooManyRequestsError as often:
+            self._refuse(sender, "ask the Directory Facilitator", str(often))
+            return
+        answer = (
+            self._journal_server.welcome(sender, request)
+            if isinstance(request, JournalRequest)
+            else self._facilitator.answer(sender, request)
+        )
+        self._send(sender, answer)
 
 
 def _answer_to(number: int, answer: tuple[Performative, str]) -> DirectoryAnswer:

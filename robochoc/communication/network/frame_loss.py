@@ -31,7 +31,7 @@ class LossTracker:
         self._said: dict[str, str] = {}
         """Reports of this search: whose frames are lost, and why."""
 
-    def begin(self) -> None:
+    def start_search(self) -> None:
         """Begin a search: what robots reported in another one no longer counts."""
         self._said.clear()
 

@@ -91,7 +91,7 @@ class Framing:
         self._of_master = msgspec.msgpack.Decoder(_ToRobot)
         self._of_robot = msgspec.msgpack.Decoder(_ToMaster if name == MASTER else _ToPeer)
 
-    def begin(self, run: str) -> None:
+    def start_run(self, run: str) -> None:
         """Begin a run: numbers start anew."""
         self.run = run
         self._written.clear()
@@ -142,7 +142,7 @@ class Framing:
             raise FrameRefusedError(f"frame {expected} is missing before frame {frame.number}")
         return Opened(frame.number, frame.message)
 
-    def take(self, sender: str, number: int) -> None:
+    def accept(self, sender: str, number: int) -> None:
         """Accept the frame `number` of `sender`: the next one is expected now."""
         if number:
             self._read[sender] = max(number, self._read.get(sender, 0))

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from queue import Empty
 from typing import NamedTuple
 
-from robochoc.communication.network.quotas import OF_A_NEIGHBOUR, Share, Usage
+from robochoc.communication.network.quotas import NEIGHBOUR_SHARE, Share, Usage
 
 
 class FrameArrived(NamedTuple):
@@ -53,7 +53,7 @@ class Inbox:
 
     def __init__(
         self,
-        share_of: Callable[[str], Share] = lambda _sender: OF_A_NEIGHBOUR,
+        share_of: Callable[[str], Share] = lambda _sender: NEIGHBOUR_SHARE,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._share_of = share_of
@@ -67,7 +67,7 @@ class Inbox:
         with self._changed:
             if isinstance(item, FrameArrived | FramesLost):
                 usage = self._usage_of(item.sender)
-                if not usage.takes(_size(item), self._clock()):
+                if not usage.accept(_size(item), self._clock()):
                     usage.dropped += 1
                     if usage.dropped > 1:
                         return

@@ -23,7 +23,7 @@ SNIFF = "sniff"
 """The right that is granted or refused."""
 PIECE_BYTES = 60_000
 """The largest piece of the journal: with its framing it fits into one batch of zenoh."""
-ANSWERED_AT_MOST = 200
+MAX_ANSWERS_PER_S = 200
 """The largest number of answers to one follower in a second. It repeats questions without an answer."""
 PRESENT_S = 5.0
 """Seconds after its last request for which a follower is waited for at the end of the run.
@@ -130,11 +130,11 @@ class Publication:
         now = time.monotonic()
         with self._lock:
             recent = [t for t in self._asked.get(name, ()) if now - t < 1]
-            if len(recent) < ANSWERED_AT_MOST:
+            if len(recent) < MAX_ANSWERS_PER_S:
                 recent.append(now)
                 self._asked[name] = recent
                 return
-        raise NotAnsweredError(f"more than {ANSWERED_AT_MOST} questions a second")
+        raise NotAnsweredError(f"more than {MAX_ANSWERS_PER_S} questions a second")
 
 
 def question(run: str, start: int) -> bytes:
@@ -165,11 +165,11 @@ class JournalServer:
     `publication` is None where it gives none out. `may` says who has the right now.
     """
 
-    def __init__(self, run: str, may: Callable[[str], bool], chronicle: MasterEvents) -> None:
+    def __init__(self, run: str, may: Callable[[str], bool], events: MasterEvents) -> None:
         self.publication: Publication | None = None
         self._run = run
         self._may = may
-        self._chronicle = chronicle
+        self._events = events
         self._known: set[str] = set()
 
     @property
@@ -181,10 +181,10 @@ class JournalServer:
         """Return the answer to `name`, which wants to sniff."""
         why = self._why_not(name)
         if why:
-            self._chronicle.refuse(name, SNIFF, why)
+            self._events.refuse(name, SNIFF, why)
         elif name not in self._known:
             self._known.add(name)
-            self._chronicle.granted(name, SNIFF)
+            self._events.granted(name, SNIFF)
         return JournalAnswer(sniff.number, self._run, why)
 
     def answer(self, name: str, content: bytes) -> bytes | None:
@@ -196,7 +196,7 @@ class JournalServer:
             except (NotAnsweredError, OSError) as refused:
                 why = str(refused)
         if why:
-            self._chronicle.refuse(name, SNIFF, why)
+            self._events.refuse(name, SNIFF, why)
         return None
 
     def _why_not(self, name: str) -> str:

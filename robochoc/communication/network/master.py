@@ -40,7 +40,7 @@ from robochoc.communication.network.control_messages import (
     StartSearch,
     ToRobot,
 )
-from robochoc.communication.network.facilitator import DirectoryFacilitator
+from robochoc.communication.network.facilitator import DirectoryFacilitator, RequestHandler
 from robochoc.communication.network.frame_loss import TO_MASTER, LossTracker
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
@@ -49,7 +49,6 @@ from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.members import Member, Members
 from robochoc.communication.network.registrar import Registrar
-from robochoc.communication.network.requests import Requests
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
 from robochoc.communication.session import is_past
@@ -111,7 +110,7 @@ class Master(MasterLoop):
         self._connection, self._send, self._policy = connection, connection.send, connection.policy
         self._journal_server = connection.journal_server
         self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
-        self._requests = Requests(self._journal_server, self._facilitator, self._send, self.events.refuse)
+        self._requests = RequestHandler(self._journal_server, self._facilitator, self._send, self.events.refuse)
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
         self.snapshots: CheckedSnapshots | None = None
@@ -175,8 +174,8 @@ class Master(MasterLoop):
             UnsupportedError: when a robot's problem is too large, or not one for this protocol.
         """
         began = time.monotonic()
-        self.events.begin()
-        self._frame_loss.begin()
+        self.events.start_search()
+        self._frame_loss.start_search()
         deadline = None if timeout is None else began + timeout
         self._policy.open_ways(self.members.reach(writes_to_non_neighbours=traits.writes_to_non_neighbours))
         epoch, declared = self.state.epoch + 1, self.members.declared(traits)
@@ -208,7 +207,7 @@ class Master(MasterLoop):
 
     def _order_start(self) -> None:
         self._send_all(StartSearch(self.state.epoch))
-        self.events.begin()
+        self.events.start_search()
 
     def _collect(self) -> None:
         """End the search, and collect all reports. Raises `RobotsLostError` when it was stuck."""

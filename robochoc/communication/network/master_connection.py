@@ -63,8 +63,8 @@ class MasterConnection:
         try:
             self.policy.open()
             inbox, lease_ms = Inbox(self.policy.share_of), self._settings.lease_ms
-            heard = self.policy.admitted
-            self._transport = Transport(self._endpoint, self._identity, heard=heard, inbox=inbox, lease_ms=lease_ms)
+            senders = self.policy.admitted
+            self._transport = Transport(self._endpoint, self._identity, senders=senders, inbox=inbox, lease_ms=lease_ms)
             if self.journal_server.publication:
                 self._transport.answer(journal_key(ALL), self.journal_server.answer)
         except BaseException:
@@ -102,7 +102,7 @@ class MasterConnection:
         except FrameRefusedError as refused:
             self._events.refuse(sender, TO_MASTER, str(refused))
             return None
-        self.framing.take(sender, opened.number)
+        self.framing.accept(sender, opened.number)
         return opened
 
     def wake(self) -> None:
@@ -112,7 +112,7 @@ class MasterConnection:
     def follow_registry(self) -> None:
         """Let in identities that were enrolled since, and exclude revoked ones."""
         self.policy.follow()
-        self._transport.hear(self.policy.admitted)
+        self._transport.subscribe(self.policy.admitted)
 
     def _note_refusal(self, refusal: Refusal) -> None:
         """Report what the router has refused, except to identities that were admitted since, and will try again."""

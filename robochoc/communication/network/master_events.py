@@ -28,29 +28,29 @@ class MasterEvents:
         """Return whether there is an observer."""
         return self._observer is not None
 
-    def begin(self) -> None:
+    def start_search(self) -> None:
         """Begin a search: from now on times are counted from here, as those of its robots are."""
         self._began = time.monotonic()
 
     def registered(self, robot: str) -> None:
         """Report that `robot` has registered."""
-        self._tell(Registered(t=self._now, robot=robot))
+        self._report(Registered(t=self._now, robot=robot))
 
     def dropped_out(self, robot: str, why: str) -> None:
         """Report that a registered `robot` is gone, and waited for again."""
-        self._tell(DroppedOut(t=self._now, robot=robot, why=why))
+        self._report(DroppedOut(t=self._now, robot=robot, why=why))
 
     def lost(self, robot: str, why: str) -> None:
         """Report that `robot` is lost."""
-        self._tell(Lost(t=self._now, robot=robot, why=why))
+        self._report(Lost(t=self._now, robot=robot, why=why))
 
     def granted(self, who: str, what: str) -> None:
         """Report that `who` was granted `what`."""
-        self._tell(Granted(t=self._now, who=who, what=what))
+        self._report(Granted(t=self._now, who=who, what=what))
 
     def relay(self, event: Granted | Refused) -> None:
         """Report an event of the Authority, whose time is another."""
-        self._tell(msgspec.structs.replace(event, t=self._now))
+        self._report(msgspec.structs.replace(event, t=self._now))
 
     def relay_from(self, name: str, events: Sequence[AnyEvent]) -> None:
         """Report a robot's events. Events that are not about itself are refused."""
@@ -59,7 +59,7 @@ class MasterEvents:
             return
         for event in events:
             if actor(event) == name:
-                self._tell(event)
+                self._report(event)
             else:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
@@ -85,12 +85,12 @@ class MasterEvents:
         return enough
 
     def _refused(self, who: str, what: str, why: str) -> None:
-        self._tell(Refused(t=self._now, who=who, what=what, why=why))
+        self._report(Refused(t=self._now, who=who, what=what, why=why))
 
     @property
     def _now(self) -> float:
         return time.monotonic() - self._began
 
-    def _tell(self, event: AnyEvent) -> None:
+    def _report(self, event: AnyEvent) -> None:
         if self._observer:
             self._observer(event)

@@ -26,11 +26,11 @@ class Share(NamedTuple):
     size_a_second: float = NO_LIMIT
 
 
-OF_A_NEIGHBOUR = Share(200_000, 256 * MIB)
+NEIGHBOUR_SHARE = Share(200_000, 256 * MIB)
 """At a robot, wherever frames wait: how fast neighbours talk is the protocol's affair, and what waits is memory."""
-OF_A_ROBOT = Share(50_000, 64 * MIB, 2_000, 16 * MIB)
+ROBOT_SHARE = Share(50_000, 64 * MIB, 2_000, 16 * MIB)
 """At the master."""
-OF_AN_OBSERVER = Share(1_000, 16 * MIB, 50, MIB)
+OBSERVER_SHARE = Share(1_000, 16 * MIB, 50, MIB)
 """At the master: an observer asks, and waits for the answer."""
 
 
@@ -64,7 +64,7 @@ class Usage:
         self._often = Allowance(share.frames_a_second, now)
         self._much = Allowance(share.size_a_second, now)
 
-    def takes(self, size: int, now: float) -> bool:
+    def accept(self, size: int, now: float) -> bool:
         """Return whether a frame of `size` bytes is within the share; if so, it waits from now on."""
         if self._framing >= self._share.frames or self._size + size > self._share.size:
             return False
@@ -85,13 +85,13 @@ class Usage:
 class Backlog:
     """Frames of each sender that are kept for later, within its share; how fast they come does not matter."""
 
-    def __init__(self, share: Share = OF_A_NEIGHBOUR) -> None:
+    def __init__(self, share: Share = NEIGHBOUR_SHARE) -> None:
         self._share = share._replace(frames_a_second=NO_LIMIT, size_a_second=NO_LIMIT)
         self._usage: dict[str, Usage] = {}
 
-    def takes(self, sender: str, size: int) -> bool:
+    def accept(self, sender: str, size: int) -> bool:
         """Return whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
-        return self._usage.setdefault(sender, Usage(self._share, 0.0)).takes(size, 0.0)
+        return self._usage.setdefault(sender, Usage(self._share, 0.0)).accept(size, 0.0)
 
     def clear(self) -> None:
         """Forget all usage."""

@@ -205,7 +205,7 @@ class NetworkRobot:
         """
         message, epoch = opened.message, self._searcher.epoch if self._searcher else 0
         if not isinstance(message, ToPeer):
-            self._channel.take(sender, opened.number)
+            self._channel.accept(sender, opened.number)
             self._obey(message)
         elif message.epoch > epoch:
             self._keep(sender, opened, message, epoch)
@@ -213,16 +213,16 @@ class NetworkRobot:
             message = self._channel.unsealed(sender, opened.number, message)
             if isinstance(message, ProtocolMessage) and self._searcher and message.epoch == epoch:
                 self._searcher.check(message.content)
-            self._channel.take(sender, opened.number)
+            self._channel.accept(sender, opened.number)
             self._handle_message(sender, message, packet)
 
     def _keep(self, sender: str, opened: Opened, message: ToPeer, epoch: int) -> None:
         """Keep a frame for the next epoch. Raises `FrameRefusedError`."""
         if message.epoch > epoch + 1:
             raise FrameRefusedError(f"it is of epoch {message.epoch}, and this is {epoch}")
-        if not self._kept.takes(sender, len(message.content)):
+        if not self._kept.accept(sender, len(message.content)):
             raise FrameRefusedError(f"it is more than is kept of {sender} for epoch {message.epoch}")
-        self._channel.take(sender, opened.number)
+        self._channel.accept(sender, opened.number)
         self._ahead.append((sender, opened))
 
     def _handle_message(self, sender: str, message: ToPeer, packet: list[Envelope]) -> None:
@@ -310,7 +310,7 @@ class NetworkRobot:
         if welcome.incarnation != self._registration.incarnation:
             return
         if self._registration.accept(welcome):
-            self._channel.begin(welcome.run, welcome.filters)
+            self._channel.start_run(welcome.run, welcome.filters)
             self._settings.stage("registered, waiting for the others")
         self._send_to_master(Joined(welcome.incarnation, self._channel.card))
 
@@ -357,5 +357,5 @@ class NetworkRobot:
             opened = self._channel.read(MASTER, content)
         except FrameRefusedError:
             return False
-        self._channel.take(MASTER, opened.number)
+        self._channel.accept(MASTER, opened.number)
         return isinstance(opened.message, Leave)

@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import IO, NamedTuple, cast
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.network.access import access_control, yielding
+from robochoc.communication.network.access import access_control, journal_qos
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
 from robochoc.system.signals import signals_held
@@ -193,7 +193,7 @@ class Router:
             },
             "transport/link/tx/lease": self._lease_ms,
             "access_control": access_control(reach, sniffers),
-            "qos/network": [] if sniffers is None else [yielding()],
+            "qos/network": [] if sniffers is None else [journal_qos()],
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:

@@ -6,6 +6,7 @@ The connection around it is in `robot.py`. The course of a search is in `communi
 from __future__ import annotations
 
 import secrets
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ import msgspec
 from robochoc.communication.control import RobotMessage, Snapshot
 from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.network.constraint_check import check_constraints
+from robochoc.communication.network.constraint_records import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.network.control_messages import (
     LATEST,
     CheckResult,
@@ -27,12 +29,10 @@ from robochoc.communication.network.control_messages import (
     ToMaster,
     ToPeer,
 )
-from robochoc.communication.network.framing import LARGEST_FRAME
+from robochoc.communication.network.framing import LARGEST_FRAME, FrameRefusedError
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.communication.network.profile import ProfileError, domain_of
 from robochoc.communication.network.quotas import Backlog
-from robochoc.communication.network.recalled import Recalled, values_asked_for
-from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
 from robochoc.model.message import Envelope
@@ -43,8 +43,11 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, TeamKnowledge
 from robochoc.solver.compiled_team import CompiledRobot
+from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, held_above
+
+_Values = dict[str, int]
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class Searcher(RobotLoop):
         self._sent_to: Counter[str] = Counter()
         self._received_from: Counter[str] = Counter()
         self._clocks: dict[str, int] = {}
-        self._recalled = Recalled()
+        self._snapshot_values = SnapshotValues()
         if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
             raise UnsupportedError(
                 f"{self._robot.name} received invalid data: other interface variables than in its file"
@@ -112,7 +115,7 @@ class Searcher(RobotLoop):
 
         The master may have told the robot to stay with what it had at a snapshot.
         """
-        adopted = self._recalled.adopted
+        adopted = self._snapshot_values.adopted
         return self._present if adopted is None else adopted
 
     @property
@@ -208,7 +211,7 @@ class Searcher(RobotLoop):
         if envelope.sender not in self._task.interfaces:
             raise BadMessageError(f"{envelope.sender} takes no part in this search")
         is_early = not (self._searching or self._paused)
-        if is_early and not self._early_share.takes(envelope.sender, len(envelope.content)):
+        if is_early and not self._early_share.accept(envelope.sender, len(envelope.content)):
             raise BadMessageError(f"{envelope.sender} says too much before the search has begun")
         return super().admit(envelope)
 
@@ -252,7 +255,7 @@ class Searcher(RobotLoop):
         more than a frame holds.
         """
         findings = protocol.findings
-        if findings.trail is not None and self._recalled.is_used:
+        if findings.trail is not None and self._snapshot_values.is_used:
             findings = msgspec.structs.replace(findings, trail=Trail([], findings.trail.cycle))
         return NOTHING if fault_of_findings(findings, self._task.order) else findings
 
@@ -270,22 +273,22 @@ class Searcher(RobotLoop):
         if host is None:
             return
         private = self._context.private
-        values = {} if private else values_asked_for(order, host.protocol, self._own.domain)
-        self._recalled.note(order.number, values)
+        values = {} if private else values_for_recall(order, host.protocol, self._own.domain)
+        self._snapshot_values.note(order.number, values)
         findings = NOTHING if private else self._findings(host.protocol)
         lost = 0 if host.dropper is None else host.dropper.count
         self._send_to_master(Snapshot(self.epoch, order.number, values, lost, findings))
 
     def adopt(self, number: int, *, published: bool) -> None:
-        """Keep what the robot had at a snapshot; see `Recalled.adopt`. Raises `FrameRefusedError`."""
-        self._recalled.adopt(number, published=published)
+        """Keep what the robot had at a snapshot; see `SnapshotValues.adopt`. Raises `FrameRefusedError`."""
+        self._snapshot_values.adopt(number, published=published)
 
     def check_constraints(self, values: Mapping[str, int], snapshot: int = 0) -> CheckResult:
         """Check the robot's constraints against what all have decided, or had at a `snapshot`. See `check_constraints`.
 
         Raises `FrameRefusedError` if the robot was not asked what it had then.
         """
-        own = self._recalled.at(snapshot) if snapshot else self._present
+        own = self._snapshot_values.at(snapshot) if snapshot else self._present
         found = check_constraints(self.epoch, self._robot, {**values, **own}, self._learnt)
         return msgspec.structs.replace(found, snapshot=snapshot)
 
@@ -294,3 +297,60 @@ def _sorted(copies: Sequence[KeyedConstraint], order: Sequence[str]) -> tuple[Ke
     """Return `copies` in the order of the robots that hold them, as in all runtimes."""
     rank = {name: place for place, name in enumerate(order)}
     return tuple(sorted(copies, key=lambda known: rank.get(known.key.partition("<")[0], -1)))
+
+
+class SnapshotValues:
+    """The values that a robot has told, by the numbers of the snapshots: the last ones, and those that it is to keep.
+
+    Attributes:
+        adopted: The values that are the robot's decision until it hears otherwise; None: there are none.
+    """
+
+    def __init__(self) -> None:
+        self.adopted: _Values | None = None
+        self._last: tuple[int, _Values] = (0, {})
+        self._kept: tuple[int, _Values] = (0, {})
+
+    @property
+    def is_used(self) -> bool:
+        """Return whether the robot was ever asked for a snapshot."""
+        return self._last[0] > 0
+
+    def note(self, number: int, values: _Values) -> None:
+        """Keep `values` until the next snapshot."""
+        self._last = (number, values)
+
+    def at(self, number: int) -> _Values:
+        """Return the values of a snapshot. Raises `FrameRefusedError` if they are not known, or no more."""
+        for known, values in (self._last, self._kept):
+            if known == number:
+                return values
+        raise FrameRefusedError(f"it is about snapshot {number}, which is not known")
+
+    def adopt(self, number: int, *, published: bool) -> None:
+        """Keep the values of a snapshot (0: none), and decide on them if they are `published`.
+
+        Raises `FrameRefusedError` if they are not known.
+        """
+        values = self.at(number) if number else None
+        if values is not None:
+            self._kept = (number, values)
+        if published:
+            self.adopted = values
+
+
+def values_for_recall(order: Recall, protocol: Protocol, domain: CompiledDomain) -> _Values:
+    """Return the values of the robot's variables that `order` asks for. Empty: it has none, or withdraws."""
+    if order.value is not None:
+        return domain.behind(order.value)
+    trail = protocol.findings.trail
+    if order.cycle is None or trail is None:
+        return protocol.assignment
+    place = _place_in(trail, order.cycle)
+    return {} if place is None else domain.solution(place)
+
+
+def _place_in(trail: Trail, cycle: int) -> int | None:
+    """Return the place of the value that the robot had in `cycle`; None if it had none yet."""
+    after = bisect_right(trail.entries, cycle, key=lambda entry: entry[0])
+    return trail.entries[after - 1][1] if after else None

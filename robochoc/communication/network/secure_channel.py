@@ -28,9 +28,9 @@ class SecureChannel:
         self._ring: KeyRing | None = None
         self._filters: FilterStack | None = None
 
-    def begin(self, run: str, filters: tuple[str, ...]) -> None:
+    def start_run(self, run: str, filters: tuple[str, ...]) -> None:
         """Begin a run, in which messages go through `filters`. Raises `UnsupportedError` for an unknown filter."""
-        self._framing.begin(run)
+        self._framing.start_run(run)
         if not filters:
             return
         self._ring = KeyRing(self._identity, run)
@@ -82,9 +82,9 @@ class SecureChannel:
         """Return what is in a frame; it counts as received once it is `taken`. Raises `FrameRefusedError`."""
         return self._framing.read(sender, content)
 
-    def take(self, sender: str, number: int) -> None:
+    def accept(self, sender: str, number: int) -> None:
         """Accept the frame `number` of `sender`: the next one is expected now."""
-        self._framing.take(sender, number)
+        self._framing.accept(sender, number)
 
     def unsealed(self, sender: str, number: int, message: ToPeer) -> ToPeer:
         """Return the message of another robot as it was before the filters sealed it.

@@ -69,7 +69,7 @@ class Transport:
         identity: Identity,
         *,
         watch: Iterable[str] = (ALL,),
-        heard: Iterable[str] = TEAM,
+        senders: Iterable[str] = TEAM,
         inbox: Inbox | None = None,
         patience_s: float = 10.0,
         lease_ms: int = LEASE_MS,
@@ -79,14 +79,14 @@ class Transport:
         self._publishers: dict[str, zenoh.ext.AdvancedPublisher] = {}
         self._subscribers: dict[str, _Subscriber] = {}
         self._session = _opened(endpoint, identity, patience_s, lease_ms)
-        self.hear(heard)
+        self.subscribe(senders)
         self._token = self._session.liveliness().declare_token(life_key(self.name))
         self._watchers = [
             self._session.liveliness().declare_subscriber(life_key(name), self._note_presence, history=True)
             for name in watch
         ]
 
-    def hear(self, senders: Iterable[str]) -> None:
+    def subscribe(self, senders: Iterable[str]) -> None:
         """Subscribe to the frames of `senders`, too. Their earlier frames arrive soon.
 
         Each has a subscriber of its own, for zenoh believes what a packet says of its source and number. In one for

@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import robochoc.modelling.array_problem
-from robochoc.communication.arrays.chance import Draws
-from robochoc.communication.arrays.cycle_run import walk
+from robochoc.communication.arrays.cycle_run import Draws, cycles_of
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
@@ -83,7 +82,7 @@ def test_arrays_run_as_the_team_of_objects(protocol: str, many: int) -> None:
         team = team_of_arrays(given)
         problem = ArrayProblem(**given, names=team.order)
         run = problem.run(protocol, seed=seed, cycles=5)
-        course = [one.values[run.layout.places].tolist() for one in walk(run)]
+        course = [one.values[run.layout.places].tolist() for one in cycles_of(run)]
         objects = Simulation(
             team, protocol_named(protocol), Concurrent(0), parameters=RunParameters(seed, {"cycles": "5"})
         ).search()
@@ -200,7 +199,7 @@ def test_costs_of_all_robots_are_exact_above_what_floats_and_64_bits_hold(protoc
     chain = [(robot, robot + 1) for robot in range(4999)]
     problem = ArrayProblem(5000, 2, chain, cost + SAME, charges=np.tile([cost, cost + 1], (5000, 1)))
     run = problem.run(protocol, cycles=2)
-    found = [one.values[run.layout.places].tolist() for one in walk(run)]
+    found = [one.values[run.layout.places].tolist() for one in cycles_of(run)]
     costs = [
         (4999 + 5000) * cost + sum(values) + sum(one == other for one, other in itertools.pairwise(values))
         for values in found
@@ -242,5 +241,5 @@ def test_all_draw_at_once_what_each_draws() -> None:
     some = np.arange(0, 50, 3)
     for rows in (np.arange(50), some, some, np.arange(50)):
         assert draws.draw(rows).tolist() == [streams[row]() for row in rows]
-    assert draws.any_of(some, np.ones(len(some), np.int64)).tolist() == [0] * len(some)
-    assert draws.any_of(some, np.full(len(some), 7)).tolist() == [int(streams[row]() * 7) for row in some]
+    assert draws.choose(some, np.ones(len(some), np.int64)).tolist() == [0] * len(some)
+    assert draws.choose(some, np.full(len(some), 7)).tolist() == [int(streams[row]() * 7) for row in some]

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
-from robochoc.communication.arrays.forms import form_of
+from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.session import ArraysRun
 from robochoc.communication.run_result import Progress
 from robochoc.experiments.execute import Bench
@@ -94,10 +94,10 @@ def test_protocols_with_a_form_say_so_and_no_other_has_one() -> None:
     for offer in installed_protocols():
         assert offer.protocol
         if offer.protocol.traits.arrays:
-            assert form_of(offer.protocol)
+            assert array_run_for(offer.protocol)
         else:
             with pytest.raises(UnsupportedError, match="has no form as arrays"):
-                form_of(offer.protocol)
+                array_run_for(offer.protocol)
 
 
 def test_a_users_kind_of_dsa_has_none() -> None:

@@ -1,4 +1,4 @@
-"""Which protocols have a form as arrays."""
+"""The protocols that can run as arrays."""
 
 from __future__ import annotations
 
@@ -16,17 +16,15 @@ from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.encoding import UnsupportedError
 
-_FORMS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType(
+_ARRAY_RUNS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType(
     {DSA: ArrayDSA, MGM: ArrayMGM, MGM2: ArrayMGM2, MaxSum: ArrayMaxSum}
 )
 
 
-def form_of(protocol: type[Protocol]) -> type[CycleRun]:
-    """Return the form of `protocol` as arrays. Raises `UnsupportedError` where there is none."""
-    form = _FORMS.get(protocol)
+def array_run_for(protocol: type[Protocol]) -> type[CycleRun]:
+    """Return the array implementation of `protocol`. Raises `UnsupportedError` if there is none."""
+    form = _ARRAY_RUNS.get(protocol)
     if form is None:
-        able = ", ".join(kind.__name__.lower() for kind in _FORMS)
-        raise UnsupportedError(
-            f"{protocol.__name__} has no form as arrays; these have: {able}; the simulator takes all"
-        )
+        able = ", ".join(kind.__name__.lower() for kind in _ARRAY_RUNS)
+        raise UnsupportedError(f"{protocol.__name__} has no form as arrays, only {able} have: use --runtime simulator")
     return form

@@ -1,4 +1,4 @@
-"""Names for kinds of arrays, and how long a short axis is."""
+"""Types of arrays, and the length of a short axis."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ Index = slice | Places
 """A choice of rows."""
 
 FEW = 8
-"""Up to so many values a loop over them is faster than numpy's along the short axis."""
+"""The longest axis along which a loop is faster than numpy's."""

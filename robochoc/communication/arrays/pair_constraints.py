@@ -1,4 +1,4 @@
-"""What pairs of neighbours share: constraints of a robot in which a neighbour takes part, for many pairs at once."""
+"""The constraints that pairs of neighbours share, for many pairs at once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robochoc.communication.arrays.kinds import Integers
+from robochoc.communication.arrays.array_types import Integers
 from robochoc.communication.arrays.layout import Block, Group, Layout
 
 
@@ -16,7 +16,7 @@ from robochoc.communication.arrays.layout import Block, Group, Layout
 class _Position:
     """The constraints of a block, sorted by the link from their owner to the robot at one position.
 
-    Those of link n are from `starts[n]` to `starts[n + 1]`.
+    The constraints of link n are at `starts[n]` to `starts[n + 1]`.
     """
 
     starts: Integers
@@ -25,7 +25,7 @@ class _Position:
 
 
 class _Constraints:
-    """The constraints of a block: `rows` as in `Column`, and who is at each position."""
+    """The constraints of a block: `rows` as in `Column`, and the robots at each position."""
 
     def __init__(self, layout: Layout, block: Block) -> None:
         held = block.held
@@ -43,14 +43,14 @@ class _Constraints:
             self.positions.append(_Position(starts.astype(layout.index), order, stride))
 
     def rows(self, values: Integers, constraints: Integers) -> Integers:
-        """Return the number of the row of costs of each of `constraints`, where robots have these `values`."""
+        """Return the row of costs of each of `constraints` under these `values`."""
         others = values[self._others[constraints]].astype(np.int64)
         found: Integers = self._base[constraints] + others @ self._strides
         return found
 
 
 class _Meeting(NamedTuple):
-    """One constraint for some of the pairs that were asked for (`pairs`); no pair is in it twice."""
+    """One constraint for each of some of the requested pairs (`pairs`, without duplicates)."""
 
     pairs: Integers
     rows: Integers
@@ -58,15 +58,15 @@ class _Meeting(NamedTuple):
     costs: Integers
 
 
-class Shared:
-    """The constraints of the robots of one group, by who else takes part."""
+class PairConstraints:
+    """The constraints of the robots of one group, by their other robots."""
 
     def __init__(self, layout: Layout, group: Group) -> None:
         self._constraints = [_Constraints(layout, block) for block in group.blocks]
         self.size = group.size
 
     def count(self, links: Integers) -> Integers:
-        """Return in how many constraints of its owner the neighbour of each of `links` takes part."""
+        """Return, for each of `links`, the number of its owner's constraints over the neighbour."""
         found = np.zeros(len(links), np.int64)
         for constraints in self._constraints:
             for position in constraints.positions:
@@ -74,19 +74,19 @@ class Shared:
                 found += last - first
         return found
 
-    def without(self, links: Integers, values: Integers, burdens: Integers) -> Integers:
-        """Return `burdens` (of each link's owner) without the constraints in which the neighbour takes part."""
-        left = burdens.copy()
+    def without(self, links: Integers, values: Integers, value_costs: Integers) -> Integers:
+        """Return `value_costs` (of each link's owner) without the constraints over the neighbour."""
+        left = value_costs.copy()
         for meeting in self._meetings(links, values):
             left[meeting.pairs] -= meeting.costs[meeting.rows]
         return left
 
-    def with_any(self, links: Integers, values: Integers, burdens: Integers, own: Integers, many: int) -> Integers:
-        """Return the `burdens` of each link's owner for each of the `many` values that its neighbour may have.
+    def with_any(self, links: Integers, values: Integers, value_costs: Integers, own: Integers, many: int) -> Integers:
+        """Return the `value_costs` of each link's owner for each of the `many` values that its neighbour may have.
 
-        `own` are the values that the neighbours have now.
+        `own` are the neighbours' present values.
         """
-        found = np.repeat(self.without(links, values, burdens)[:, None, :], many, axis=1)
+        found = np.repeat(self.without(links, values, value_costs)[:, None, :], many, axis=1)
         for meeting in self._meetings(links, values):
             first = meeting.rows - meeting.stride * own[meeting.pairs].astype(np.int64)
             for value in range(many):
