@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from robochoc.cli.group import cli
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.run.registry import installed_protocols
 from robochoc.system.compiled_core import docstring
 

@@ -9,22 +9,21 @@ simulator or on a robot.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, MutableSequence
+from collections.abc import Callable, Iterable, Mapping, MutableSequence
 from typing import Any, ClassVar
 
-from robochoc.model.message import Message
+from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
-from robochoc.protocols.inspectable import Inspectable
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.settings_base import NO_SETTINGS, Settings
+from robochoc.protocols.settings import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class Protocol(Inspectable, ABC):
+class Protocol(ABC):
     """One robot's side of a protocol.
 
     Subclasses declare `messages`, the union of the message types that they receive, and their `traits`: properties and
@@ -39,6 +38,8 @@ class Protocol(Inspectable, ABC):
     """Draws from [0, 1): the host's, seeded for each robot. There before `start`. No secret may depend on it."""
     secret: Callable[[int], int]
     """Draws a number of so many bits, for keys (`protocols/key_stream.py`). There before `start`."""
+    numbered_values: ClassVar[bool] = False
+    """True if the robots never receive others' values, only numbers of assignments; `view` contains these numbers."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem
@@ -61,10 +62,10 @@ class Protocol(Inspectable, ABC):
     def receive(self, sender: str, message: Message) -> None:
         """Process one message."""
 
-    def settle(self) -> None:
+    def settle(self) -> None:  # noqa: B027 - optional
         """Decide on the whole view; called when the inbox has been drained."""
 
-    def miss(self, sender: str) -> None:
+    def miss(self, sender: str) -> None:  # noqa: B027 - optional
         """Note that a message of `sender` is lost: the one that would have come before the next."""
 
     def go_on(self) -> bool:
@@ -106,3 +107,24 @@ class Protocol(Inspectable, ABC):
     def findings(self) -> Findings:
         """This robot's knowledge of the whole search besides its own value. May be read at any time."""
         return NOTHING
+
+    # Optional: what a replay shows of the state (`replay/inspection.py`), which finds agent views, nogood stores,
+    # contexts and partial assignments by itself. None of these may check constraints or change the state.
+
+    @property
+    def checked_against(self) -> Mapping[str, Value] | None:
+        """The values of others against which this robot's values are checked; None: all that it knows."""
+        return None
+
+    @property
+    def kept_nogoods(self) -> Iterable[Mapping[str, Value]]:
+        """The nogoods outside a `NogoodStore`: assignments that cannot all hold, this robot's included."""
+        return ()
+
+    def value_notes(self, index: int) -> Mapping[str, float]:  # noqa: ARG002 - used by overrides
+        """Return this robot's notes on its value at `index`, by name: `{"LB": 3, "UB": 7}`."""
+        return {}
+
+    def tried(self, index: int) -> bool:  # noqa: ARG002 - used by overrides
+        """Return whether the value at `index` has been tried without success for the current view."""
+        return False

@@ -1,39 +1,59 @@
-"""The settings of a protocol, as text: which ones there are, and whether they have values that it accepts."""
+"""Settings of protocols (`--set NAME=VALUE`): their base class, and the reading of values given as text."""
 
 from __future__ import annotations
 
+import typing
 from collections.abc import Mapping
+from typing import ClassVar, cast
 
 import msgspec
 
-from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings_base import Settings
 from robochoc.system.decode_errors import describe_decode_error
+
+MOST = 10**12
+"""The largest number that a setting accepts, except `inf` for fields in `Settings.may_be_infinite`."""
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The base of a protocol's settings: fields of simple types, each with a default.
+
+    A subclass's docstring explains its fields; `robochoc protocols NAME` shows it. `__post_init__` raises `ValueError`
+    for invalid values. `may_be_infinite` names the fields that accept `inf`.
+    """
+
+    may_be_infinite: ClassVar[frozenset[str]] = frozenset()
+
+
+NO_SETTINGS = Settings()
 
 
 class SettingsError(ValueError):
-    """A setting that the protocol does not have, or a value that it does not accept."""
+    """An unknown setting, or an invalid value of a setting."""
 
 
-MOST = 10**12
-"""No number of a setting is higher, but for `inf` where the protocol takes it (`Settings.may_be_infinite`)."""
+class HasSettings(typing.Protocol):
+    """A protocol, as far as its settings are concerned (`protocol.py` imports this module)."""
+
+    @property
+    def settings(self) -> Settings:
+        """The defaults, or after `equip` the given values."""
 
 
-def equip(protocol: Protocol, given: Mapping[str, str]) -> None:
+def equip(protocol: HasSettings, given: Mapping[str, str]) -> None:
     """Give one robot's protocol the settings that are `given`. Raises `SettingsError`."""
     if given:
-        # For mypyc the class has the settings, and its objects have no others. Those with settings are not compiled.
+        # For mypyc settings belong to the class, not to its objects. Protocols with settings are not compiled.
         setattr(protocol, "settings", settings_of(type(protocol), given))  # noqa: B010
 
 
-def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
+def settings_of(protocol: type[HasSettings], given: Mapping[str, str]) -> Settings:
     """Return the settings of `protocol`: the `given` ones, and defaults for the others. Raises `SettingsError`."""
-    known = type(protocol.settings)
+    known = type(cast("Settings", protocol.settings))
     names = known.__struct_fields__
     for name in given:
         if name not in names:
             there = f"it has {', '.join(names)}" if names else "it has no settings"
-            raise SettingsError(f"{name!r} is no setting of this protocol: {there}")
+            raise SettingsError(f"{name!r} is not a setting of this protocol: {there}")
     try:
         settings = msgspec.convert(dict(given), known, strict=False)
     except msgspec.ValidationError as error:
@@ -42,5 +62,5 @@ def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
         value = getattr(settings, name)
         infinite = given[name] == "inf" and name in known.may_be_infinite
         if isinstance(value, int | float) and not (-MOST <= value <= MOST or infinite):
-            raise SettingsError(f"{name} is a number up to {MOST:,}, not {given[name][:40]}")
+            raise SettingsError(f"{name} is {given[name][:40]}; it must be a number up to {MOST:,}")
     return settings

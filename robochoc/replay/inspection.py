@@ -1,7 +1,7 @@
 """A robot's state at one moment, in words. Inspection changes nothing, and its checks are not counted.
 
 Agent views, nogood stores, partial assignments and contexts are found by the names and types of the protocol's
-attributes. A protocol says itself what else is special about its state (`protocols/inspectable.py`). All other
+attributes. A protocol says itself what else is special about its state (`protocols/protocol.py`). All other
 attributes are shown by `safe_repr`.
 """
 

@@ -11,7 +11,7 @@ from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
 from robochoc.run.options import CENTRAL

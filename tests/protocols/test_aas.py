@@ -14,8 +14,18 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.satisfaction.aas import AAS, AASSettings, AddLink, Narrow, Nogood, Ok
-from robochoc.protocols.satisfaction.aggregates import AggregateStore, covers, matching, met
+from robochoc.protocols.satisfaction.aas import (
+    AAS,
+    AASSettings,
+    AddLink,
+    AggregateStore,
+    Narrow,
+    Nogood,
+    Ok,
+    covers,
+    matching,
+    met,
+)
 from robochoc.run import Runtime, solve
 from tests.support.agents import replies, started_robot, value
 from tests.support.examples import count

@@ -18,8 +18,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.compapo import Assign, Changes, CompAPO, Evaluate, Evaluation, Ok, Release
-from robochoc.protocols.satisfaction.compapo_tables import sizes_in
-from robochoc.protocols.satisfaction.mediation import Mediation, allows
+from robochoc.protocols.satisfaction.mediation import Mediation, allows, sizes_in
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import violations

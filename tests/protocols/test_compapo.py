@@ -24,8 +24,7 @@ from robochoc.protocols.satisfaction.compapo import (
     Release,
     Wait,
 )
-from robochoc.protocols.satisfaction.compapo_tables import Table
-from robochoc.protocols.satisfaction.mediation import Mediation, allows
+from robochoc.protocols.satisfaction.mediation import Mediation, Table, allows
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import after, assert_refused, replies, robot_of, started, value
 from tests.support.examples import count

@@ -15,7 +15,7 @@ from robochoc.model.message import Message, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
-from robochoc.protocols.optimization.interchangeable import expanded
+from robochoc.protocols.optimization.run_lengths import expanded
 from robochoc.protocols.optimization.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError

@@ -5,8 +5,8 @@ from __future__ import annotations
 from random import Random
 
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization.bnb_adopt_fdac import SoftArc, move_costs
 from robochoc.protocols.optimization.bounding_messages import Number
-from robochoc.protocols.optimization.soft_arcs import SoftArc, move_costs
 from tests.support.cases import looped
 
 HARD = 0.2

@@ -14,7 +14,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from tests.support.problems import PREDICATES, team_of

@@ -13,7 +13,7 @@ import msgspec
 from robochoc import __version__
 from robochoc.cli.reports.table import print_table
 from robochoc.formats import on_one_line
-from robochoc.protocols.settings_base import NO_SETTINGS, Settings
+from robochoc.protocols.settings import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import InstalledProtocol, installed_protocols

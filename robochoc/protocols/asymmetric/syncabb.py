@@ -53,7 +53,7 @@ from robochoc.model.wording import Wording, cost_text, incumbent_text
 from robochoc.protocols import acts
 from robochoc.protocols.optimization.syncbb import Backtrack, BestPath, Cost, SyncBB, Terminate, best_proves
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 

@@ -47,7 +47,7 @@ from robochoc.protocols.inference import maxsum
 from robochoc.protocols.inference.maxsum_factor import Functions, Row, cheapest, checked, from_zero, total, without_each
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem

@@ -78,7 +78,7 @@ from robochoc.protocols.inference.dpop_tables import (
     width_of,
 )
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

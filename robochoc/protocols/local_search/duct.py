@@ -67,7 +67,7 @@ from robochoc.model.disclosure import (
 from robochoc.model.outcome import Verdict
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

@@ -54,9 +54,8 @@ from typing import Any, ClassVar, assert_never, cast
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt_messages import Cost, Threshold, Value
-from robochoc.protocols.optimization.bounding import BoundingProtocol
+from robochoc.protocols.optimization.bounding import BoundingProtocol, clamp_share, split_threshold
 from robochoc.protocols.optimization.bounding_messages import Entry, Number, Terminate
-from robochoc.protocols.optimization.shares import clamp_share, split_threshold
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

@@ -57,8 +57,8 @@ from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols.optimization import bnb_adopt_messages as bnb_adopt
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.bnb_adopt_messages import BnBADOPTSettings, Cost, Domain, Floor
+from robochoc.protocols.optimization.bounding import clamp_share, split_threshold
 from robochoc.protocols.optimization.bounding_messages import Entry, Number, Terminate
-from robochoc.protocols.optimization.shares import clamp_share, split_threshold
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

@@ -13,7 +13,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
 from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 
 
 class BnBADOPTSettings(Settings, frozen=True):

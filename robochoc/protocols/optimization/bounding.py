@@ -216,3 +216,20 @@ class BoundingProtocol(TreeProtocol):
     def value_notes(self, index: int) -> Mapping[str, float]:
         """Return LB(d) and UB(d) of the value at `index`."""
         return {"LB": self.lower[index], "UB": self.upper[index]}
+
+
+def clamp_share(t: list[Number], bounds: Bounds, index: int) -> None:
+    """Keep a child's share within its bounds, for the value at `index`: lb(d, l) <= t(d, l) <= ub(d, l)."""
+    t[index] = min(max(t[index], bounds.lb[index]), bounds.ub[index])
+
+
+def split_threshold(
+    threshold: Number, shares: Mapping[str, list[Number]], bounds: Mapping[str, Bounds], index: int
+) -> None:
+    """Change the children's shares for the value at `index` until they add up to `threshold`, which is finite."""
+    spare = threshold - sum(t[index] for t in shares.values())
+    for child, t in shares.items():
+        limits = bounds[child]
+        step = min(spare, limits.ub[index] - t[index]) if spare > 0 else max(spare, limits.lb[index] - t[index])
+        t[index] += step
+        spare -= step

@@ -54,7 +54,7 @@ from robochoc.model.wording import Wording, cost_text, listed
 from robochoc.protocols import acts
 from robochoc.protocols.optimization.branching import BranchingProtocol, Number, Result, Terminate, allowance
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem

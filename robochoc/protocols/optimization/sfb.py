@@ -59,7 +59,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, assert_never, cast
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
-from robochoc.protocols.optimization.interchangeable import expanded, fits
+from robochoc.protocols.optimization.run_lengths import expanded, fits
 from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -89,8 +89,8 @@ from robochoc.model.disclosure import (
 )
 from robochoc.model.message import Value
 from robochoc.model.wording import Wording, along, cost_text, counted, incumbent_text, listed
-from robochoc.protocols.optimization.interchangeable import Run, cut_off, grouped
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.optimization.run_lengths import Run, cut_off, grouped
+from robochoc.protocols.settings import Settings
 
 MIB = 1 << 20
 

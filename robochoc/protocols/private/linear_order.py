@@ -25,7 +25,7 @@ from robochoc.protocols.private.p32_dpop import MOST
 from robochoc.protocols.private.p_dpop import Shape, cells_of
 from robochoc.protocols.private.rerooting import Next, RerootingProtocol
 from robochoc.protocols.private.ring import Ring
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact

@@ -71,7 +71,7 @@ from robochoc.protocols.findings import Findings
 from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage, AnonymousTreeProtocol
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError

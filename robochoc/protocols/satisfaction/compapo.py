@@ -76,8 +76,7 @@ from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.compapo_tables import Table, distinct, own_tables, sizes_in
-from robochoc.protocols.satisfaction.mediation import Mediation, allows
+from robochoc.protocols.satisfaction.mediation import Mediation, Table, allows, distinct, own_tables, sizes_in
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 

@@ -29,7 +29,7 @@ from robochoc.protocols.chance import one_of
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.anytime import Anytime, Best, Paid, Place, Step
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 

@@ -19,7 +19,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.compapo_tables import Table
+from robochoc.protocols.satisfaction.mediation import Table
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.acl import parse
