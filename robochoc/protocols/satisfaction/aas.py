@@ -20,7 +20,7 @@ Where its rules are:
 
     aggregates that go with all of the view         `_choose_aggregate`, `_gaps`
     the largest Cartesian product                   `_best_part`, `_wanted`
-    nogoods over aggregates                         `aggregates.py`, `_backtrack`, `_resolve_conflict`
+    nogoods over aggregates                         `AggregateStore`, `_backtrack`, `_resolve_conflict`
     add-link                                        `_check_add_link`, `_set_link`
 
 What differs from the paper: there robots own constraints and share variables, and a robot narrows other robots'

@@ -49,7 +49,7 @@ Other choices and differences:
 - A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems never.
 - New values are numbered, so that an old `ok?` never replaces what a mediator has said. A mediator tells the new values
   to all neighbours of those that change, so no `ok?` follows an `accept!`.
-- The mediator's search is in `mediation.py`, its constraints are in `compapo_tables.py`. It counts its checks.
+- The mediator's search and its tables of constraints are in `mediation.py`; its checks are counted.
 
 Privacy: a mediator learns the domains' sizes, the constraints and the values of all robots in its good_list, and the
 values of those around it. In the worst case one robot learns the whole problem.
