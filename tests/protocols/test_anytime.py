@@ -257,7 +257,9 @@ def test_if_all_steps_break_something_the_last_values_stay() -> None:
         ("dsa", "maybe", "anytime"),
         ("a-dsa", "yes", "anytime is for robots that go through cycles together"),
         ("d-gibbs", "yes", "'anytime' is not a setting of this protocol: it has cycles, temperature"),
-        *((name, "yes", "'anytime' is not a setting of this protocol: it has") for name in ("acls", "mcs-mgm", "gca-mgm")),
+        ("acls", "yes", "'anytime' is not a setting of this protocol: it has"),
+        ("mcs-mgm", "yes", "'anytime' is not a setting of this protocol: it has"),
+        ("gca-mgm", "yes", "'anytime' is not a setting of this protocol: it has"),
     ],
 )
 def test_who_cannot_refuses_the_setting(protocol: str, value: str, why: str) -> None:
