@@ -1,1 +1,1 @@
-"""The application: `robochoc app`, where people model a team by hand, let it decide, and see it fly, in a browser."""
+"""The application `robochoc app`: users model a team, solve its problem and watch it fly, in a browser."""

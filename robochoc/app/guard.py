@@ -1,4 +1,4 @@
-"""Who may speak with the application: browsers of this machine that know its address, and no other page in them."""
+"""Access control of the application: only browsers on this machine that know its address, and only its own pages."""
 
 from __future__ import annotations
 
@@ -25,42 +25,42 @@ _HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
 )
 MOST_BYTES = (64 << 20) + (1 << 16)
-"""Bytes that are taken of one request: the largest file that is opened, and what a form adds to it."""
+"""The maximum number of bytes of a request: the largest file that can be opened, and the overhead of a form."""
 PART_S = 30.0
 """The longest wait for the next part of a request's body, in seconds."""
 NOT_FOUND = 404
 _METHODS = frozenset({"GET", "HEAD", "POST"})
-"""POST: files that are opened, and sockets of browsers that have no better one."""
+"""POST: uploaded files, and browsers without WebSockets."""
 _MOST_DIGITS = 12
 _NO_ANSWER = "No response returned."
-"""Starlette's error for a page that was left before it was made: nobody waits for it any more, and nothing is wrong."""
+"""Starlette's error for a page that was closed before it was built, which is harmless."""
 _POLICY = (
     "default-src 'self'; "
-    "script-src 'self' 'unsafe-inline' 'unsafe-eval'; "  # NiceGUI makes its pages of both
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval'; "  # NiceGUI's pages require both
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
     "connect-src 'self' ws://{host}; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-"""What a page may do that has no policy of its own: nothing is loaded from elsewhere, and nothing is sent there."""
+"""The policy of a page without its own policy: no connections to other hosts."""
 
 
 class Guard:
-    """Lets requests through to `served` that know the secret path, and come from this machine and its own pages.
+    """Passes requests to `served` if they have the secret path and come from this machine and the application's pages.
 
-    Others use this machine, too: they do not know the path. Another site in the same browser does not know it either;
-    should it ever, its Origin gives it away, and a name that it bends to this machine (DNS rebinding) is not our Host.
+    Other users of this machine do not know the path. Other sites in the same browser do not know the path either, and
+    have another Origin; after DNS rebinding their Host header is another one.
     """
 
     def __init__(self, served: Served, secret: str, port: int) -> None:
         self.app = served
-        """What is served. NiceGUI finds its server by this name."""
+        """The served application. NiceGUI looks for this attribute."""
         self._secret = secret.encode()
         self._hosts = {f"127.0.0.1:{port}".encode(), f"localhost:{port}".encode()}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve a request, or refuse it."""
+        """Serve a request, or reject it."""
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
-        elif (status := self._refused(scope)) is None:
+        elif (status := self._rejection(scope)) is None:
             await self._serve(scope, receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
@@ -68,27 +68,27 @@ class Guard:
             await _answer(send, status, say("app.nothing-here") if status == NOT_FOUND else "")
 
     async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
-        taken = _Taken(receive)
-        begun = False
+        body = _BoundedBody(receive)
+        is_started = False
 
         async def sending(message: MutableMapping[str, Any]) -> None:
-            nonlocal begun
-            if begun or not (taken.too_much or taken.is_late):  # else it says that it has failed, and we say why
-                begun = True
+            nonlocal is_started
+            if is_started or not (body.too_much or body.is_late):  # else the answer below has the reason
+                is_started = True
                 await send(message)
 
         try:
-            await self.app(scope, taken, self._with_headers(scope, sending))
-        except ClientDisconnect:  # it has gone before all of its file was here, or sends too much
+            await self.app(scope, body, self._with_headers(scope, sending))
+        except ClientDisconnect:  # the client closed the connection during an upload, or the upload is too long
             pass
         except RuntimeError as error:
-            if begun or not taken.gone or str(error) != _NO_ANSWER:
+            if is_started or not body.gone or str(error) != _NO_ANSWER:
                 raise
-        if (taken.too_much or taken.is_late) and not begun:
-            await _answer(send, 413 if taken.too_much else 408)
+        if (body.too_much or body.is_late) and not is_started:
+            await _answer(send, 413 if body.too_much else 408)
 
-    def _refused(self, scope: Scope) -> int | None:
-        """Return the HTTP status of a request that is refused; None: it is served."""
+    def _rejection(self, scope: Scope) -> int | None:
+        """Return the HTTP status of a rejected request; None if it is accepted."""
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"")
         given = scope["path"].split("/")[1] if "/" in scope["path"] else ""
@@ -111,14 +111,14 @@ class Guard:
         async def sending(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
                 known = {name.lower() for name, _ in message.get("headers", ())}
-                more = [one for one in ours if one[0] not in known]
+                more = [header for header in ours if header[0] not in known]
                 message = {**message, "headers": [*message.get("headers", ()), *more]}
             await send(message)
 
         return sending
 
 
-class _Taken:
+class _BoundedBody:
     """Receives a request; if the request is too long or late, the client counts as disconnected."""
 
     def __init__(self, receive: Receive) -> None:
@@ -126,7 +126,7 @@ class _Taken:
         self.is_late = False
         """Whether the next part of the request's body was late."""
         self.gone = False
-        """Whether its sender has gone."""
+        """Whether the client has disconnected."""
         self._receive, self._left = receive, MOST_BYTES
         self._is_complete = False
 

@@ -1,20 +1,20 @@
-"""Who is told when something changes."""
+"""Callbacks for changes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from robochoc.app.log import noted
+from robochoc.app.log import log_error
 
 
 class Listeners:
-    """Callbacks that are called when there is news. Call it to tell all of them."""
+    """Callbacks for one kind of change. Calling the object calls all of them."""
 
     def __init__(self) -> None:
         self._callbacks: list[Callable[[], None]] = []
 
     def add(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` from now on; return what ends that."""
+        """Add a callback; return a function that removes it."""
         self._callbacks.append(callback)
 
         def end() -> None:
@@ -24,16 +24,16 @@ class Listeners:
         return end
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of callbacks."""
         return len(self._callbacks)
 
     def __call__(self) -> None:
-        """Tell all. Who is added or removed meanwhile is told the next time, or once more.
+        """Call all callbacks that were present at the start of the call.
 
-        One that fails keeps nobody else from being told; the file of errors has what is known of it.
+        An error of a callback is written to the error log, and the others are called.
         """
         for callback in [*self._callbacks]:
             try:
                 callback()
-            except Exception as fault:  # noqa: BLE001 - kept in the file of errors
-                noted(fault, "listener")
+            except Exception as fault:  # noqa: BLE001 - written to the error log
+                log_error(fault, "listener")

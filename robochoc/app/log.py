@@ -1,4 +1,4 @@
-"""What the application tells besides its pages: to the terminal, and to the file of errors (`faults.keep_faults`)."""
+"""The application's logs: messages in the terminal, and the error log (`error_log.log_errors_to`)."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import logging
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.texts import say
 
-TOLD = logging.getLogger("robochoc.app")
-"""Says in the terminal what users must know, even when no page is open."""
-FAULTS = logging.getLogger("robochoc.app.faults")
-"""Keeps what went wrong unforeseen, with all that is known of it."""
+USER_LOG = logging.getLogger("robochoc.app")
+"""Messages that users must see in the terminal, even if no page is open."""
+ERROR_LOG = logging.getLogger("robochoc.app.error_log")
+"""Unforeseen errors, with their tracebacks."""
 
 
-def words(error: Exception) -> str:
-    """Return what somebody in front of the page is told of an error."""
+def error_text(error: Exception) -> str:
+    """Return the text that a page shows for an error."""
     if isinstance(error, EditError):
         return say(error.key, **error.named)
     if isinstance(error, OSError):
@@ -22,12 +22,12 @@ def words(error: Exception) -> str:
     return say("app.fault")
 
 
-def noted(error: Exception, doing: str) -> str:
-    """Keep an error in the file of errors; return what somebody in front of the page is told.
+def log_error(error: Exception, doing: str) -> str:
+    """Write an error to the error log, and return the text that a page shows.
 
     Args:
         error: The error.
-        doing: The work that it has ended, for the file.
+        doing: The work that failed, for the log.
     """
-    FAULTS.error("%s: %s", doing, type(error).__name__, exc_info=error)
-    return words(error)
+    ERROR_LOG.error("%s: %s", doing, type(error).__name__, exc_info=error)
+    return error_text(error)

@@ -1,4 +1,4 @@
-"""What belongs to one object, such as all runs of a team, and lives as long as that does."""
+"""Objects with attached parts, such as a team with its runs, which live as long as their owner."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any, Self, TypeVar
 T = TypeVar("T")
 
 
-class HasParts:
-    """An object with parts that it knows nothing of. Each is made once, when it is first asked for."""
+class PartsOwner:
+    """An object to which other modules attach parts. Each part is created when it is first requested."""
 
     def __init__(self) -> None:
         self._parts: dict[Any, Any] = {}
 
     def part(self, make: Callable[[Self], T]) -> T:
-        """Return the part that `make` makes, always the same one."""
+        """Return the part that `make` creates; the same object in all calls."""
         if make not in self._parts:
             self._parts[make] = make(self)
         found: T = self._parts[make]

@@ -1,4 +1,4 @@
-"""The teams that are open: one `Project` each, which all pages that show it share."""
+"""The open teams: each is a `Project`, shared by all its pages."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import Any
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.jobs.job import Job, end_jobs_in
 from robochoc.app.listeners import Listeners
-from robochoc.app.log import TOLD
-from robochoc.app.parts import HasParts
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.log import USER_LOG
+from robochoc.app.parts import PartsOwner
+from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.shape import is_sound
@@ -23,13 +23,13 @@ from robochoc.app.store import Store
 from robochoc.app.texts import say
 
 SAVE_S = 0.5
-"""An edit is on disk after so long."""
+"""The time from an edit to its saving."""
 AGAIN_S = 5.0
-"""What could not be saved is tried again after so long."""
+"""The time after which a failed saving is repeated."""
 
 
-class Project(HasParts):
-    """A team that somebody edits. It is saved by itself, and tells whoever listens that it has changed."""
+class Project(PartsOwner):
+    """A team that is edited. Changes are saved automatically, and reported to listeners."""
 
     def __init__(self, store: Store, name: str) -> None:
         super().__init__()
@@ -40,80 +40,80 @@ class Project(HasParts):
         self._saving: asyncio.TimerHandle | None = None
         self._writing = Lock()
         self.removed = False
-        """Somebody removed the team. Pages that still show it say so."""
+        """Whether the team was removed. Open pages of the team show that."""
         self.unsaved = ""
-        """Why it could not be saved last time; empty: it could."""
+        """The error of the last saving; empty if it succeeded."""
 
     @property
     def sketch(self) -> Sketch:
-        """The team as it stands."""
+        """The present state of the team."""
         return self._history.now
 
     @property
     def folder(self) -> Path:
-        """Where runs and what else belongs to it are kept."""
+        """The folder with the team's runs and other files."""
         return self._store.path(self.id)
 
     @property
     def foreign(self) -> Path | None:
-        """The files of a team that was not drawn here, and cannot be edited by hand. None: it was."""
+        """The files of an imported team, which cannot be edited; None if the team was drawn here."""
         return self._store.foreign(self.id)
 
     @property
     def files(self) -> TeamFiles | None:
-        """What decides, of a team that was not drawn here. None: its sketch does."""
+        """The files that runs of an imported team use; None if the team was drawn here: runs use its sketch."""
         folder = self.foreign
         return None if folder is None else TeamFiles(folder, flies=self.facts.flies, maximised=self.facts.maximised)
 
     @cached_property
     def facts(self) -> Facts:
-        """What is known of a team that was not drawn here. Raises `ValueError` if its files are damaged."""
+        """The facts about an imported team. Raises `ValueError` if its files are damaged."""
         return self._store.facts(self.id)
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is something to undo."""
+        """Whether there is an edit to undo."""
         return bool(self._history.before)
 
     @property
     def can_redo(self) -> bool:
-        """Whether something was undone."""
+        """Whether there is an undone edit."""
         return bool(self._history.after)
 
     def edit(self, change: Callable[[Sketch], Sketch]) -> None:
-        """Change the sketch. Raises `EditError` if that cannot be; it stays as it was then."""
+        """Change the sketch. Raises `EditError` for an invalid change, and then leaves the sketch unchanged."""
         if self.removed:
             raise EditError("app.removed")
-        made = change(self.sketch)
-        if not is_sound(made):  # whoever asked for it: what is kept can be read again
+        changed = change(self.sketch)
+        if not is_sound(changed):  # a saved sketch must always be readable
             raise EditError("edit.unsound")
-        self._become(self._history.edited(made))
+        self._update(self._history.edited(changed))
 
     def undo(self) -> None:
-        """Take the last edit back."""
-        self._become(self._history.undone())
+        """Undo the last edit."""
+        self._update(self._history.undone())
 
     def redo(self) -> None:
-        """Make the edit that was undone last again."""
-        self._become(self._history.redone())
+        """Repeat the edit that was undone last."""
+        self._update(self._history.redone())
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` after each change; return what ends that."""
+        """Call `callback` after each change; return a function that removes it."""
         return self._listeners.add(callback)
 
     def save(self) -> None:
-        """Keep it on disk now. `unsaved` tells why, if that cannot be."""
-        self._write()  # what is to be saved a little later, or again, still is
+        """Save the team now. `unsaved` has the error if that fails."""
+        self._write()  # a scheduled saving remains scheduled
 
-    def forget(self) -> None:
-        """Keep nothing of it any more: it was removed."""
+    def mark_removed(self) -> None:
+        """Note that the team was removed, and save nothing any more."""
         if self._saving is not None:
             self._saving.cancel()
         with self._writing:
             self.removed = True
         self._listeners()
 
-    def _become(self, history: History) -> None:
+    def _update(self, history: History) -> None:
         if history is self._history or self.removed:
             return
         self._history = history
@@ -122,10 +122,10 @@ class Project(HasParts):
 
     def _save_in(self, seconds: float) -> None:
         if self._saving is None:
-            self._saving = asyncio.get_running_loop().call_later(seconds, self._save_beside)
+            self._saving = asyncio.get_running_loop().call_later(seconds, self._save_in_thread)
 
-    def _save_beside(self) -> None:
-        """Save in a thread: a disk may be slow, and nobody shall wait for it."""
+    def _save_in_thread(self) -> None:
+        """Save in a thread, so that a slow disk blocks no page."""
         self._saving = None
         was = self.unsaved
 
@@ -138,7 +138,7 @@ class Project(HasParts):
         asyncio.ensure_future(asyncio.get_running_loop().run_in_executor(None, self._write)).add_done_callback(done)
 
     def _write(self) -> None:
-        with self._writing:  # one at a time, each what stands then: the last one is the newest
+        with self._writing:  # one at a time, each with the present state: the last one is the newest
             if self.removed:
                 return
             try:
@@ -150,49 +150,49 @@ class Project(HasParts):
 
 
 class Projects:
-    """All teams of a store; those that are open are in memory once."""
+    """All teams of a store. An open team is in memory once."""
 
     def __init__(self, store: Store) -> None:
         self.store = store
         self._open: dict[str, Project] = {}
 
     def open(self, name: str) -> Project:
-        """Return the team of that id. Raises `KeyError` if there is none, `ValueError` if its file is damaged."""
+        """Return the team with this id. Raises `KeyError` if there is none, `ValueError` if its file is damaged."""
         if name not in self._open:
             self._open[name] = Project(self.store, name)
         return self._open[name]
 
     def add(self, sketch: Sketch) -> Project:
-        """Return a new team."""
+        """Add a new team, and return it."""
         return self.open(self.store.add(sketch))
 
     def remove(self, name: str) -> None:
-        """Remove a team, and all that was decided by it. All that it does at present is ended.
+        """Remove a team and its runs, and end its jobs.
 
         Raises:
-            KeyError: for what is no id.
-            OSError: if that cannot be. Nothing has changed then, but that nothing runs any more.
+            KeyError: if the id is not valid.
+            OSError: if the team cannot be removed. Then its jobs are ended, but nothing else has changed.
         """
         folder = self.store.path(name)
         ended = end_jobs_in(folder)
         self.store.put_away(name)
         project = self._open.pop(name, None)
         if project is not None:
-            project.forget()
-        Job(f"removal of {name}", partial(self._swept, name, ended)).start()
+            project.mark_removed()
+        Job(f"removal of {name}", partial(self._remove_files, name, ended)).start()
 
     def sweep(self) -> None:
-        """Remove, in a thread, what is left of teams whose removal was broken off."""
+        """Remove, in a thread, the remaining files of teams whose removal was interrupted."""
         Job("removal", lambda _: self.store.sweep()).start()
 
-    def _swept(self, name: str, ended: Sequence[Job[Any]], job: Job[None]) -> None:
-        """Remove the files once nobody writes them any more; a thread that was at work may have written some anew."""
+    def _remove_files(self, name: str, ended: Sequence[Job[Any]], job: Job[None]) -> None:
+        """Remove the files after the ended jobs, which may still write some."""
         job.wait_for(ended)
         self.store.remove(name)
 
     def save(self) -> None:
-        """Keep all that is open on disk. What cannot be kept is told in the terminal."""
+        """Save all open teams. Errors are printed in the terminal."""
         for project in [*self._open.values()]:
             project.save()
             if project.unsaved:
-                TOLD.error("%s", say("app.lost", name=project.sketch.name, why=project.unsaved))
+                USER_LOG.error("%s", say("app.lost", name=project.sketch.name, why=project.unsaved))

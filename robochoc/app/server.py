@@ -1,4 +1,4 @@
-"""The application's server: for browsers of this machine alone, under a path that cannot be guessed."""
+"""The application's server, for browsers on this machine only, under a path that cannot be guessed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastapi import FastAPI
 from nicegui import ui
 
 from robochoc.app.connections import BoundedConnection
-from robochoc.app.faults import keep_faults
+from robochoc.app.error_log import log_errors_to
 from robochoc.app.guard import Guard
 from robochoc.app.jobs.job import end_all
 from robochoc.app.pages import routes
@@ -30,12 +30,12 @@ from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.redirect import RedirectFile
 
 _RECONNECT_S = 30.0
-"""A browser that was away for so long finds its page as it was. After it, the page is made again: nothing is lost."""
+"""The time for which a disconnected browser finds its page unchanged; later the page is built again."""
 _LONGEST_END_S = 2.5
-"""Told to end, the server has ended after so long."""
+"""The time after a signal at which the process is forced to end."""
 _LONGEST_SAVE_S = 1.0
 _SIGNALLED = 128
-"""The exit status of a program that a signal has ended, less that signal's number: as shells say it."""
+"""The exit status of a program that a signal has ended is this plus the signal's number (the shells' convention)."""
 _ICON = Path(__file__).with_name("icon.svg")
 
 
@@ -45,17 +45,17 @@ def serve_app(
     """Serve the application until it is interrupted.
 
     Args:
-        folder: Where teams are kept.
-        port: The port; 0: any that is free.
-        open_browser: Whether the user's browser is to show it.
-        ready: Is called with the URL once it can be opened.
+        folder: The folder of the teams.
+        port: The port; 0: any free port.
+        open_browser: Whether to open the user's browser.
+        ready: Called with the URL when it can be opened.
 
     Raises:
-        OSError: if the port is taken, or the folder, by another `robochoc app`.
+        OSError: if the port is in use, or the folder is in use by another `robochoc app`.
     """
     store = Store(folder)
-    with store.held(), loopback_socket(port) as here:
-        keep_faults(folder)
+    with store.locked(), loopback_socket(port) as here:
+        log_errors_to(folder)
         secret = secret_path()
         url = url_of(here, f"{secret}/")
         outside = FastAPI(openapi_url=None)
@@ -86,7 +86,7 @@ def serve_app(
 
 
 class _Server(uvicorn.Server):
-    """Calls `ready` once browsers can ask. Told to end, it ends in time, whatever else is at work."""
+    """A server that calls `ready` when it accepts requests, and ends in time after a signal."""
 
     ready: Callable[[], None]
     redirect: RedirectFile | None = None
@@ -96,23 +96,23 @@ class _Server(uvicorn.Server):
         self._projects = projects
 
     async def startup(self, sockets: list[socket] | None = None) -> None:
-        """Start, and say so."""
+        """Start, and call `ready`."""
         await super().startup(sockets)
         self.ready()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Begin to end."""
+        """Start the shutdown."""
         super().handle_exit(sig, frame)
         status = 0 if sig == signal.SIGINT else _SIGNALLED + sig
         threading.Thread(target=self._end_in_time, args=(status,), daemon=True).start()
 
     def _end_in_time(self, status: int) -> None:
-        """End this process if it has not ended by then: somebody computes, and cannot be interrupted."""
+        """End this process after the time limit, if a computation cannot be interrupted."""
         time.sleep(_LONGEST_END_S)
         end_all(0)
         saving = threading.Thread(target=self._projects.save, daemon=True)
         saving.start()
-        saving.join(_LONGEST_SAVE_S)  # a disk may not answer at all
+        saving.join(_LONGEST_SAVE_S)  # a disk may not respond
         if self.redirect:
             self.redirect.close()
         os._exit(status)

@@ -1,11 +1,11 @@
-"""Teams on disk: every one is a folder with its sketch, and is saved by itself, all of it or nothing.
+"""Teams on disk: each is a folder with its sketch, and is saved atomically.
 
-FOLDER/ID/history.json    the sketch, and what can be undone
-FOLDER/ID/team/           the files of a team that was not drawn here; foreign.json: what is known of it
-FOLDER/ID/runs/           what was decided and flown
+FOLDER/ID/history.json    the sketch, with undo and redo steps
+FOLDER/ID/team/           the files of an imported team; foreign.json: the facts about it
+FOLDER/ID/runs/           runs and flights
 FOLDER/.removed-...       a team that is being removed
 FOLDER/.new-...           a team that is being written
-FOLDER/.lock              held by the one application that has the folder open
+FOLDER/.lock              locked by the application that has opened the folder
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from robochoc.formats import InvalidInputError, read_team
 
 _HISTORY = "history.json"
 FILES = "team"
-"""The folder of the files of a team that was not drawn here."""
+"""The folder with the files of an imported team."""
 _FACTS = "foreign.json"
 _LOCK = ".lock"
 _REMOVED = ".removed-"
 _NEW = ".new-"
 _ID_BYTES = 6
 MAX_BYTES = 64 << 20
-"""A larger file is none of ours. What would be larger is kept with fewer steps that can be undone."""
+"""Larger files are rejected. A history that would be larger is saved with fewer undo steps."""
 
 
 class InUseError(OSError):
-    """Another application has the folder open."""
+    """Another application has opened the folder."""
 
 
 class _Now(msgspec.Struct):
@@ -55,27 +55,27 @@ _Read = TypeVar("_Read", History, _Now)
 
 
 class Store:
-    """The teams in `folder`, which is made if it is not there."""
+    """The teams in `folder`, which is created if it does not exist."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder = folder.absolute()  # processes of jobs run in folders of their own
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
     @contextmanager
-    def held(self) -> Iterator[None]:
-        """Keep other applications out: two that both save what they have in memory would undo each other's edits.
+    def locked(self) -> Iterator[None]:
+        """Lock the folder: two applications would overwrite each other's edits.
 
-        The lock is the kernel's: it ends with the process, however that ends.
+        The lock is the kernel's: it ends with the process.
 
         Raises:
-            InUseError: if another one has it.
+            InUseError: if another application has locked the folder.
         """
         lock = os.open(self.folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                why = "use its page, or end it, or say another folder with --folder"
+                why = "use its page, or end it, or name another folder with --folder"
                 raise InUseError(f"{self.folder} is open in another 'robochoc app': {why}") from None
             self._sweep(_NEW)
             yield
@@ -83,16 +83,16 @@ class Store:
             os.close(lock)
 
     def ids(self) -> list[str]:
-        """Return the teams, the one that was changed last first."""
+        """Return the ids of the teams, the last changed one first."""
         found: list[tuple[int, str]] = []
         for file in self.folder.glob(f"*/{_HISTORY}"):
-            with suppress(OSError, KeyError):  # it is being removed, or its folder is none of ours
+            with suppress(OSError, KeyError):  # the team is being removed, or the folder is not a team's
                 self.path(file.parent.name)
                 found.append((file.stat().st_mtime_ns, file.parent.name))
         return [name for _, name in sorted(found, reverse=True)]
 
     def add(self, sketch: Sketch) -> str:
-        """Keep a sketch as a new team; return its id."""
+        """Save a sketch as a new team; return its id."""
         with self._new_team() as (name, folder):
             _write(folder / _HISTORY, History(sketch))
         return name
@@ -113,12 +113,12 @@ class Store:
             raise
 
     def foreign(self, name: str) -> Path | None:
-        """Return the files of a team that was not drawn here; None: it was. Raises `KeyError` for what is no id."""
+        """Return the files of an imported team; None if it was drawn here. Raises `KeyError` for an invalid id."""
         files = self.path(name) / FILES
         return files if files.is_dir() else None
 
     def add_foreign(self, team: ForeignTeam) -> str:
-        """Keep a team that was not drawn here; return its id."""
+        """Save an imported team; return its id."""
         facts = facts_of(team.team, files=team.changed, notes=team.notes, origin=team.path.name)
         with self._new_team() as (name, folder):
             _write(folder / _HISTORY, History(drawn(team)))
@@ -127,17 +127,17 @@ class Store:
         return name
 
     def facts(self, name: str) -> Facts:
-        """Return what is known of a team that was not drawn here.
+        """Return the facts about an imported team.
 
         Raises:
-            KeyError: for what is no id.
+            KeyError: if the id is not valid.
             ValueError: if its files are damaged.
         """
         file = self.path(name) / _FACTS
         try:
             if file.stat().st_size <= MAX_BYTES:
                 return msgspec.json.decode(file.read_bytes(), type=Facts)
-        except (OSError, msgspec.DecodeError, RecursionError):  # it was kept before there were facts, say
+        except (OSError, msgspec.DecodeError, RecursionError):  # for example, the team was saved by an earlier version
             pass
         try:
             facts = facts_of(read_team(self.path(name) / FILES))
@@ -148,10 +148,10 @@ class Store:
         return facts
 
     def load(self, name: str) -> History:
-        """Return a team. Steps that are beyond all bounds, which no edit makes, cannot be undone.
+        """Return a team. Undo steps beyond the bounds of edits are dropped.
 
         Raises:
-            KeyError: if there is none of that id.
+            KeyError: if there is no team with this id.
             ValueError: if its file is damaged.
         """
         history = self._read(name, History)
@@ -160,7 +160,7 @@ class Store:
         return History(history.now)
 
     def now(self, name: str) -> Sketch:
-        """Return a team without what can be undone, which is faster. Raises what `load` raises."""
+        """Return a team without its undo steps, which is faster. Raises as `load`."""
         return self._read(name, _Now).now
 
     def _read(self, name: str, kind: type[_Read]) -> _Read:
@@ -169,35 +169,35 @@ class Store:
             raise KeyError(name)
         try:
             if file.stat().st_size > MAX_BYTES:
-                raise ValueError(f"{file}: it is too large")
+                raise ValueError(f"{file}: the file has more than {MAX_BYTES:,} bytes")
             read = msgspec.json.decode(file.read_bytes(), type=kind)
         except (msgspec.DecodeError, RecursionError, OSError) as damaged:
             raise ValueError(f"{file}: {damaged}") from None
         if not is_sound(read.now):
-            raise ValueError(f"{file}: it is beyond all bounds")
+            raise ValueError(f"{file}: the sketch exceeds the limits of the application")
         return read
 
     def save(self, name: str, history: History) -> None:
-        """Keep a team as it stands now."""
+        """Save the present state of a team."""
         _write(self.path(name) / _HISTORY, history)
 
     def remove(self, name: str) -> None:
-        """Remove a team, and all that was decided by it. Raises `KeyError` for what is no id."""
+        """Remove a team and its runs. Raises `KeyError` for an invalid id."""
         self.put_away(name)
         self.sweep()
 
     def put_away(self, name: str) -> None:
-        """Remove a team at once: its files, which may be many, are gone after `sweep`.
+        """Remove a team at once; its files, which may be many, are deleted by `sweep`.
 
         Raises:
-            KeyError: for what is no id.
-            OSError: if that cannot be.
+            KeyError: if the id is not valid.
+            OSError: if the team cannot be removed.
         """
         with suppress(FileNotFoundError):
             self.path(name).rename(self.folder / f"{_REMOVED}{name}-{secrets.token_hex(_ID_BYTES)}")
 
     def sweep(self) -> None:
-        """Remove what is left of teams that were removed. What cannot be removed is left for the next time."""
+        """Delete the files of removed teams. Files that cannot be deleted are tried again next time."""
         self._sweep(_REMOVED)
 
     def _sweep(self, prefix: str) -> None:
@@ -205,7 +205,7 @@ class Store:
             shutil.rmtree(left, ignore_errors=True)
 
     def path(self, name: str) -> Path:
-        """Return a team's folder. Raises `KeyError` for what is no id."""
+        """Return a team's folder. Raises `KeyError` for an invalid id."""
         if not (name.isascii() and name.isalnum() and len(name) == 2 * _ID_BYTES):
             raise KeyError(name)
         return self.folder / name
@@ -226,7 +226,7 @@ def _write(file: Path, history: History) -> None:
 
 
 def _within_bounds(history: History) -> bytes:
-    """Return a history as its file has it, without its oldest steps where it would be too large."""
+    """Return the JSON of a history, without its oldest steps if it would be too large."""
     while len(content := msgspec.json.encode(history)) > MAX_BYTES and (history.before or history.after):
         before, after = history.before, history.after
         history = History(history.now, before[(len(before) + 1) // 2 :], after[(len(after) + 1) // 2 :])

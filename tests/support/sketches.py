@@ -7,7 +7,7 @@ from random import Random
 
 import msgspec
 
-from robochoc.app.sketch.palette import Form, Links, Opening
+from robochoc.app.sketch.palette import Form, Links, RuleField
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import (
     NUMBERED,
@@ -78,7 +78,7 @@ def _rule(random: Random, sketch: Sketch, name: str, kinds: list[str]) -> Sketch
     return SketchRule(name, entry.key, decision.name, robots, settings, cost, private, random.random() > 0.1)
 
 
-def _setting(random: Random, opening: Opening, values: tuple[int | str, ...]) -> Setting:
+def _setting(random: Random, opening: RuleField, values: tuple[int | str, ...]) -> Setting:
     match opening.form:
         case Form.NUMBER:
             return random.randint(opening.least, opening.least + 3)

@@ -13,7 +13,7 @@ from robochoc.app.conflicts.rules import minimal
 from robochoc.app.conflicts.time_left import OutOfTimeError, can_hold
 from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.app.foreign.sentences import sentence
-from robochoc.app.log import noted
+from robochoc.app.log import log_error
 from robochoc.app.texts import say
 from robochoc.formats import read_team
 from robochoc.model.change import team_after_events
@@ -44,7 +44,7 @@ def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool
         except (ImportError, UntranslatedError):
             pass
         except Exception as fault:  # noqa: BLE001 - kept; numbers that are too large for its solver, say
-            noted(fault, "a conflict by CPMpy")
+            log_error(fault, "a conflict by CPMpy")
     try:
         return told(minimal(forbidding, lambda some: can_hold(with_only(team, {*map(int, some)}), until)), Finder.OWN)
     except OutOfTimeError:

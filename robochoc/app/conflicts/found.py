@@ -12,7 +12,7 @@ import msgspec
 
 from robochoc.app.jobs.job import EndedError, Job, LateError
 from robochoc.app.jobs.process import Command
-from robochoc.app.log import words
+from robochoc.app.log import error_text
 from robochoc.app.sketch.sketch import Sketch
 
 PATIENCE_S = 30.0
@@ -108,4 +108,4 @@ def _told(result: Callable[[], Conflict]) -> Conflict | None:
     except EndedError:
         return None
     except Exception as fault:  # noqa: BLE001 - the file of errors has it already
-        return Conflict(None, why=words(fault))
+        return Conflict(None, why=error_text(fault))

@@ -18,7 +18,7 @@ from robochoc.app.conflicts.files import found_in_files
 from robochoc.app.conflicts.found import Conflict, Finder
 from robochoc.app.conflicts.rules import candidates, minimal, with_only
 from robochoc.app.conflicts.time_left import OutOfTimeError, can_hold
-from robochoc.app.log import noted
+from robochoc.app.log import log_error
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.system.orphans import signal_when_orphaned
@@ -44,7 +44,7 @@ def found_in(sketch: Sketch, seconds: float, *, use_cpmpy: bool = True) -> Confl
         except (ImportError, UntranslatedError):
             pass
         except Exception as fault:  # noqa: BLE001 - kept; numbers that are too large for its solver, say
-            noted(fault, "a conflict by CPMpy")
+            log_error(fault, "a conflict by CPMpy")
     until = time.monotonic() + seconds
     try:
         return Conflict(

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from robochoc.app.flights.ground import happened_in
+from robochoc.app.flights.flight_map import happened_in
 from robochoc.app.foreign.facts import events_in_words
 from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.run import MAX_RESULT, Run

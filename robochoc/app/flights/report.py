@@ -19,14 +19,14 @@ from typing import Any
 import msgspec
 
 from robochoc.app.flights.answer import broken
-from robochoc.app.flights.checking import claimed
-from robochoc.app.flights.flown import flight_words, flown_of
-from robochoc.app.flights.ground import changed_to, happened_in
-from robochoc.app.flights.making import flies
-from robochoc.app.flights.who import who_flies
+from robochoc.app.flights.answer_check import claim_words
+from robochoc.app.flights.builder import flies
+from robochoc.app.flights.flight_map import changed_to, happened_in
+from robochoc.app.flights.flight_result import flight_result_of, flight_words
+from robochoc.app.flights.flying_robots import flying_robots_words
 from robochoc.app.runs.options import RESULT
-from robochoc.app.runs.paid import Decided, costly, price, values_in
 from robochoc.app.runs.result import robots_in
+from robochoc.app.runs.rule_costs import Decided, rule_cost, rules_with_costs, values_by_robot
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
@@ -98,20 +98,20 @@ def summary(sketch: Sketch, run: Run) -> str:
     worth = run.record.maximised
     verdict = "most" if worth and verdict == "optimal" else verdict
     words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
-    if result.withdrawn and not who_flies(run):  # which tells it, too
+    if result.withdrawn and not flying_robots_words(run):  # which tells it, too
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))
     if result.cost:
         words.append(say("report.worth" if worth else "report.cost", cost=cost_shown(result.cost)))
-    return claimed(run, " ".join(words))
+    return claim_words(run, " ".join(words))
 
 
 def _story(run: Run) -> list[str]:
     """Return what happened to the team, who flies, and what went wrong on the way."""
     happened = happened_in(run)
-    flown = flown_of(run)
+    flown = flight_result_of(run)
     return [
         *([say("fly.happened-first", what=" ".join(happened))] if happened else []),
-        *who_flies(run),
+        *flying_robots_words(run),
         *([say("fly.unsolved")] if run.result and run.result.ends_unsolved and flies(run) else []),
         *(flight_words(flown) if flown else []),
     ]
@@ -122,7 +122,7 @@ _VERDICTS = frozenset({"solution", "optimal", "most", "fewest", "no-solution", "
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
     """Return what robots have decided, by robot and decision."""
-    return values_in(sketch, run.result.assignment) if run.result else {}
+    return values_by_robot(sketch, run.result.assignment) if run.result else {}
 
 
 def _answer(sketch: Sketch, run: Run) -> str:
@@ -166,8 +166,8 @@ def _rules(sketch: Sketch, run: Run) -> str:
 
 def _by_degrees(sketch: Sketch, values: Decided) -> dict[str, int]:
     """Return what rules cost that are never broken, but cost more or less: by their ids."""
-    graded = (rule for rule in costly(sketch) if values and PALETTE[rule.kind].graded)
-    return {rule.id: price(sketch, rule, values) for rule in graded}
+    graded = (rule for rule in rules_with_costs(sketch) if values and PALETTE[rule.kind].graded)
+    return {rule.id: rule_cost(sketch, rule, values) for rule in graded}
 
 
 def _team(sketch: Sketch) -> str:

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import msgspec
 
-from robochoc.app.flights.checking import check
-from robochoc.app.flights.ground import Change
-from robochoc.app.flights.names import file_name
+from robochoc.app.flights.answer_check import check
+from robochoc.app.flights.file_names import file_name
+from robochoc.app.flights.flight_map import Change
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import CHANGE, MAX_RESULT, RECORD, SKETCH, Record, Run
 from robochoc.app.sketch import opening

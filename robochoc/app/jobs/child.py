@@ -1,6 +1,6 @@
 """The process of a job: `python -m robochoc.app.jobs.child PARENT MODULE ...` is `python -m MODULE ...`.
 
-It ends with the server whose process is PARENT, however that ends: the kernel tells it.
+It ends with the server process PARENT, by a signal of the kernel.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from robochoc.system.orphans import signal_when_orphaned
 
 
 def main() -> None:
-    """Run the module, as long as there is somebody to read what comes of it."""
+    """Run the module, unless the parent process has already ended."""
     parent, module = int(sys.argv.pop(1)), sys.argv.pop(1)
     signal_when_orphaned(signal.SIGTERM)
-    if os.getppid() != parent:  # it has died before the kernel knew whom to tell
+    if os.getppid() != parent:  # the parent has ended before the signal was requested
         return
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 

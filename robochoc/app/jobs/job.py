@@ -1,4 +1,4 @@
-"""A job: work in a thread of its own, with the processes that it starts one after the other."""
+"""A job: work in a thread, with the processes that it starts one after the other."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 from robochoc.app.jobs.process import Command, Finished, GroupProcess
-from robochoc.app.log import noted
+from robochoc.app.log import log_error
 
 LOOK_S = 0.2
-"""Whoever watches a process is asked so often to look how far it is."""
+"""The interval of the callback that observes a process."""
 _PAUSES_S = (0.001, 0.05)
-"""The first and the longest pause between two looks whether a process has ended."""
+"""The first and the longest pause between two checks whether a process has ended."""
 _JOIN_S = 0.1
-"""A job that waits for others looks so often whether it was ended itself."""
+"""The interval at which a job that waits for others checks whether it was ended."""
 END_S = 1.5
-"""Jobs that are ended together have so long to say how they ended. Their processes are killed at once."""
+"""The time limit for jobs that are ended together. Their processes are killed at once."""
 AT_ONCE = ((0.0, signal.SIGKILL),)
-"""How a job stops that has nothing to tell: it is killed."""
+"""The signals that stop a job without a result: its process is killed."""
 
 T = TypeVar("T")
 Call = Callable[[Callable[[], None]], object]
-"""Calls something, perhaps later and in another thread."""
+"""Calls a function, perhaps later and in another thread."""
 Over = Callable[[str], object]
-"""Is told once, in the job's thread, that it did not come to its end, and why; empty: somebody has ended it."""
+"""Called once, in the job's thread, if the job did not complete: with the error, or empty if the job was ended."""
 
 
 class EndedError(Exception):
@@ -38,35 +38,35 @@ class EndedError(Exception):
 
 
 class LateError(Exception):
-    """A process has taken too long, and was ended."""
+    """A process has reached its time limit, and was ended."""
 
 
-def call_here() -> Call:
-    """Return what calls something in the event loop that runs here. Without one: at once, in whatever thread."""
+def event_loop_caller() -> Call:
+    """Return a function that schedules calls in the current event loop. Without a loop, it calls immediately."""
     try:
         loop = asyncio.get_running_loop()
     except RuntimeError:
         return lambda does: does()
 
     def call(does: Callable[[], None]) -> None:
-        with suppress(RuntimeError):  # the loop is closed: nobody listens any more
+        with suppress(RuntimeError):  # the loop is closed
             loop.call_soon_threadsafe(does)
 
     return call
 
 
 class Job(Generic[T]):
-    """Work that is carried out in a thread. `work` gets the job, by which it starts processes.
+    """Work in a thread. The argument of `work` is the job, which can start processes.
 
-    Whatever goes wrong in it, it comes to an end: `future` then has the exception, `over` is told, and what was
-    unforeseen stands in the file of errors.
+    The job always ends: after an error, `future` has the exception, `over` is called, and unforeseen errors are written
+    to the error log.
 
     Args:
-        name: What the job is, for the file of errors.
+        name: A description of the job, for the error log.
         work: The work.
-        over: Is told if the work did not come to its end.
-        folder: The folder that the job writes to, or is about, if there is one: see `end_jobs_in`.
-        stopping: The signals that its process gets when it is to stop, each with the seconds after which it is sent.
+        over: Called if the work was not completed.
+        folder: The folder that the job uses, if any: see `end_jobs_in`.
+        stopping: The signals that stop its process, each with the seconds after which it is sent.
     """
 
     def __init__(
@@ -83,28 +83,28 @@ class Job(Generic[T]):
         self.over = over
         self._does, self._stopping = work, stopping
         self._lock = threading.Lock()
-        self._is_told = False
+        self._is_reported = False
         self._news = threading.Event()
         self._process: GroupProcess | None = None
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self.stopped_at: float | None = None
-        """When somebody has asked it to stop, on the monotonic clock."""
+        """The time of the request to stop, on the monotonic clock."""
         self.is_ended = False
-        """Whether somebody has ended it."""
+        """Whether the job was ended."""
 
     @property
     def pid(self) -> int | None:
-        """The process that runs at present, the first of its group."""
+        """The id of the present process, which is also its group."""
         process = self._process
         return process.pid if process else None
 
     @property
     def is_alive(self) -> bool:
-        """Whether its thread is at work."""
+        """Whether the job's thread is running."""
         return self._thread.is_alive()
 
     def start(self) -> Self:
-        """Begin."""
+        """Start the thread."""
         self.future.set_running_or_notify_cancel()
         with _LOCK:
             _ALIVE.add(self)
@@ -112,17 +112,17 @@ class Job(Generic[T]):
             self._thread.start()
         except RuntimeError as no_thread:
             self._fail(no_thread)
-            self._forget()
+            self._unregister()
         return self
 
     def stop(self) -> None:
-        """Ask it to stop, in the way that it has. Returns at once."""
+        """Request a stop by the `stopping` signals. Returns immediately."""
         if self.stopped_at is None:
             self.stopped_at = time.monotonic()
         self._news.set()
 
     def end(self) -> None:
-        """End it now: its process is killed, and it starts no other one. Returns at once."""
+        """End the job: kill its process, and start no others. Returns immediately."""
         self.is_ended = True
         with self._lock:
             process = self._process
@@ -131,23 +131,23 @@ class Job(Generic[T]):
         self._news.set()
 
     def give_up(self) -> None:
-        """Say that it has ended, though its thread still computes."""
-        self._tell("")
+        """Report the end of the job, although its thread is still running."""
+        self._report("")
 
     def join(self, within_s: float | None = None) -> bool:
-        """Wait until its thread has ended; return whether it has."""
+        """Wait for the end of the thread; return whether it has ended."""
         if self._thread.ident is not None:
             self._thread.join(within_s)
         return not self.is_alive
 
     def wait_for(self, others: Iterable[Job[Any]]) -> None:
-        """Wait, in this job, until others have ended. Raises `EndedError` if somebody ends it meanwhile."""
+        """Wait, in this job's thread, for the end of others. Raises `EndedError` if this job is ended meanwhile."""
         for other in others:
             while not other.join(_JOIN_S):
                 self.check()
 
     def check(self) -> None:
-        """Raise `EndedError` if somebody has ended it."""
+        """Raise `EndedError` if the job was ended."""
         if self.is_ended:
             raise EndedError
 
@@ -158,13 +158,13 @@ class Job(Generic[T]):
 
         Args:
             command: The process.
-            look: Is called again and again meanwhile.
-            within_s: The process is ended after so long.
+            look: Called repeatedly while the process runs.
+            within_s: The time limit of the process.
 
         Raises:
-            EndedError: if somebody has ended the job.
-            LateError: if the process has taken too long.
-            OSError: if it cannot be started.
+            EndedError: if the job was ended.
+            LateError: if the process has reached its time limit.
+            OSError: if the process cannot be started.
         """
         with self._lock:
             self.check()
@@ -181,20 +181,20 @@ class Job(Generic[T]):
         return finished
 
     def _watch(self, process: GroupProcess, look: Callable[[], object] | None, within_s: float | None) -> bool:
-        """Watch a process until it has ended; return whether it was too late."""
+        """Watch a process until its end; return whether it has reached its time limit."""
         began = looked = time.monotonic()
-        said = 0
+        sent = 0
         pause_s, longest_s = _PAUSES_S
         while not process.has_ended and not self.is_ended:
             now = time.monotonic()
             if within_s is not None and now - began > within_s:
                 return True
-            while self.stopped_at is not None and said < len(self._stopping):
-                after_s, number = self._stopping[said]
+            while self.stopped_at is not None and sent < len(self._stopping):
+                after_s, number = self._stopping[sent]
                 if now - self.stopped_at < after_s:
                     break
                 process.kill() if number == signal.SIGKILL else process.signal(number)
-                said += 1
+                sent += 1
             if look and now - looked >= LOOK_S:
                 look()
                 looked = now
@@ -208,29 +208,29 @@ class Job(Generic[T]):
             self.check()
             result = self._does(self)
         except EndedError as ended:
-            self._tell("")
+            self._report("")
             self.future.set_exception(ended)
-        except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
+        except Exception as fault:  # noqa: BLE001 - reported, and written to the error log
             self._fail(fault)
         else:
             self.future.set_result(result)
         finally:
-            self._forget()
+            self._unregister()
 
     def _fail(self, fault: Exception) -> None:
-        self._tell(noted(fault, self.name))
+        self._report(log_error(fault, self.name))
         self.future.set_exception(fault)
 
-    def _tell(self, why: str) -> None:
+    def _report(self, why: str) -> None:
         with self._lock:
-            was_told, self._is_told = self._is_told, True
-        if self.over and not was_told:
+            was_reported, self._is_reported = self._is_reported, True
+        if self.over and not was_reported:
             try:
                 self.over(why)
-            except Exception as fault:  # noqa: BLE001 - the job comes to its end all the same
-                noted(fault, self.name)
+            except Exception as fault:  # noqa: BLE001 - the job must end nevertheless
+                log_error(fault, self.name)
 
-    def _forget(self) -> None:
+    def _unregister(self) -> None:
         with _LOCK:
             _ALIVE.discard(self)
 
@@ -240,18 +240,18 @@ _ALIVE: set[Job[Any]] = set()
 
 
 def jobs_alive() -> list[Job[Any]]:
-    """Return all jobs that have begun and have not ended."""
+    """Return all running jobs."""
     with _LOCK:
         return [*_ALIVE]
 
 
 def end_all(within_s: float = END_S) -> None:
-    """End all jobs: the server ends. It returns in time, whatever they do; threads end with the process."""
+    """End all jobs within a time limit, since the server is shutting down; threads end with the process."""
     _end(jobs_alive(), within_s)
 
 
 def end_jobs_in(folder: Path) -> list[Job[Any]]:
-    """End the jobs that are about a folder, or about one in it. Returns at once; return them."""
+    """End the jobs of a folder and its subfolders; return them without waiting for their end."""
     found = [job for job in jobs_alive() if job.folder and (job.folder == folder or folder in job.folder.parents)]
     for job in found:
         job.end()

@@ -1,4 +1,4 @@
-"""One process of a job: it is started as the first of a group, and ended with all of that group."""
+"""One process of a job, which leads a process group and is ended with that group."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from robochoc.system.temporary_files import unnamed_file
 
 ROBOCHOC = "robochoc"
 MAX_OUT = 64 << 20
-"""What a process writes beyond is not read."""
+"""The maximum number of bytes that are read of a process's output."""
 MAX_ERRORS = 8_000
 _REAPED_S = 5.0
-"""A process that was killed is gone by then, unless the kernel keeps it: then it is left to the kernel."""
+"""The longest wait for the end of a killed process, in seconds."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A process that is to be started.
+    """A process to start.
 
     Attributes:
         arguments: The arguments of `module`.
-        folder: Its current folder. None: this process's.
+        folder: Its working directory. None: that of this process.
         module: The module that it runs.
-        given: What it reads.
-        out: The file that it writes. None: `Finished.out` has what it wrote.
-        errors: The file with what it has to say besides. None: none is kept.
-        can_be_asked: Whether it is asked to stop by the signal `STOP`, which it is not to die of until it listens.
+        given: Its standard input.
+        out: The file of its standard output. None: the output is in `Finished.out`.
+        errors: The file of its standard error. None: no file.
+        can_be_asked: Whether the signal `STOP` requests its stop; the signal is blocked until the process handles it.
     """
 
     arguments: tuple[str, ...]
@@ -48,7 +48,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Finished:
-    """How a process has ended. `status`: its exit status; negative: the signal that has ended it."""
+    """The result of a process. `status` is its exit status, or minus the number of the signal that ended it."""
 
     status: int
     out: bytes
@@ -56,19 +56,19 @@ class Finished:
 
     @property
     def why(self) -> str:
-        """The end of what it has said, or else how it has ended."""
+        """The end of its standard error, or else its exit status."""
         if self.errors:
             return self.errors
         return f"exit status {self.status}" if self.status >= 0 else signal.Signals(-self.status).name
 
 
 class GroupProcess:
-    """A process, and all that it starts and that stays in its group.
+    """A process with its process group.
 
-    It must be started by the thread that waits for it: on Linux it is ended with that thread.
+    The thread that starts the process must wait for it: on Linux the process ends with that thread.
 
     Raises:
-        OSError: if it cannot be started.
+        OSError: if the process cannot be started.
     """
 
     def __init__(self, command: Command) -> None:
@@ -88,34 +88,34 @@ class GroupProcess:
 
     @property
     def pid(self) -> int:
-        """Its number, which is that of its group."""
+        """The process id, which is also the id of its group."""
         return self._process.pid
 
     @property
     def has_ended(self) -> bool:
-        """Whether it has come to an end. Its number is not given to another one before `finish`."""
+        """Whether the process has ended. Its id is not reused before `finish`."""
         try:
             return os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
         except ChildProcessError:
             return True
 
     def signal(self, number: int) -> None:
-        """Send it a signal."""
+        """Send a signal to the process."""
         with self._lock, suppress(ProcessLookupError):
             if not self._is_over:
                 os.kill(self.pid, number)
 
     def kill(self) -> None:
-        """End it, and whatever is left of its group."""
+        """Kill the process group."""
         with self._lock, suppress(ProcessLookupError, PermissionError):
             if not self._is_over:
                 os.killpg(self.pid, signal.SIGKILL)
 
     def finish(self) -> Finished:
-        """End whatever is left, and return how it has ended."""
+        """Kill the process group, and return the result."""
         self.kill()
         with self._lock:
-            self._is_over = True  # from now on the number may be another one's
+            self._is_over = True  # from now on the id may be reused
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(_REAPED_S)
         with self._files:
@@ -133,7 +133,7 @@ def _read(file: IO[bytes], begin: int, most: int) -> bytes:
 
 def _started(command: Command, given: IO[bytes] | None, out: IO[bytes], errors: IO[bytes]) -> subprocess.Popen[bytes]:
     held = {STOP} if command.can_be_asked else set()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, held)  # it holds it until it knows what it means
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, held)  # blocked until the process handles it
     try:
         return subprocess.Popen(  # noqa: S603 - our own module
             [

@@ -1,1 +1,1 @@
-"""The pages of the application, made with NiceGUI."""
+"""The pages of the application, built with NiceGUI."""

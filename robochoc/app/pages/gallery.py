@@ -8,10 +8,10 @@ from functools import partial
 
 from nicegui import ui
 
-from robochoc.app.pages.opening import build_opening
-from robochoc.app.pages.pictures import thumbnail
+from robochoc.app.pages.upload_card import build_upload_card
 from robochoc.app.projects import Projects
 from robochoc.app.sketch.examples import examples, shows, title_of
+from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 
@@ -26,7 +26,7 @@ def build_gallery(projects: Projects) -> None:
         ui.label(say("gallery.intro")).classes("soft")
     with ui.element("ul").classes("cards"):
         _card(say("gallery.new"), say("gallery.new-hint"), lambda: _begin(projects, Sketch()), icon="add")
-        build_opening(projects, open_team)
+        build_upload_card(projects, open_team)
         _card(say("lesson.title"), say("lesson.title-hint"), lambda: ui.navigate.to("/lessons"), icon="school")
     _heading("gallery.examples")
     with ui.element("ul").classes("cards"):
@@ -76,13 +76,13 @@ def _own_card(projects: Projects, name: str) -> None:
     with _card(title, says, partial(open_team, name), sketch=sketch):
         button = ui.button(icon="close", on_click=partial(_ask_to_remove, projects, name, title)).classes("remove")
         button.props("flat round dense size=sm")
-        button.props["aria-label"] = say("gallery.remove", name=title)  # `props` would parse what the name has in it
+        button.props["aria-label"] = say("gallery.remove", name=title)  # `props` would parse the name
 
 
 def _ask_to_remove(projects: Projects, name: str, title: str) -> None:
     def remove() -> None:
         dialog.close()
-        with suppress(KeyError):  # it is gone already
+        with suppress(KeyError):  # already removed
             projects.remove(name)
         _own.refresh()
 
@@ -94,7 +94,7 @@ def _ask_to_remove(projects: Projects, name: str, title: str) -> None:
 
 
 def counted(robots: int) -> str:
-    """Return how many robots there are, in words."""
+    """Return the number of robots in words."""
     return say("gallery.robot") if robots == 1 else say("gallery.robots", count=robots)
 
 
@@ -109,7 +109,7 @@ def _card(
     item = ui.element("li").classes("item")
     with item, ui.element("button").classes("card").props("type=button").on("click", does):
         if sketch is not None:
-            thumbnail(sketch)
+            _thumbnail(sketch)
         elif icon:
             with ui.element("span").classes("picture").props("aria-hidden=true"):
                 ui.icon(icon, size="2.5rem")
@@ -119,3 +119,8 @@ def _card(
         if note:
             ui.label(note).classes("small")
     return item
+
+
+def _thumbnail(sketch: Sketch) -> None:
+    with ui.element("span").classes("picture").props("aria-hidden=true"):
+        ui.html(picture(sketch), sanitize=False).classes("drawn")  # texts in the picture are escaped

@@ -1,18 +1,18 @@
-"""Numbers of fields. A browser sends what it likes: also no number, or one that is no integer."""
+"""Numbers in fields, which are checked since a browser can send any value."""
 
 from __future__ import annotations
 
 from math import isfinite
 
 
-def whole(value: object, least: int, most: int, otherwise: int) -> int:
+def bounded_integer(value: object, least: int, most: int, otherwise: int) -> int:
     """Return the integer in a field, within bounds.
 
     Args:
-        value: What is in the field.
-        least: The least that it can be.
-        most: The most.
-        otherwise: What it is taken for if it is no number.
+        value: The value of the field.
+        least: The minimum.
+        most: The maximum.
+        otherwise: The result for a value that is not a number.
     """
     if not isinstance(value, (int, float)) or not isfinite(value):
         return otherwise

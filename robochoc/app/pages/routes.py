@@ -1,4 +1,4 @@
-"""Which page is where."""
+"""The addresses of all pages."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from nicegui import app, ui
 
 from robochoc.app.jobs.job import end_all
 from robochoc.app.lessons.progress import Progress
-from robochoc.app.log import words
+from robochoc.app.log import error_text
 from robochoc.app.pages.compare.page import build_compare
 from robochoc.app.pages.compare.served import install_reports
 from robochoc.app.pages.decide.page import build_decide
-from robochoc.app.pages.fly.kept import install_kept
 from robochoc.app.pages.fly.page import build_fly
+from robochoc.app.pages.fly.saved_files import install_saved_files
 from robochoc.app.pages.foreign.model import build_foreign_model
 from robochoc.app.pages.foreign.whatif import build_foreign_whatif
 from robochoc.app.pages.gallery import build_gallery
@@ -33,13 +33,13 @@ _BUILD: dict[str, Callable[[Project], None]] = {
     "compare": build_compare,
 }
 _BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_foreign_model, "whatif": build_foreign_whatif}
-"""Pages of teams that were not drawn here, where they are others."""
+"""Pages of imported teams that differ from the others."""
 
 
 def install(projects: Projects) -> None:
     """Install all pages."""
     app.on_shutdown(projects.save)
-    install_kept(projects)
+    install_saved_files(projects)
     app.on_shutdown(_end_jobs)
     install_reports(projects)
 
@@ -79,7 +79,7 @@ def install(projects: Projects) -> None:
         _missing(damaged=False)
 
 
-def _end_jobs() -> None:  # without a parameter: NiceGUI would give the application to it
+def _end_jobs() -> None:  # without a parameter, for which NiceGUI would pass the application
     end_all()
 
 
@@ -87,7 +87,7 @@ def _fault(error: Exception) -> None:
     with shell(""):
         with ui.element("h1"):
             ui.label(say("app.fault-page"))
-        ui.label(words(error))
+        ui.label(error_text(error))
         ui.link(say("app.home"), "/")
 
 

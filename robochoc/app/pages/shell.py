@@ -1,4 +1,4 @@
-"""What every page has: the bar with its links, the team's name, undo and redo, light and dark."""
+"""The frame of all pages: the bar with links, the team's name, undo and redo, and the theme button."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from functools import cache
 from importlib.resources import files
 
 from nicegui import ui
+from nicegui.element import Element
 from nicegui.events import KeyEventArguments
 
-from robochoc.app.pages.theme import ThemeButton
 from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError, renamed
 from robochoc.app.texts import say
@@ -20,14 +20,22 @@ AREAS = ("model", "decide", "whatif", "fly", "compare")
 """The pages of a team, in the order in which they are used."""
 
 
-def told(error: EditError) -> str:
-    """Return what is wrong with an edit, in words."""
+class ThemeButton(Element, component="theme.js"):
+    """The button that switches between light and dark. The choice is stored in the browser, for all pages."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._props["says"] = say("app.dark")
+
+
+def edit_error_text(error: EditError) -> str:
+    """Return the text of an invalid edit."""
     return say(error.key, **error.named)
 
 
 @contextmanager
 def shell(title: str, project: Project | None = None, area: str = "") -> Iterator[None]:
-    """Build a page: its bar, and the container that the caller fills."""
+    """Build the bar of a page, and the container that the caller fills."""
     ui.add_css(_style())
     ui.page_title(f"{title} - {say('app.title')}" if title else say("app.title"))
     ui.colors(primary="var(--accent)")
@@ -45,12 +53,12 @@ def shell(title: str, project: Project | None = None, area: str = "") -> Iterato
             ThemeButton()
     with ui.element("main").classes("main").props("id=content tabindex=-1"):
         if project is not None:
-            _trouble(project)
+            _project_error(project)
         yield
 
 
-def while_shown(end: Callable[[], None]) -> None:
-    """Call `end` when the browser has left this page."""
+def on_leave(end: Callable[[], None]) -> None:
+    """Call `end` when the browser leaves this page."""
     ui.context.client.on_delete(end)
 
 
@@ -65,7 +73,7 @@ def _name(project: Project) -> None:
         try:
             project.edit(lambda sketch: renamed(sketch, str(value or "")))
         except EditError as error:
-            return told(error)
+            return edit_error_text(error)
         return None
 
     field = ui.input(value=project.sketch.name, validation=rename).classes("name")
@@ -75,11 +83,11 @@ def _name(project: Project) -> None:
         if field.value != project.sketch.name and not field.error:
             field.set_value(project.sketch.name)
 
-    while_shown(project.on_change(follow))
+    on_leave(project.on_change(follow))
 
 
-def _trouble(project: Project) -> None:
-    """Say, while it is so, that the team was removed in another window, or cannot be saved."""
+def _project_error(project: Project) -> None:
+    """Show whether the team was removed in another window or cannot be saved."""
     label = ui.label().classes("error").props("role=alert")
 
     def follow() -> None:
@@ -87,7 +95,7 @@ def _trouble(project: Project) -> None:
         label.set_text(say("app.removed") if project.removed else text)
         label.set_visibility(bool(label.text))
 
-    while_shown(project.on_change(follow))
+    on_leave(project.on_change(follow))
     follow()
 
 
@@ -112,7 +120,7 @@ def _undo_and_redo(project: Project) -> None:
             (project.redo if event.modifiers.shift else project.undo)()
 
     ui.keyboard(pressed, ignore=["input", "select", "textarea"])  # where somebody types, the browser undoes
-    while_shown(project.on_change(follow))
+    on_leave(project.on_change(follow))
     follow()
 
 

@@ -1,1 +1,1 @@
-"""Runs: a team of the application decides, in a process of its own, and what came of it is kept."""
+"""Runs: a team of the application solves its problem in a separate process, and the outcome is saved."""

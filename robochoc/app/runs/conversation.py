@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from robochoc.app.runs.options import JOURNAL
-from robochoc.app.runs.prepared import from_before
+from robochoc.app.runs.prepared_team import from_run
 from robochoc.app.runs.run import Run
 from robochoc.app.runs.tape import Tape, recorded
 from robochoc.formats import InvalidInputError
@@ -19,7 +19,7 @@ def conversation_of(run: Run, wanted: Callable[[], bool] = lambda: True) -> Tape
     It takes a while: call it in a thread.
     """
     try:
-        ready = from_before(run)
+        ready = from_run(run)
         tape = recorded(run.folder / JOURNAL, Tape(ready.robots, ready.label, ready.called), wanted)
     except (OSError, JournalError, ModelError, InvalidInputError, ValueError, TypeError, KeyError):
         return None

@@ -1,10 +1,10 @@
-"""Which protocols fit a team, and why `auto` chooses the one that it does."""
+"""The protocols that suit a team, and the choice of `auto` with its reasons."""
 
 from __future__ import annotations
 
 import msgspec
 
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.sketch import Sketch
@@ -17,14 +17,14 @@ from robochoc.run.registry import installed_protocols
 
 
 class Fitting(msgspec.Struct, frozen=True):
-    """What fits a team.
+    """The protocols that suit a team.
 
     Attributes:
-        protocols: The protocols that accept it, complete ones first, and whether each is complete.
-        chosen: The one that `auto` takes.
-        why: Why, in words.
-        facts: What is known of the team, in words.
-        rejected: Why better known ones were not taken, by name.
+        protocols: The protocols that accept the team, complete ones first, and whether each is complete.
+        chosen: The protocol that `auto` chooses.
+        why: The reason for the choice, in words.
+        facts: Facts about the team, in words.
+        rejected: The reasons against better known protocols, by name.
     """
 
     protocols: tuple[tuple[str, bool], ...]
@@ -35,10 +35,10 @@ class Fitting(msgspec.Struct, frozen=True):
 
 
 def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
-    """Return the team of a sketch, or that of files where there are some.
+    """Return the team of a sketch, or of files if there are some.
 
     Raises:
-        NotReadyError: for a sketch that is no team yet.
+        NotReadyError: for an incomplete sketch.
         InvalidInputError: if the files are damaged.
     """
     if files:
@@ -56,11 +56,11 @@ def fitting_protocols(team: Team, options: Options) -> tuple[tuple[str, bool], .
 
 
 def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runtime.SIMULATOR) -> Fitting:
-    """Return what fits the team of a sketch, or of files.
+    """Return the protocols that suit the team of a sketch, or of files.
 
     Raises:
-        NotReadyError: for a sketch that is no team yet.
-        UnsupportedError: for a team that nothing can decide.
+        NotReadyError: for an incomplete sketch.
+        UnsupportedError: for a team that no protocol can solve.
         InvalidInputError: if the files are damaged.
     """
     team = team_of(sketch, files)

@@ -1,4 +1,4 @@
-"""Values as the user says them, from the codes that robots compute with, and from the symbols that files have."""
+"""Conversion of the robots' integer codes, and of symbols in files, to the user's values."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from robochoc.modelling.model import Model
 
 
 def value_of(model: Model, variable: str, code: int) -> Value:
-    """Return the user's value that a code of a variable stands for."""
-    told = model.variables[variable].codes.user_values or {}
-    value = told.get(code, code)
+    """Return the user's value of a variable's code."""
+    user_values = model.variables[variable].codes.user_values or {}
+    value = user_values.get(code, code)
     return value if isinstance(value, (int, str)) else str(value)
 
 
 def label_of(model: Model, variable: str, code: int) -> Value:
-    """Return the user's value that a code of a variable stands for; the code, if the team has no such variable."""
+    """Return the user's value of a variable's code; the code itself, if the team has no such variable."""
     return value_of(model, variable, code) if variable in model.variables else code
 
 
 def labels_of(model: Model) -> dict[str, str]:
-    """Return the user's values that files say otherwise, such as `two words`, by what files say: `two_words`."""
+    """Return the user's values with another spelling in files, such as `two words`, by that spelling: `two_words`."""
     found: dict[str, str] = {}
     for name, variable in model.team.variables.items():
         if not variable.domain.symbols or name not in model.variables:
@@ -35,7 +35,7 @@ def labels_of(model: Model) -> dict[str, str]:
 
 
 def called_in(model: Model, sketch: Sketch) -> Callable[[str, int], str]:
-    """Return what tells a code of a variable in short, as the user knows it: a cell as `(2, 3)`."""
+    """Return a function that converts a variable's code to a short text for the user: a cell to `(2, 3)`."""
     decisions = {f"{robot}.{one.name}": one for one in sketch.decisions for robot in sketch.deciders(one)}
 
     def called(variable: str, code: int) -> str:

@@ -1,4 +1,4 @@
-"""What can be seen of a run while it goes on, from its journal: who speaks, what is decided, what it costs."""
+"""The live state of a run, read from its journal: messages, decisions and costs."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from robochoc.sniffer.spoken import Called, Spoken
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0
-"""Messages are shown for so long."""
+"""The time for which a message is shown."""
 SETTLED_S = 1.0
-"""A value that stays for so long looks settled."""
+"""The time after which an unchanged value counts as settled."""
 AT_ONCE = 5_000
-"""So many entries are read in one go."""
+"""The number of entries that are read at once."""
 READ_S = 0.1
-"""Entries are read for so long at a time, then others get their turn."""
+"""The time for reading entries before other work is done."""
 LAST = 8
-"""So many of the last messages are kept in words."""
+"""The number of last messages that are available in words."""
 MOST_COSTS = 300
-"""Points of the falling cost that are kept."""
+"""The maximum number of points of the cost curve."""
 
 
 @dataclass
 class Live:
-    """The facts.
+    """The live state of a run.
 
     Attributes:
-        messages: How many were sent so far.
+        messages: The number of sent messages.
         values: Each robot's present values, by `ROBOT.DECISION`.
-        since: When each robot has changed them last, on the monotonic clock.
-        costs: The costs of the answers of the present run so far: seconds since the start, and the cost. They fall.
-        bound: Nothing costs less. None: not known.
-        recent: The messages of the last second: how many went from whom to whom.
-        is_cut: Whether the last messages were not read, since the run had ended and there were too many.
+        since: The time of each robot's last change of values, on the monotonic clock.
+        costs: The decreasing costs of the answers so far: seconds since the start, and the cost.
+        bound: The lower bound of the cost. None: not known.
+        recent: The number of messages in the last second, by sender and receiver.
+        is_cut: Whether the last messages were skipped, since there were too many after the end of the run.
         said: The last messages in words, the last one first.
     """
 
@@ -58,15 +58,19 @@ class Live:
     said: tuple[Said, ...] = ()
 
     def settled(self, robot: str) -> bool:
-        """Return whether a robot has kept its values for a while."""
+        """Return whether a robot has not changed its values for a while."""
         return robot in self.since and time.monotonic() - self.since[robot] >= SETTLED_S
 
 
 class LiveReader:
-    """Follows the journal at `file`, which need not be there yet, and keeps `live` up to date. Memory is bounded.
+    """Follows the journal at `file`, which need not exist yet, and updates `live`. Memory is bounded.
 
-    `label` says what the code of a variable's value stands for; `objective`, what assignments cost (None: nothing is
-    minimised, or the problem changes); `called`, what values are called in messages.
+    Args:
+        file: The journal.
+        live: The state to update.
+        label: Converts the code of a variable to the user's value.
+        objective: The cost of assignments. None: nothing is minimised, or the problem changes.
+        called: The names of values in messages.
     """
 
     def __init__(
@@ -90,7 +94,7 @@ class LiveReader:
         self._bunches: deque[tuple[float, Counter[tuple[str, str]]]] = deque()
 
     def advance(self) -> bool:
-        """Read what is new, for a short while; return whether there was something."""
+        """Read new entries for a short time; return whether there were any."""
         if self._follower is None and self._file.is_file():
             self._open = self._file.open("rb")
             self._follower = Follower(self._open)
@@ -103,10 +107,10 @@ class LiveReader:
         return anything
 
     def _read(self, follower: Follower) -> bool:
-        """Read a few entries; return whether there were some."""
+        """Read a few entries; return whether there were any."""
         try:
             entries = follower.read(AT_ONCE)
-        except JournalError:  # not even its beginning is there: the run has its own words on that
+        except JournalError:  # the header is incomplete: the run reports the error
             return False
         now = time.monotonic()
         bunch: Counter[tuple[str, str]] = Counter()
@@ -151,7 +155,7 @@ class LiveReader:
             self._weigh(event, now)
 
     def _weigh(self, event: Decided | Heard | Bounded | Began, now: float) -> None:
-        """Take note of what is known of the cost."""
+        """Update the costs and the bound."""
         if self._known is None:
             return
         before = self._known.best
@@ -162,11 +166,11 @@ class LiveReader:
             return
         costs = self._live.costs
         costs.append((now - self._began, self._known.best))
-        if len(costs) > MOST_COSTS:  # every other point is enough, but the last one
+        if len(costs) > MOST_COSTS:  # drop every other point except the last
             del costs[1:-1:2]
 
     def _forget_old(self, now: float) -> None:
-        """Keep the messages of the last second, and count them."""
+        """Drop messages older than a second, and count the others."""
         while self._bunches and now - self._bunches[0][0] > RECENT_S:
             self._bunches.popleft()
         recent: Counter[tuple[str, str]] = Counter()

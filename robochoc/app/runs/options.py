@@ -1,4 +1,4 @@
-"""How a team is to decide, and the command line that says so."""
+"""The options of a run, and the equivalent command line."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ RESULT = "result.json"
 JOURNAL = "run.journal"
 MAX_SEED = 2**31 - 1
 MAX_TIMEOUT_S = 1e9
-"""A longer limit is none that anybody meant."""
+"""The longest valid time limit."""
 
 
 class RunOptions(msgspec.Struct, frozen=True):
-    """How a team is to decide.
+    """The options of a run.
 
     Attributes:
-        protocol: The protocol; `auto`: one that suits the team.
+        protocol: The protocol; `auto`: chosen by the team's problem.
         runtime: `simulator` or `processes`.
-        seed: The seed of what is random.
-        timeout: A limit in seconds. None: no limit.
-        withdraw: Whether robots may step aside where there is no solution: as few as possible, by weight.
+        seed: The random seed.
+        timeout: The time limit in seconds. None: no limit.
+        withdraw: Whether robots withdraw if there is no solution: the least total weight.
         more: Further arguments of `robochoc solve`.
     """
 
@@ -39,22 +39,22 @@ class RunOptions(msgspec.Struct, frozen=True):
     more: tuple[str, ...] = ()
 
     def arguments(self, team: str, *, ranked: bool = False) -> list[str]:
-        """Return the arguments of `robochoc` that let the folder `team` decide, in the folder of a run.
+        """Return the arguments of `robochoc` that solve the team in the folder `team`, in the folder of a run.
 
-        Where the team is `ranked`, robots decide in their own order, and no protocol chooses another one.
+        In a `ranked` team, the order of the robots is that of the files.
         """
-        said = ["solve", team, "--json", "--journal", JOURNAL]
-        said += ["--protocol", self.protocol, "--runtime", self.runtime, "--seed", str(self.seed)]
+        arguments = ["solve", team, "--json", "--journal", JOURNAL]
+        arguments += ["--protocol", self.protocol, "--runtime", self.runtime, "--seed", str(self.seed)]
         if ranked:
-            said += ["--order", Order.GIVEN]
+            arguments += ["--order", Order.GIVEN]
         if self.timeout is not None:
-            said += ["--timeout", f"{self.timeout:g}"]
-        said.append("--withdraw" if self.withdraw else "--bounds")  # with it, costs mean another thing
-        return [*said, *self.more]
+            arguments += ["--timeout", f"{self.timeout:g}"]
+        arguments.append("--withdraw" if self.withdraw else "--bounds")  # costs of a withdrawal are not the user's
+        return [*arguments, *self.more]
 
     @property
     def are_known(self) -> bool:
-        """Whether the application could have set them itself: those of a stranger's file may say anything."""
+        """Whether the application could have set these options: an opened file may have any others."""
         return (
             self.protocol in {AUTO, *protocol_names()}
             and self.runtime in {Runtime.SIMULATOR, Runtime.PROCESSES}
@@ -65,5 +65,5 @@ class RunOptions(msgspec.Struct, frozen=True):
 
 
 def command_line(arguments: Sequence[str]) -> str:
-    """Return a command line as it can be typed in a shell, for arguments of `robochoc`."""
+    """Return the shell command line for arguments of `robochoc`."""
     return shlex.join(["robochoc", *arguments])

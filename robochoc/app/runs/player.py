@@ -1,23 +1,23 @@
-"""Where a conversation that is played back is: at which of its moments, and how fast it goes on."""
+"""The position and speed of a conversation that is played back."""
 
 from __future__ import annotations
 
 from math import isnan
 
 LEAST_S, MOST_S, PER_MOMENT_S = 3.0, 10.0, 0.15
-"""A conversation is played in this time, however many moments it has."""
+"""The limits of the playing time of a conversation, and the time for one moment."""
 SPEEDS = (0.25, 0.5, 1.0, 2.0)
 LARGE_S = 1.0
-"""The picture of a large team that is played is drawn so often: it takes a while, and others want a turn."""
+"""The interval at which the picture of a large team is drawn, which is slow."""
 
 
 class Player:
-    """Plays `count` moments, of which there is at least one.
+    """Plays `count` moments, at least one.
 
     Attributes:
-        count: How many there are.
-        playing: Whether it goes on by itself.
-        speed: How many times as fast as usual.
+        count: The number of moments.
+        playing: Whether the player is running.
+        speed: The speed, relative to the usual one.
     """
 
     def __init__(self, count: int) -> None:
@@ -33,7 +33,7 @@ class Player:
 
     @property
     def seconds(self) -> float:
-        """How long all of it takes at the usual speed."""
+        """The playing time at the usual speed."""
         return min(max(self.count * PER_MOMENT_S, LEAST_S), MOST_S)
 
     @property
@@ -42,47 +42,47 @@ class Player:
         return self.moment == self.count - 1
 
     def toggle(self) -> None:
-        """Play, from the beginning if it was at the end; or pause."""
+        """Pause or continue; at the end, play again from the start."""
         if not self.playing and self.ended:
             self._at = 0.0
         self.playing = not self.playing
 
     def advance(self, seconds: float) -> None:
-        """Let time go by."""
+        """Advance by a time in seconds."""
         if not self.playing:
             return
         self._at = min(self._at + max(seconds, 0.0) * self.speed * self.count / self.seconds, float(self.count))
         self.playing = self._at < self.count
 
     def step(self, by: int) -> None:
-        """Pause, and go so many moments on, or back."""
+        """Pause, and move by a number of moments."""
         self.seek(self.moment + by)
 
     def seek(self, moment: object) -> None:
-        """Pause at a moment; what is none, as browsers may say anything, changes nothing."""
+        """Pause at a moment; an invalid value, which a browser can send, changes nothing."""
         if isinstance(moment, (int, float)) and not (isinstance(moment, float) and isnan(moment)):
             self.playing = False
             self._at = float(min(max(moment, 0), self.count - 1))
 
-    def hurry(self, speed: object) -> None:
+    def set_speed(self, speed: object) -> None:
         """Set the speed, if it is one of `SPEEDS`."""
         if speed in SPEEDS and isinstance(speed, (int, float)):
             self.speed = float(speed)
 
 
 class Frames:
-    """Says when the picture of a conversation is to be drawn again."""
+    """Decides when the picture of a conversation is drawn again."""
 
     def __init__(self) -> None:
         self._drawn = -LARGE_S
 
     def is_due(self, now: float, *, large: bool, playing: bool) -> bool:
-        """Return whether to draw it.
+        """Return whether to draw the picture.
 
         Args:
             now: A time in seconds.
             large: Whether the team is large.
-            playing: Whether the conversation goes on by itself; where it stands still, what is shown stays.
+            playing: Whether the player is running; if not, the picture is always drawn, since it remains visible.
         """
         if large and playing and now - self._drawn < LARGE_S:
             return False

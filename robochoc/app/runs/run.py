@@ -1,12 +1,12 @@
-"""A run: a team decides in a folder of its own, and what came of it stays there.
+"""A run of a team, with its files in a folder.
 
-sketch.json    the sketch that it was made from
+sketch.json    the sketch of the team
 TEAM/          the team's files
-run.json       how it was started, and how it ended
-run.journal    what was said, while it is said
-result.json    the answer
-errors.txt     what the command had to say besides
-change.json    what has happened meanwhile, and the team after it, if something has
+run.json       the record: options, state and errors
+run.journal    the journal, written during the run
+result.json    the result
+errors.txt     the standard error of the command
+change.json    later events, and the team after them, if there were any
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import msgspec
 
 from robochoc.app.jobs.job import Call
 from robochoc.app.listeners import Listeners
-from robochoc.app.parts import HasParts
+from robochoc.app.parts import PartsOwner
 from robochoc.app.runs.live import Live
 from robochoc.app.runs.options import RESULT, RunOptions, command_line
 from robochoc.app.runs.result import RunResult, decoded
@@ -35,39 +35,39 @@ SKETCH = "sketch.json"
 CHANGE = "change.json"
 ERRORS = "errors.txt"
 MAX_RESULT = 64 << 20
-"""A larger result is none of ours."""
+"""Larger results are rejected."""
 _MAX_MESSAGE = 2_000
 
 
 class State(StrEnum):
-    """How far a run is."""
+    """The state of a run."""
 
     RUNNING = "running"
     ENDED = "ended"
-    """It has an answer, or a limit was reached."""
+    """The run has an answer, or a limit was reached."""
     STOPPED = "stopped"
-    """Somebody stopped it. There may be an answer: the best so far."""
+    """The user stopped the run. There may be an answer: the best so far."""
     FAILED = "failed"
-    """It could not be; `Run.message` says why."""
+    """The run failed; `Run.message` has the error."""
 
 
 class Checked(StrEnum):
-    """What a check has found of an answer that came in a file."""
+    """The result of checking an answer from an opened file."""
 
     KEPT = "kept"
-    """Each constraint that must hold does, and the cost is right."""
+    """All hard constraints are satisfied, and the cost is correct."""
     BROKEN = "broken"
-    """Some constraint that must hold does not, or a value is none."""
+    """A hard constraint is violated, or a value is invalid."""
     COST = "cost"
-    """All hold, but the cost is another."""
+    """All hard constraints are satisfied, but the cost is wrong."""
 
 
 class Record(msgspec.Struct):
-    """What is kept of a run besides its files. Times are Unix times; `message`: why it failed.
+    """The record of a run (run.json). Times are Unix times; `message` has the error of a failed run.
 
-    `labels`: the values that files cannot say as the user does, by what files say. `opened`: whether it came in a file,
-    from elsewhere; `checked`: what came of checking its answer then (None: it could not be). `flies`: whether decisions
-    say where robots are to be, of a team that was not drawn here; `maximised`: whether its costs are a worth.
+    `labels`: the user's values with another spelling in files, by that spelling. `opened`: whether the run is from an
+    opened file; `checked`: the result of checking its answer (None: not possible). `flies`: of an imported team,
+    whether its decisions are positions of robots; `maximised`: whether its costs are utilities.
     """
 
     options: RunOptions
@@ -84,21 +84,21 @@ class Record(msgspec.Struct):
     maximised: bool = False
 
 
-class Watching(Protocol):
-    """Who watches a run's process."""
+class Watcher(Protocol):
+    """The watcher of a run's process."""
 
     @property
     def pid(self) -> int | None:
-        """The process, which is the first of its group; None: there is none (yet)."""
+        """The id of the process and its group; None if there is none (yet)."""
 
     def stop(self) -> None:
-        """Ask it to stop."""
+        """Request a stop."""
 
     def end(self) -> None:
-        """End it now."""
+        """End the process now."""
 
 
-class Run(HasParts):
+class Run(PartsOwner):
     """A run. `Runs` starts them; pages listen to them."""
 
     def __init__(self, folder: Path, record: Record, sketch: Sketch | None = None) -> None:
@@ -107,13 +107,13 @@ class Run(HasParts):
         self.folder = folder
         self.record = record
         self.live = Live()
-        """What can be seen while it runs."""
+        """The live state during the run."""
         self.result: RunResult | None = None
-        """The answer, as soon as there is one; of a run that was stopped, the best so far."""
+        """The answer, as soon as there is one; of a stopped run, the best so far."""
         self._sketch = sketch
         self._listeners = Listeners()
         self._call: Call = lambda does: does()
-        self.watched_by: Watching | None = None
+        self.watched_by: Watcher | None = None
 
     @property
     def state(self) -> State:
@@ -122,15 +122,15 @@ class Run(HasParts):
 
     @property
     def message(self) -> str:
-        """Why it failed, in one line; of one that has ended, what went wrong beside the answer; else empty."""
+        """The error of a failed run, or an error besides the answer of an ended one, in one line; else empty."""
         return self.record.message
 
     @property
     def command(self) -> str:
-        """The command line that does the same, in the run's folder. Empty: there is none.
+        """The equivalent command line, in the run's folder; empty if there is none.
 
-        A stranger's file may hold any command. Of a run that came in one, it is made from its options, if they are any
-        that can be set here.
+        An opened file may contain any command. For a run from such a file, the command line is made from its options,
+        if the application could have set them.
         """
         record = self.record
         if not record.opened:
@@ -143,12 +143,12 @@ class Run(HasParts):
 
     @property
     def seconds(self) -> float:
-        """How long it has taken so far."""
+        """The elapsed time of the run."""
         return max(0.0, (self.record.ended or time.time()) - self.record.started)
 
     @property
     def sketch(self) -> Sketch:
-        """The sketch that it was made from. Raises `ValueError` if its file is damaged, `OSError` if it is gone."""
+        """The sketch of the team. Raises `ValueError` if its file is damaged, `OSError` if it cannot be read."""
         if self._sketch is None:
             try:
                 self._sketch = msgspec.json.decode((self.folder / SKETCH).read_bytes(), type=Sketch)
@@ -158,39 +158,39 @@ class Run(HasParts):
 
     @property
     def team(self) -> Path:
-        """The folder of the team's files. Its name is the team's, if that is a name."""
+        """The folder of the team's files. Its name is the team's, if that is a valid name."""
         name = self.sketch.name
         return self.folder / (name if is_name(name) and len(name) <= MAX_LABEL else "team")
 
     def stop(self) -> None:
-        """Stop it, with the best so far. It returns at once; nothing happens where it has ended."""
+        """Request a stop with the best answer so far, and return immediately."""
         if self.watched_by:
             self.watched_by.stop()
 
     @property
     def pid(self) -> int | None:
-        """Its process, the first of its group, while there is one."""
+        """The id of its process and group, while there is one."""
         return self.watched_by.pid if self.watched_by else None
 
     def artefact(self, name: str) -> Path | None:
-        """Return a file of the run, such as `run.journal`, if it is there."""
+        """Return a file of the run, such as `run.journal`, if it exists."""
         file = self.folder / Path(name).name
         return file if file.is_file() else None
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` whenever there is news, in the event loop in which it was started; return what ends that."""
+        """Call `callback` after each change, in the event loop of the run; return a function that removes it."""
         return self._listeners.add(callback)
 
-    def told_by(self, call: Call) -> None:
-        """Have listeners called by `call`: from a thread into an event loop, say."""
+    def call_listeners_by(self, call: Call) -> None:
+        """Call listeners by `call`, for example from a thread in an event loop."""
         self._call = call
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         """Call all listeners."""
         self._call(self._listeners)
 
-    def become(self, state: State, message: str = "") -> None:
-        """Note that it is over, and how. What was noted first stays."""
+    def finish(self, state: State, message: str = "") -> None:
+        """Set the final state. Later calls have no effect."""
         if self.state != State.RUNNING:
             return
         self.record.message = " ".join(message.split())[:_MAX_MESSAGE]
@@ -199,14 +199,14 @@ class Run(HasParts):
         self.save()
 
     def save(self) -> None:
-        """Keep its record on disk: all of it, or nothing."""
+        """Save the record atomically."""
         fresh = self.folder / f"{RECORD}.{os.getpid()}.new"
-        with suppress(OSError):  # the disk is full, or the team was removed: the run goes on
+        with suppress(OSError):  # the disk is full, or the team was removed: the run continues
             fresh.write_bytes(msgspec.json.encode(self.record))
             fresh.replace(self.folder / RECORD)
 
     def read_result(self) -> RunResult | None:
-        """Read its answer, if there is one by now."""
+        """Read the result, if there is one."""
         file = self.folder / RESULT
         if self.result is None:
             with suppress(OSError):
@@ -216,7 +216,7 @@ class Run(HasParts):
 
 
 def run_of(folder: Path) -> Run:
-    """Return a run of earlier: one that was running then, and is no more, has failed; so has one that is damaged."""
+    """Return an earlier run. A damaged run has failed, and so has a run whose process has disappeared."""
     try:
         record = msgspec.json.decode((folder / RECORD).read_bytes(), type=Record)
     except (OSError, msgspec.DecodeError, RecursionError):
@@ -224,5 +224,5 @@ def run_of(folder: Path) -> Run:
     run = Run(folder, record)
     run.read_result()
     if record.state == State.RUNNING:
-        run.become(State.ENDED if run.result else State.FAILED, "" if run.result else "lost")
+        run.finish(State.ENDED if run.result else State.FAILED, "" if run.result else "lost")
     return run

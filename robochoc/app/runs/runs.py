@@ -1,4 +1,4 @@
-"""The runs of a team: they are started, watched, stopped, and found again after the server has died."""
+"""The runs of a team: started, watched, stopped, and found again after a restart of the server."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from typing import Any, Protocol
 
 import msgspec
 
-from robochoc.app.jobs.job import Job, call_here, end_jobs_in, jobs_alive
+from robochoc.app.jobs.job import Job, end_jobs_in, event_loop_caller, jobs_alive
 from robochoc.app.listeners import Listeners
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.prepared import TeamFiles, from_files, from_sketch
+from robochoc.app.runs.prepared_team import TeamFiles, prepare_files, prepare_sketch
 from robochoc.app.runs.run import RECORD, SKETCH, Record, Run, State, run_of
-from robochoc.app.runs.watching import watched
+from robochoc.app.runs.run_job import run_job
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.modelling.model import Model
 
 MOST_KEPT = 30
-"""Runs of a team. Older ones are removed."""
+"""The maximum number of runs of a team. Older ones are removed."""
 _USUAL = RunOptions()
 
 
 class Team(Protocol):
-    """What decides: `Project` is one."""
+    """The owner of runs, such as a `Project`."""
 
     @property
     def sketch(self) -> Sketch:
-        """The team as it stands."""
+        """The present state of the team."""
 
     @property
     def folder(self) -> Path:
-        """Where its runs are kept, in the folder `runs`."""
+        """The folder with the subfolder `runs`."""
 
 
 class Runs:
-    """The runs of one team. `runs_of` returns the one object for each team that is open."""
+    """The runs of one team. `runs_of` returns the object of an open team."""
 
     def __init__(self, project: Team) -> None:
         self._project = project
@@ -53,11 +53,11 @@ class Runs:
 
     @property
     def latest(self) -> Run | None:
-        """The run that was started last."""
+        """The last started run."""
         return self._runs[-1] if self._runs else None
 
     def latest_for(self, purpose: str) -> Run | None:
-        """Return the run that was started last for a purpose, such as `decide`."""
+        """Return the last started run for a purpose, such as `decide`."""
         return next((run for run in self.all() if run.record.purpose == purpose), None)
 
     def all(self) -> list[Run]:
@@ -65,7 +65,7 @@ class Runs:
         return self._runs[::-1]
 
     def find(self, name: str) -> Run | None:
-        """Return the run of that id."""
+        """Return the run with this id."""
         return next((run for run in self._runs if run.id == name), None)
 
     def start(
@@ -77,41 +77,41 @@ class Runs:
         files: TeamFiles | None = None,
         purpose: str = "decide",
     ) -> Run:
-        """Let the team decide. The run has begun when this returns; all work is done in a thread and a process.
+        """Start a run, and return it; all work is done in a thread and a process.
 
         Args:
-            options: How.
-            sketch: The team. None: as it stands.
-            model: Makes a model of the sketch.
-            files: What decides instead, of a team that was not drawn here; the sketch is its picture then.
-            purpose: What for: a word for `latest_for`. There is one run at a time for each purpose: one before that
-                still runs is ended.
+            options: The options.
+            sketch: The team. None: its present state.
+            model: Converts the sketch to a model.
+            files: The files of an imported team, used instead of the sketch, which is only its picture.
+            purpose: The purpose, for `latest_for`. There is one run at a time for each purpose: an earlier one that is
+                still running is ended.
 
         Raises:
             EditError: if the team was removed.
-            OSError: if the disk is full, say. Nothing has changed then.
+            OSError: if a file cannot be written, for example. Nothing has changed then.
         """
         chosen = self._project.sketch if sketch is None else sketch
         record = Record(options, purpose=purpose, started=time.time())
         if files:
             record.flies, record.maximised = files.flies, files.maximised
-        run = self._made(record, chosen)
-        run.told_by(call_here())
+        run = self._new_run(record, chosen)
+        run.call_listeners_by(event_loop_caller())
         run.save()
         self._end_before(purpose)
         self._runs.append(run)
         self._forget_old()
-        prepare = partial(from_files, files=files) if files else partial(from_sketch, model=model)
-        run.watched_by = watched(run, prepare).start()
+        prepare = partial(prepare_files, files=files) if files else partial(prepare_sketch, model=model)
+        run.watched_by = run_job(run, prepare).start()
         self._listeners()
         return run
 
     def on_start(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` when a run is started; return what ends that."""
+        """Call `callback` when a run is started; return a function that removes it."""
         return self._listeners.add(callback)
 
-    def _made(self, record: Record, sketch: Sketch) -> Run:
-        """Return a run in a folder of its own."""
+    def _new_run(self, record: Record, sketch: Sketch) -> Run:
+        """Return a run in a new folder."""
         folder = self._new_folder()
         try:
             run = Run(folder, record, sketch)
@@ -146,15 +146,15 @@ class Runs:
         over = [run for run in self._runs if run.state != State.RUNNING]
         for run in over[: max(0, len(self._runs) - MOST_KEPT)]:
             self._runs.remove(run)
-            with suppress(OSError):  # without its record it is no run any more, should this process die now
+            with suppress(OSError):  # without its record, the folder is not a run any more if this process dies now
                 (run.folder / RECORD).unlink()
             self._remove(run.folder, end_jobs_in(run.folder))
 
     def _sweep(self) -> None:
-        """Remove what is no run: the disk was full when it began, or its removal was broken off.
+        """Remove folders that are not runs: their start failed, or their removal was interrupted.
 
-        Nobody writes there. The folder of all teams is this application's alone (`Store.held`), and of this one no run
-        has begun yet; what it still does with the files of earlier runs, it does in jobs.
+        No other process writes there: the folder of all teams is locked (`Store.locked`), no run of this team has
+        started yet, and work on the files of earlier runs is done in jobs.
         """
         if not self._folder.is_dir():
             return
@@ -164,7 +164,7 @@ class Runs:
                 self._remove(folder)
 
     def _remove(self, folder: Path, ended: Sequence[Job[Any]] = ()) -> None:
-        """Remove a folder, in a thread, once the jobs that were about it have `ended`: they may write until then."""
+        """Remove a folder, in a thread, after the end of its jobs `ended`, which may write until then."""
 
         def remove(job: Job[None]) -> None:
             job.wait_for(ended)
@@ -174,5 +174,5 @@ class Runs:
 
 
 def runs_of(project: Project) -> Runs:
-    """Return the runs of a team, the same object for all pages that show it."""
+    """Return the runs of a team; the same object for all pages."""
     return project.part(Runs)

@@ -1,4 +1,4 @@
-"""The conversation of a run that is over, in few moments: what the page plays back."""
+"""The conversation of an ended run, summarised in a few moments that the page plays back."""
 
 from __future__ import annotations
 
@@ -19,17 +19,16 @@ from robochoc.sniffer.live_trace import entries_of, next_entries, sorted_by_time
 from robochoc.sniffer.spoken import Called, Spoken
 
 MOST_MOMENTS = 200
-"""With twice as many, every two become one."""
+"""With twice as many moments, pairs of moments are joined."""
 MOST_READ = 300_000
-"""Messages and what was decided. What comes after them is not played: it would take long to read and to sort, and
-nobody could follow it."""
+"""The maximum number of messages and decisions that are played: more are slow to read and sort, and unreadable."""
 MOST_BYTES = 32 << 20
-"""Of the journal."""
+"""The maximum number of bytes that are read of the journal."""
 WORDS_KEPT = 3
-"""Of the messages of one moment, so many are kept in words."""
+"""The number of messages of a moment that are available in words."""
 MOST_LETTERS = 300
 MOST_LINKS = 200
-"""Pairs of robots of one moment. With more, nobody sees them apart."""
+"""The maximum number of pairs of robots in one moment, for readability."""
 
 
 class Said(NamedTuple):
@@ -42,7 +41,7 @@ class Said(NamedTuple):
 
 
 def in_words(sent: Sent, spoken: Spoken) -> Said:
-    """Return a message in words, without the name of its sender; long ones are cut."""
+    """Return a message in words, without the name of its sender; long texts are shortened."""
     words = spoken.sentence(sent).removeprefix(f"{sent.sender} says: ").removeprefix(f"{sent.sender} says ")
     short = words if len(words) <= MOST_LETTERS else f"{words[: MOST_LETTERS - 1]}…"
     return Said(sent.sender, sent.receiver, sent.type, short)
@@ -50,14 +49,14 @@ def in_words(sent: Sent, spoken: Spoken) -> Said:
 
 @dataclass
 class Moment:
-    """One or more messages, one after the other, and what came of them.
+    """One or more successive messages, and the resulting values.
 
     Attributes:
-        count: How many messages they are.
-        said: The last of them, in words.
-        links: How many went from whom to whom.
-        values: The new values of those who have changed them since the moment before, by `ROBOT.DECISION`.
-        begins: Whether a run, or an epoch, begins in it: what was decided before is void.
+        count: The number of messages.
+        said: The last messages, in words.
+        links: The number of messages by sender and receiver.
+        values: The values that have changed since the previous moment, by robot and `ROBOT.DECISION`.
+        begins: Whether a run or an epoch begins in this moment: earlier decisions are void.
     """
 
     count: int = 0
@@ -67,29 +66,29 @@ class Moment:
     begins: bool = False
 
     def joined(self, later: Moment) -> Moment:
-        """Return this moment and the one after it as one."""
+        """Return this moment joined with the next one."""
         links = Counter(dict((self.links + later.links).most_common(MOST_LINKS)))
         said = (*self.said, *later.said)[-WORDS_KEPT:]
         values = later.values if later.begins else self.values | later.values
         return Moment(self.count + later.count, said, links, values, begins=self.begins or later.begins)
 
     def after(self, before: Mapping[str, Mapping[str, Value]]) -> dict[str, Mapping[str, Value]]:
-        """Return the values of all robots at its end. `before`: those at the end of the moment before."""
+        """Return the values of all robots at its end, given the values `before` it."""
         return dict(self.values) if self.begins else {**before, **self.values}
 
 
 class Tape:
-    """The moments of a conversation. There are at most `2 * MOST_MOMENTS`, however much is said.
+    """The moments of a conversation: at most `2 * MOST_MOMENTS`, for any number of messages.
 
     Args:
-        robots: The robots of the team. What others do is none of its conversation.
-        label: What the code of a variable's value stands for.
-        called: The same in words.
+        robots: The robots of the team. Events of others are ignored.
+        label: Converts the code of a variable to the user's value.
+        called: The names of values in messages.
 
     Attributes:
-        moments: The moments, the first one first.
-        messages: How many messages they are together.
-        is_whole: Whether this is all that was said; otherwise it is the beginning.
+        moments: The moments, in order.
+        messages: The total number of messages.
+        is_whole: Whether these are all messages; otherwise they are the first ones.
     """
 
     def __init__(self, robots: Collection[str], label: Callable[[str, int], Value], called: Called) -> None:
@@ -103,8 +102,8 @@ class Tape:
         self._size = 1
         self._settled: dict[str, int] = {}
 
-    def take(self, entry: JournalEntry) -> None:
-        """Take in what has happened next."""
+    def add(self, entry: JournalEntry) -> None:
+        """Add the next entry of the journal."""
         match entry:
             case Sent():
                 if entry.sender in self._robots and entry.receiver in self._robots:
@@ -119,7 +118,7 @@ class Tape:
                 self._spoken.follow(entry)
 
     def end(self) -> None:
-        """Note that this was all."""
+        """Complete the tape after the last entry."""
         self._close()
         now: dict[str, Mapping[str, Value]] = {}
         for number, moment in enumerate(self.moments):
@@ -128,7 +127,7 @@ class Tape:
             self._settled |= {robot: number for robot in robots if before.get(robot) != now.get(robot)}
 
     def _begin(self) -> None:
-        """Begin a run, or an epoch: its robots have not decided anything."""
+        """Start a run or an epoch, in which no robot has decided yet."""
         self._close()
         if self.moments[-1].count:
             self._next()
@@ -145,7 +144,7 @@ class Tape:
         self.messages += 1
 
     def _close(self) -> None:
-        """Put the last messages into words, while it is known who speaks of what."""
+        """Convert the last messages to words, while the context of the messages is available."""
         if self._last:
             moment = self.moments[-1]
             said = (*moment.said, *(in_words(sent, self._spoken) for sent in self._last))
@@ -162,7 +161,7 @@ class Tape:
         self.moments.append(Moment())
 
     def values_at(self, number: int) -> dict[str, Value]:
-        """Return all values at the end of the moment of this number."""
+        """Return all values at the end of a moment."""
         now: dict[str, Mapping[str, Value]] = {}
         begun = max((place for place in range(number + 1) if self.moments[place].begins), default=0)
         for moment in self.moments[begun : number + 1]:
@@ -170,15 +169,15 @@ class Tape:
         return {name: value for values in now.values() for name, value in values.items()}
 
     def unsettled_at(self, number: int) -> frozenset[str]:
-        """Return who will have other values after the moment of this number, once all is told: see `end`."""
+        """Return the robots whose values change after a moment; `end` must have been called."""
         return frozenset(robot for robot, last in self._settled.items() if last > number)
 
     def messages_at(self, number: int) -> int:
-        """Return how many messages were sent by the end of the moment of this number."""
+        """Return the number of messages up to the end of a moment."""
         return sum(moment.count for moment in self.moments[: number + 1])
 
     def said_at(self, number: int, most: int) -> list[Said]:
-        """Return the last messages in words at the end of the moment of this number, the last one first."""
+        """Return the last messages in words at the end of a moment, the last one first."""
         said: list[Said] = []
         for moment in reversed(self.moments[: number + 1]):
             said += reversed(moment.said)
@@ -188,16 +187,16 @@ class Tape:
 
 
 def recorded(file: Path, tape: Tape, wanted: Callable[[], bool] = lambda: True) -> Tape:
-    """Return `tape` with the conversation of a journal that is whole, or broke off, in the order of its times.
+    """Return `tape` with the conversation of a complete or interrupted journal, ordered by time.
 
     Args:
         file: The journal.
-        tape: Takes it in.
-        wanted: Whether somebody still waits for it; asked now and then.
+        tape: The tape to fill.
+        wanted: Returns whether the result is still needed; called from time to time.
 
     Raises:
-        OSError: when it cannot be read.
-        JournalError: when it is none.
+        OSError: if the journal cannot be read.
+        JournalError: if the file is not a journal.
     """
     descriptor = open_to_read(file)
     try:
@@ -214,17 +213,17 @@ def recorded(file: Path, tape: Tape, wanted: Callable[[], bool] = lambda: True) 
 def _read(file: GrowingFile, tape: Tape, wanted: Callable[[], bool]) -> None:
     here = file.again()
     for header in next_entries(Follower(BufferedReader(here)), here, file.end)[:1]:
-        tape.take(header)
+        tape.add(header)
     for piece in sorted_by_time(_first(file, tape)):
         for event in piece:
-            tape.take(event)
+            tape.add(event)
         if not wanted():
             tape.is_whole = False
             return
 
 
 def _first(file: GrowingFile, tape: Tape) -> Iterator[Sequence[JournalEntry]]:
-    """Yield what is played of a file, up to a bound: nothing else is worth sorting."""
+    """Yield the entries of a file that are played, up to a bound."""
     read = 0
     for piece in entries_of(file):
         if read >= MOST_READ:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robochoc.app.sketch import sketch as limits
-from robochoc.app.sketch.palette import Form, Links, Opening, PaletteRule
+from robochoc.app.sketch.palette import Form, Links, PaletteRule, RuleField
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.shape import repeated, strangers
 from robochoc.app.sketch.sketch import Setting, Sketch, SketchRule
@@ -87,7 +87,7 @@ def _of_robots(facts: Facts, rule: SketchRule, entry: PaletteRule) -> Iterator[T
         yield _trouble(rule, "private-many", count=count)
 
 
-def _of_opening(given: Setting | None, opening: Opening, values: set[int | str]) -> str | None:
+def _of_opening(given: Setting | None, opening: RuleField, values: set[int | str]) -> str | None:
     """Return what is wrong with what fills an opening. None: nothing."""
     match opening.form:
         case Form.NUMBER:

@@ -54,7 +54,7 @@ class Links(StrEnum):
 
 
 @dataclass(frozen=True)
-class Opening:
+class RuleField:
     """What a rule's words leave open: `name` is its name among the rule's settings."""
 
     name: str
@@ -128,7 +128,7 @@ class PaletteRule:
     kinds: frozenset[Kind]
     links: Links
     condition: Callable[[Applied, Sequence[Operand]], Operand]
-    openings: tuple[Opening, ...] = ()
+    openings: tuple[RuleField, ...] = ()
     fewest: int = 2
     most: int | None = None
     graded: bool = False

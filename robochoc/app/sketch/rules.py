@@ -10,8 +10,8 @@ from robochoc.app.sketch.palette import (
     Applied,
     Form,
     Links,
-    Opening,
     PaletteRule,
+    RuleField,
     allowed,
     count,
     equal,
@@ -21,13 +21,13 @@ from robochoc.app.sketch.palette import (
 from robochoc.app.sketch.sketch import NUMBERED, Kind
 from robochoc.app.sketch.written import Operand
 
-_RADIUS = Opening("radius", Form.NUMBER, 1, 100, 3)
-_GAP = Opening("gap", Form.NUMBER, 1, 100, 2)
-_VALUE = Opening("value", Form.VALUE)
-_VALUES = Opening("values", Form.VALUES)
-_COUNT = Opening("count", Form.NUMBER, 1, 1000, 1)
-_STEP = Opening("step", Form.NUMBER, 1, 1000, 1)
-_ROWS = Opening("rows", Form.TABLE)
+_RADIUS = RuleField("radius", Form.NUMBER, 1, 100, 3)
+_GAP = RuleField("gap", Form.NUMBER, 1, 100, 2)
+_VALUE = RuleField("value", Form.VALUE)
+_VALUES = RuleField("values", Form.VALUES)
+_COUNT = RuleField("count", Form.NUMBER, 1, 1000, 1)
+_STEP = RuleField("step", Form.NUMBER, 1, 1000, 1)
+_ROWS = RuleField("rows", Form.TABLE)
 _HEIGHTS = frozenset(NUMBERED - PLACES)
 
 Group = Sequence[Operand]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.app.sketch.palette import Form, Links, Opening
+from robochoc.app.sketch.palette import Form, Links, RuleField
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Kind, Setting, Sketch, SketchRule
 from robochoc.app.texts import say
@@ -100,7 +100,7 @@ def _everybody(sketch: Sketch, rule: SketchRule, bound: list[str]) -> str:
     return say("list.all") if len(bound) == len(sketch.robots) > few and not rule.robots else listed(bound)
 
 
-def _filled(sketch: Sketch, decision: Decision | None, opening: Opening, given: Setting | None) -> str:
+def _filled(sketch: Sketch, decision: Decision | None, opening: RuleField, given: Setting | None) -> str:
     """Return what fills an opening, in words."""
     match opening.form, given:
         case Form.NUMBER, int():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from robochoc.app.runs.fitting import fitting_protocols, team_of
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.sketch import MAX_LABEL, Sketch
 from robochoc.app.sketch.words import listed
 from robochoc.app.studies.families import Family, family_of

@@ -13,11 +13,11 @@ from statistics import median
 
 import msgspec
 
-from robochoc.app.jobs.job import Call, Job, call_here
+from robochoc.app.jobs.job import Call, Job, event_loop_caller
 from robochoc.app.jobs.process import Command, Finished
 from robochoc.app.listeners import Listeners
 from robochoc.app.projects import Project
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.studies.families import family_of
@@ -81,7 +81,7 @@ class Study:
         self._folder = project.folder / "study"
         self._listeners = Listeners()
         self._job: Job[None] | None = None
-        self._call: Call = call_here()
+        self._call: Call = event_loop_caller()
         self.facts = self._last()
 
     @property
@@ -102,7 +102,7 @@ class Study:
         family = family_of(sketch) if question.family else None
         text = study_of(sketch, question, family)
         facts = self.facts = Facts(question, text, number_of_runs(question, family))
-        self._call = call_here()
+        self._call = event_loop_caller()
         self._job = Job(
             f"study {self._folder}",
             partial(self._carry_out, sketch, files, facts),

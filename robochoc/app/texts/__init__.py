@@ -1,6 +1,6 @@
-"""The texts of the application: one catalogue, the files of the folder `en`, so that others can translate it.
+"""The texts of the application: a catalogue in the files of the folder `en`, which can be translated.
 
-`say("gallery.title")` returns a text; `{name}` in it is filled in. Nothing is computed in a text.
+`say("gallery.title")` returns a text; `{name}` in it is replaced by an argument.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _HOLE = re.compile(r"\{([a-z_]+)\}")
 
 
 def say(key: str, **named: object) -> str:
-    """Return the text of that key, with what it names filled in. Braces in what is filled in mean nothing.
+    """Return the text of a key, with names in braces replaced by the arguments. Braces in arguments are not replaced.
 
     Raises:
         KeyError: if there is no such text.
@@ -27,10 +27,10 @@ def say(key: str, **named: object) -> str:
 @cache
 def catalogue(language: str = LANGUAGE) -> dict[str, str]:
     """Return all texts of a language, by dotted keys."""
-    whole: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for file in sorted((files(__package__) / language).iterdir(), key=lambda file: file.name):
-        whole |= _flat("", toml_tables(file.read_text(encoding="utf-8")))
-    return whole
+        texts |= _flat("", toml_tables(file.read_text(encoding="utf-8")))
+    return texts
 
 
 def _flat(prefix: str, part: dict[str, object]) -> dict[str, str]:

@@ -8,7 +8,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from robochoc.app.faults import ERRORS
+from robochoc.app.error_log import ERRORS
 from robochoc.app.sketch import files
 from robochoc.app.sketch.examples import examples, title_of
 from robochoc.app.sketch.sketch import Sketch

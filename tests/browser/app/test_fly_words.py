@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.app.flights.flown import FLOWN, refused
+from robochoc.app.flights.flight_result import FLOWN, refused
 from robochoc.app.runs.options import JOURNAL, RunOptions
 from robochoc.app.runs.run import RECORD, Record, Run, State
 from robochoc.app.sketch import edits

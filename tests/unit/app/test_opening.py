@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.app import opening
-from robochoc.app.opening import opening_of
+from robochoc.app import open_file
+from robochoc.app.open_file import open_file_job
 from robochoc.app.sketch.opening import ForeignTeam
 from robochoc.app.store import FILES, Store
 from tests.support.limits import HANG_S
@@ -23,11 +23,11 @@ agents: [a1, a2]
 """
 
 
-def opened(text: str, folder: Path, *, within_s: float = HANG_S) -> tuple[Store, opening.Opening]:
+def opened(text: str, folder: Path, *, within_s: float = HANG_S) -> tuple[Store, open_file.OpenedFile]:
     """Return a store, and the result of opening a file with `text` as a team of it."""
     file, store = folder / "t.yaml", Store(folder / "store")
     file.write_text(text)
-    return store, opening_of(file, store, within_s=within_s).future.result(HANG_S)
+    return store, open_file_job(file, store, within_s=within_s).future.result(HANG_S)
 
 
 def test_a_file_becomes_a_team(tmp_path: Path) -> None:
@@ -59,5 +59,5 @@ def test_a_team_is_there_once_its_files_are_complete(tmp_path: Path, monkeypatch
         store.add_foreign(ForeignTeam(tmp_path, pair()))
     assert list(store.folder.iterdir()) == []
     (tmp_path / ".new-0123").mkdir()
-    with store.held():
+    with store.locked():
         assert [file.name for file in tmp_path.iterdir()] == [".lock"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.app.conflicts.found import ConflictSearch
-from robochoc.app.flights.making import Making
+from robochoc.app.flights.builder import FlightBuilder
 from robochoc.app.jobs.job import Job, end_all, jobs_alive
 from robochoc.app.projects import Projects
 from robochoc.app.runs.options import RunOptions
@@ -50,7 +50,7 @@ def test_all_that_it_does_is_ended(projects: Projects) -> None:
     its = runs_of(other).start(RunOptions(protocol="syncbb"))
     study_on(project).start(project.sketch, Question(("syncbb", "afb"), timeout=MOST_SECONDS))
     search = ConflictSearch(project.sketch, folder=project.folder)
-    Making(kept).wanted(lambda: None)
+    FlightBuilder(kept).wanted(lambda: None)
     assert len(jobs_alive()) == 5
     wait_until(lambda: all(job.pid for job in jobs_alive()), "not all of them have begun")
     projects.remove(project.id)

@@ -7,11 +7,11 @@ from importlib.resources import files
 
 from nicegui import ui
 
+from robochoc.app.pages.background_query import ErrorText, run_query
 from robochoc.app.pages.compare.lines import show_lines
 from robochoc.app.pages.compare.served import REPORT
-from robochoc.app.pages.looking import Wrong, looked
-from robochoc.app.pages.numbers import whole
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.numbers import bounded_integer
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, Possible, Question, possible, study_of
@@ -55,8 +55,8 @@ class ComparePage:
             self._asked = ui.element("section").classes("panel compare-part")
             self._told = ui.element("section").classes("compare-told").props("aria-live=polite")
         self._looking = ui.timer(_LOOK_S, self._look)
-        while_shown(project.on_change(self._looking.activate))
-        while_shown(self._study.on_change(self._follow))
+        on_leave(project.on_change(self._looking.activate))
+        on_leave(self._study.on_change(self._follow))
         with self._asked:
             ui.label(say("compare.looking")).classes("soft")
         self._follow()
@@ -68,13 +68,13 @@ class ComparePage:
         if sketch == self._sketch:
             return
         self._sketch = sketch
-        found = await looked(possible, sketch, self._project.files)
+        found = await run_query(possible, sketch, self._project.files)
         if found is None or self._sketch is not sketch:
             return
         self._asked.clear()
         self._boxes, self._text, self._start = {}, None, None
         with self._asked:
-            if isinstance(found, Wrong):
+            if isinstance(found, ErrorText):
                 ui.label(say("compare.not-yet", why=found)).classes("error")
                 ui.link(say("compare.to-model"), f"/team/{self._project.id}/model")
             else:
@@ -153,8 +153,8 @@ class ComparePage:
         return Question(
             tuple(name for name, box in self._boxes.items() if box.value),
             family=self._kind.value == _FAMILY,
-            runs=whole(self._runs.value, 1, MOST_RUNS, otherwise=1),
-            timeout=whole(self._timeout.value, 1, MOST_SECONDS, otherwise=1),
+            runs=bounded_integer(self._runs.value, 1, MOST_RUNS, otherwise=1),
+            timeout=bounded_integer(self._timeout.value, 1, MOST_SECONDS, otherwise=1),
             ordered=self._possible is not None and self._possible.ordered,
         )
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from html import escape
 
-from robochoc.app.flights.checking import claimed
+from robochoc.app.flights.answer_check import claim_words
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.pages.foreign.answer import robots_of
-from robochoc.app.runs.paid import costly
 from robochoc.app.runs.result import RunResult
+from robochoc.app.runs.rule_costs import rules_with_costs
 from robochoc.app.runs.run import Run, State
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.words import listed, value_words
@@ -23,7 +23,7 @@ def headline(run: Run, foreign: Facts | None = None) -> str:
 
     Of one that came in a file, it says that the file says so, and what a check has found.
     """
-    return claimed(run, _headline(run, foreign))
+    return claim_words(run, _headline(run, foreign))
 
 
 def _headline(run: Run, foreign: Facts | None) -> str:
@@ -38,7 +38,7 @@ def _headline(run: Run, foreign: Facts | None) -> str:
     if not result.assignment:
         return say("decide.nothing-yet")
     count = robots_of(foreign, result) if foreign else len(sketch.robots)
-    costs = foreign.costs if foreign else bool(costly(sketch))
+    costs = foreign.costs if foreign else bool(rules_with_costs(sketch))
     worth = foreign is not None and foreign.maximised
     words = [_who(count, result), _so_far(result, run.state)]
     words.append(_cost(result, worth=worth) if costs else "")

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from nicegui import run, ui
 
-from robochoc.app.runs.paid import paid
 from robochoc.app.runs.result import RunResult
+from robochoc.app.runs.rule_costs import rule_costs
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.words import sentence
 from robochoc.app.texts import say
@@ -19,7 +19,7 @@ MOST_BARS = 40
 
 async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> None:
     """Fill `where` with what rules cost, if there are costs. It is found beside the event loop."""
-    costs = await run.io_bound(paid, sketch, result.assignment)
+    costs = await run.io_bound(rule_costs, sketch, result.assignment)
     if not costs or where.is_deleted:
         return
     with where, ui.element("section").classes("panel costs"):

@@ -11,16 +11,16 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from robochoc.app.pages.decide.answer import headline, table_html, took
-from robochoc.app.pages.decide.conflict import Doors
+from robochoc.app.pages.decide.conversation_player import ConversationPlayer
 from robochoc.app.pages.decide.costs import show_costs
-from robochoc.app.pages.decide.ground import decides_places, targets_of
-from robochoc.app.pages.decide.how import How
+from robochoc.app.pages.decide.map_picture import decides_places, targets_of
+from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
-from robochoc.app.pages.decide.talk import Talk
+from robochoc.app.pages.decide.run_options_panel import RunOptionsPanel
 from robochoc.app.pages.foreign.answer import says_of
 from robochoc.app.pages.foreign.answer import table_html as answers_html
-from robochoc.app.pages.foreign.below import ForeignDoors, show_foreign_below
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.foreign.below import ForeignNoSolutionPanel, show_foreign_below
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.player import Frames
 from robochoc.app.runs.result import RunResult
@@ -60,7 +60,7 @@ class _Page:
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
         self._told_below: tuple[object, ...] = ()
-        self._doors: Doors | ForeignDoors | None = None
+        self._doors: NoSolutionPanel | ForeignNoSolutionPanel | None = None
         self._pressed: Run | None = None
         self._frames = Frames()
         with ui.element("h1"):
@@ -73,18 +73,18 @@ class _Page:
                 self._status = ui.label("").classes("status").props("role=status")
                 self._facts = ui.label("").classes("soft facts")
             self._not_ready = ui.element("div").classes("not-ready")
-            self._how = How(project)
+            self._how = RunOptionsPanel(project)
         with ui.element("div").classes("decide-body"):
             with ui.element("section").classes("panel team-picture"):
                 self._picture = ui.html("", sanitize=False)
                 self._legend = ui.label(say("decide.legend")).classes("soft small")
                 self._falling = ui.html("", sanitize=False).classes("cost-line")
-                self._talk = Talk(self._draw)
+                self._talk = ConversationPlayer(self._draw)
             self._answer = ui.element("section").classes("panel answer")
         self._below = ui.element("div").classes("decide-below")
-        while_shown(project.on_change(self._follow_team))
-        while_shown(self._runs.on_start(self._follow_latest))
-        while_shown(self._end)
+        on_leave(project.on_change(self._follow_team))
+        on_leave(self._runs.on_start(self._follow_latest))
+        on_leave(self._end)
         self._follow_latest()
         self._follow_team()
 
@@ -264,7 +264,7 @@ class _Page:
         if self._foreign:
             self._doors = show_foreign_below(self._project, self._foreign, result, self._decide)
         elif result.verdict == "no-solution":
-            self._doors = Doors(self._project, sketch, self._decide)
+            self._doors = NoSolutionPanel(self._project, sketch, self._decide)
         if shown.live.is_cut:
             ui.label(say("decide.live-cut", messages=f"{shown.live.messages:,}")).classes("soft")
         if result.assignment and not self._foreign:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
-from robochoc.app.pages.decide.ground import Target, brief, decides_places, goers_svg, homes, map_svg, view_box
+from robochoc.app.pages.decide.map_picture import Target, brief, decides_places, goers_svg, homes, map_svg, view_box
 from robochoc.app.sketch.sketch import Cell, Sketch, Value
 from robochoc.app.sketch.words import value_in_short
 from robochoc.app.texts import say

@@ -10,16 +10,16 @@ from pathlib import Path
 
 from nicegui import ui
 
-from robochoc.app.flights.flown import flight_words, flown_of
-from robochoc.app.flights.ground import happened_in
+from robochoc.app.flights.builder import MOST_MESSAGES, FlightBuilder, Stage, builder_of, flies
+from robochoc.app.flights.flight_map import happened_in
+from robochoc.app.flights.flight_result import flight_result_of, flight_words
+from robochoc.app.flights.flying_robots import flying_robots_words
 from robochoc.app.flights.listing import run_words
-from robochoc.app.flights.making import MOST_MESSAGES, Making, Stage, flies, making_of
 from robochoc.app.flights.report import summary
-from robochoc.app.flights.who import who_flies
-from robochoc.app.pages.fly.kept import beside
+from robochoc.app.pages.fly.saved_files import beside
+from robochoc.app.pages.fly.share_panel import build_share_panel
 from robochoc.app.pages.fly.stage import Stage as Frames
-from robochoc.app.pages.fly.tell import build_tell
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import MOST_KEPT, runs_of
@@ -48,8 +48,8 @@ class _Page:
         self._leave: Callable[[], None] = _nothing
         self._body = ui.element("div").classes("fly")
         self._follow()
-        while_shown(self._runs.on_start(self._follow))
-        while_shown(self._left)
+        on_leave(self._runs.on_start(self._follow))
+        on_leave(self._left)
 
     def _left(self) -> None:
         self._leave()
@@ -102,12 +102,12 @@ class _Page:
                 if happened := happened_in(run):
                     ui.label(say("fly.happened-first", what=" ".join(happened)))
                 ui.label(summary(sketch, run)).classes("soft")
-                for words in who_flies(run):
+                for words in flying_robots_words(run):
                     ui.label(words).classes("soft")
             self._choice(run)
         if sketch != self._project.sketch:
             ui.label(say("fly.old")).classes("note")
-        making = making_of(run)
+        making = builder_of(run)
         if not flies(run):
             remedy = "fly.no-places-files" if self._project.foreign else "fly.no-places-remedy"
             _note("fly.no-places", remedy, "fly.to-model", f"/team/{self._project.id}/model")
@@ -116,7 +116,7 @@ class _Page:
         elif run.result and run.result.ends_unsolved:
             ui.label(say("fly.unsolved")).classes("note")
         shown = _Made(making)
-        build_tell(making, shown.frames)
+        build_share_panel(making, shown.frames)
         self._leave = shown.leave
 
     def _choice(self, run: Run) -> None:
@@ -136,7 +136,7 @@ class _Page:
 class _Made:
     """The frames of a run, which appear as soon as they are made, and what is said until then."""
 
-    def __init__(self, making: Making) -> None:
+    def __init__(self, making: FlightBuilder) -> None:
         self._making = making
         self._line = ui.element("div").classes("fly-line").props("role=status")
         with self._line:
@@ -185,7 +185,7 @@ class _Made:
         making = self._making
         for place, why in making.troubles.items():
             ui.label(say(f"fly.trouble.{place}", why=why)).classes("error")
-        flown = flown_of(making.run) if making.flight else None
+        flown = flight_result_of(making.run) if making.flight else None
         words = flight_words(flown) if flown else []
         for told in words:
             ui.label(told).classes("error" if flown and flown.refused else "note")
@@ -208,7 +208,7 @@ class _Made:
             self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._making.seconds)))
 
 
-def _framed(making: Making, page: Path | None) -> str | None:
+def _framed(making: FlightBuilder, page: Path | None) -> str | None:
     """Return the address of a page for a frame: another one for each time that it was made."""
     with suppress(OSError):
         return f"{beside(making.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None

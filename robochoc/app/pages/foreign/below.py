@@ -11,7 +11,7 @@ from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, F
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.pages.foreign.answer import epochs_html
 from robochoc.app.pages.foreign.model import style
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.result import RunResult
 from robochoc.app.texts import say
@@ -21,7 +21,7 @@ _MOST_CONSTRAINTS = 60
 
 def show_foreign_below(
     project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]
-) -> ForeignDoors | None:
+) -> ForeignNoSolutionPanel | None:
     """Fill the current container; return the ways out, where there is no solution.
 
     Args:
@@ -37,11 +37,11 @@ def show_foreign_below(
                 ui.label(say("foreign.epochs"))
             ui.html(epochs_html(facts, result), sanitize=False).classes("foreign-table")
     if result.verdict == "no-solution":
-        return ForeignDoors(project, facts, result, decide)
+        return ForeignNoSolutionPanel(project, facts, result, decide)
     return None
 
 
-class ForeignDoors:
+class ForeignNoSolutionPanel:
     """The ways out of a team without a solution; of one that cannot be gone, why. `decide`: as above."""
 
     def __init__(self, project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]) -> None:
@@ -61,7 +61,7 @@ class ForeignDoors:
                 _door("foreign.door-conflict", "foreign.door-conflict-help", self._look)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
             ui.link(say("foreign.to-files"), f"/team/{project.id}/model")
-        while_shown(self.end)
+        on_leave(self.end)
 
     def end(self) -> None:
         """Search no more."""

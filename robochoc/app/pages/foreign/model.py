@@ -9,7 +9,7 @@ from pathlib import Path
 
 from nicegui import run, ui
 
-from robochoc.app.flights.names import file_name
+from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.state import files_archive
 from robochoc.app.foreign.facts import Facts, RobotFacts
 from robochoc.app.foreign.reading import Read, read

@@ -9,11 +9,11 @@ from typing import Any
 
 from nicegui import ui
 
-from robochoc.app.flights.checking import claimed
+from robochoc.app.flights.answer_check import claim_words
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.pages.foreign.answer import MOST_ROWS
 from robochoc.app.pages.foreign.model import style
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.result import robots_in
@@ -54,8 +54,8 @@ class _Page:
                 self._says = ui.label().props("role=status")
             self._wrong = ui.label().classes("error").props("role=alert")
         self._box = ui.element("section").classes("foreign-part").props("aria-live=polite")
-        while_shown(self._runs.on_start(self._follow_latest))
-        while_shown(self._end)
+        on_leave(self._runs.on_start(self._follow_latest))
+        on_leave(self._end)
         self._follow_latest()
 
     def _press(self) -> None:
@@ -110,7 +110,7 @@ class _Page:
 
     def _told(self, run: Run, before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
         with ui.element("h2"):
-            ui.label(claimed(run, _headline(self._facts, before, after)))
+            ui.label(claim_words(run, _headline(self._facts, before, after)))
         gone = [name for name in robots_in(before) if name not in robots_in(after)]
         ui.label(say("foreign.failed", names=listed(gone)))
         protocol = run.result.protocol if run.result else ""

@@ -19,7 +19,7 @@ from robochoc.app.pages.model.parts import (
     refuse_last,
 )
 from robochoc.app.pages.model.values import first_values, free_decision_name, typed_values, written_values
-from robochoc.app.pages.shell import told
+from robochoc.app.pages.shell import edit_error_text
 from robochoc.app.sketch.edits import EditError, with_decision, without_decision
 from robochoc.app.sketch.sketch import NUMBERED, Decision, Kind, Sketch
 from robochoc.app.sketch.troubles import About
@@ -150,7 +150,7 @@ class _DecisionCard:
         try:
             values = typed_values(self._kind, value or "")
         except EditError as error:
-            return told(error)
+            return edit_error_text(error)
         return self._change(values=values)
 
     def _decided_by(self, robots: tuple[str, ...]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from robochoc.app.listeners import Listeners
-from robochoc.app.pages.shell import told
+from robochoc.app.pages.shell import edit_error_text
 from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Kind, Sketch
@@ -68,7 +68,7 @@ class Desk:
         try:
             self.project.edit(change)
         except EditError as error:
-            return told(error)
+            return edit_error_text(error)
         return None
 
     def do(self, change: Edit) -> bool:

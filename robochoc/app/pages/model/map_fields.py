@@ -6,7 +6,7 @@ from nicegui import ui
 
 from robochoc.app.pages.model.desk import Desk
 from robochoc.app.pages.model.parts import number_field, put
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.sketch.edits import with_area
 from robochoc.app.sketch.sketch import MAX_SIDE
 from robochoc.app.texts import say
@@ -22,7 +22,7 @@ class MapFields:
             ui.label("×").props("aria-hidden=true").classes("soft")  # noqa: RUF001 - the sign of multiplication
             self._rows = number_field("model.rows", 1, MAX_SIDE, lambda value: self._change(rows=value))
         self._follow()
-        while_shown(desk.project.on_change(self._follow))
+        on_leave(desk.project.on_change(self._follow))
 
     def _follow(self) -> None:
         put(self._columns, self._desk.sketch.area.columns)

@@ -17,7 +17,7 @@ from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
 from robochoc.app.pages.model.robots_panel import RobotsPanel, without_robots
 from robochoc.app.pages.model.rules_panel import RulesPanel
 from robochoc.app.pages.model.sources import Sources
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import with_cell_blocked, with_robot, with_robot_moved
@@ -56,7 +56,7 @@ class ModelPage:
         self._sources = Sources(desk)
         desk.on_look(self._follow)
         desk.point = self._light
-        while_shown(project.on_change(self._changed))
+        on_leave(project.on_change(self._changed))
         self._timer = ui.timer(_QUIET_S, self._look, active=False)
         self._changed()
 

@@ -9,7 +9,7 @@ from nicegui import ui
 from robochoc.app.pages.model.desk import Desk
 from robochoc.app.sketch.edits import with_rule
 from robochoc.app.sketch.fits import why_no_cost
-from robochoc.app.sketch.palette import Form, Opening, PaletteRule
+from robochoc.app.sketch.palette import Form, PaletteRule, RuleField
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Kind, Setting, Sketch, SketchRule
 from robochoc.app.sketch.words import listed
@@ -115,7 +115,7 @@ def _nearest(sketch: Sketch, robot: str, values: tuple[int | str, ...]) -> Setti
     return min(cells, key=steps)
 
 
-def _first(opening: Opening, values: tuple[int | str, ...]) -> Setting:
+def _first(opening: RuleField, values: tuple[int | str, ...]) -> Setting:
     match opening.form:
         case Form.NUMBER:
             return opening.least if opening.default is None else opening.default

@@ -14,7 +14,7 @@ from robochoc.app.pages.model.parts import everybody_button, number_field, put, 
 from robochoc.app.sketch import sketch as limits
 from robochoc.app.sketch.edits import with_rule
 from robochoc.app.sketch.fits import why_no_cost, why_not_private
-from robochoc.app.sketch.palette import Form, Links, Opening, PaletteRule
+from robochoc.app.sketch.palette import Form, Links, PaletteRule, RuleField
 from robochoc.app.sketch.sketch import Decision, SketchRule
 from robochoc.app.sketch.troubles import Trouble
 from robochoc.app.sketch.words import value_words
@@ -106,7 +106,7 @@ class RuleForm:
 
         self._follow.append(follow)
 
-    def _opening(self, opening: Opening) -> None:
+    def _opening(self, opening: RuleField) -> None:
         match opening.form:
             case Form.NUMBER:
                 self._number(opening)
@@ -117,7 +117,7 @@ class RuleForm:
             case Form.TABLE:
                 self._table(opening)
 
-    def _number(self, opening: Opening) -> None:
+    def _number(self, opening: RuleField) -> None:
         key = f"opening.{opening.name}"
         slider, field = _slider_and_field(key, opening.least, opening.most, partial(self._set, opening.name))
 
@@ -128,7 +128,7 @@ class RuleForm:
 
         self._follow.append(follow)
 
-    def _values(self, opening: Opening, *, several: bool) -> None:
+    def _values(self, opening: RuleField, *, several: bool) -> None:
         label = say(f"opening.{opening.name}")
         choice = ui.select({}, label=label, multiple=several, with_input=True).classes("wide")
         choice.props("dense outlined use-chips" if several else "dense outlined")
@@ -152,7 +152,7 @@ class RuleForm:
 
         self._follow.append(follow)
 
-    def _table(self, opening: Opening) -> None:
+    def _table(self, opening: RuleField) -> None:
         table = PairTable(lambda rows: self._set(opening.name, rows))
 
         def follow(rule: SketchRule, decision: Decision) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from robochoc.app.flights.checking import claimed
+from robochoc.app.flights.answer_check import claim_words
 from robochoc.app.pages.whatif.outcome import Fate, Outcome, Row
 from robochoc.app.pages.whatif.story import Kept, Story
 from robochoc.app.pages.whatif.ways_out import WaysOut
@@ -56,7 +56,7 @@ class Answer:
     def _told(self, found: Outcome, kept: Kept, run: Run) -> None:
         with ui.element("div").classes("panel whatif-part"):
             with ui.element("h2"):
-                ui.label(claimed(run, _headline(found)))
+                ui.label(claim_words(run, _headline(found)))
             ui.label(" ".join(kept.happened)).classes("soft")
             if kept.anew:
                 ui.label(say("whatif.all-anew", why=kept.anew)).classes("soft")

@@ -10,10 +10,10 @@ from nicegui import run, ui
 
 from robochoc.app.pages.model.board import Act, Board, Clicked, Told
 from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
-from robochoc.app.pages.numbers import whole
-from robochoc.app.pages.shell import told, while_shown
+from robochoc.app.pages.numbers import bounded_integer
+from robochoc.app.pages.shell import edit_error_text, on_leave
 from robochoc.app.pages.whatif.answer import Answer
-from robochoc.app.pages.whatif.going_on import why_anew
+from robochoc.app.pages.whatif.can_continue import why_not_continue
 from robochoc.app.pages.whatif.story import story_of
 from robochoc.app.projects import Project
 from robochoc.app.sketch.changes import FULL, LEAST_BATTERY, AnyChange, Battery, Blocked, Fails, Joins
@@ -60,8 +60,8 @@ class WhatIfPage:
             self._answer = Answer(project, self._story)
         self._linking = ui.timer(_LINK_S, self._link, active=False)
         ui.timer(_LOOK_S, self._answer.look)
-        while_shown(project.on_change(self._follow))
-        while_shown(self._story.on_change(self._follow))
+        on_leave(project.on_change(self._follow))
+        on_leave(self._story.on_change(self._follow))
         self._follow()
 
     def _build_happenings(self) -> None:
@@ -130,11 +130,13 @@ class WhatIfPage:
         return str(self._robots.value or "")
 
     def _chosen_cell(self) -> Cell:
-        column, row = (whole(field.value, 0, MAX_SIDE + 1, otherwise=0) for field in (self._column, self._row))
+        column, row = (
+            bounded_integer(field.value, 0, MAX_SIDE + 1, otherwise=0) for field in (self._column, self._row)
+        )
         return Cell(column - 1, row - 1)
 
     def _percent(self) -> int:
-        return whole(self._slider.value, 0, FULL, otherwise=FULL)
+        return bounded_integer(self._slider.value, 0, FULL, otherwise=FULL)
 
     def _battery_set(self) -> None:
         self._happen(lambda: Battery(self._chosen(), self._percent()))
@@ -144,7 +146,7 @@ class WhatIfPage:
         try:
             self._story.add(change())
         except EditError as error:
-            self._wrong.set_text(told(error))
+            self._wrong.set_text(edit_error_text(error))
 
     # What is shown
 
@@ -194,7 +196,7 @@ class WhatIfPage:
 
 def _looked_at(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, str]:
     wrong = next((error.text for error in errors_of(after)), "")
-    return links_of(after), wrong, "" if wrong or before == after else why_anew(before, after)
+    return links_of(after), wrong, "" if wrong or before == after else why_not_continue(before, after)
 
 
 def _offered(sketch: Sketch) -> tuple[dict[str, str], dict[str, str]]:

@@ -12,8 +12,8 @@ from contextlib import suppress
 import msgspec
 
 from robochoc.app.listeners import Listeners
-from robochoc.app.log import noted
-from robochoc.app.pages.looking import Wrong, looked
+from robochoc.app.log import log_error
+from robochoc.app.pages.background_query import ErrorText, run_query
 from robochoc.app.pages.whatif.outcome import Outcome, Part, outcome, part_of, parts_of_epochs
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
@@ -136,7 +136,7 @@ class Story:
         except (ModelError, InvalidInputError) as mistake:
             self.run, self.message = None, str(mistake)
         except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
-            self.run, self.message = None, noted(fault, "what if")
+            self.run, self.message = None, log_error(fault, "what if")
         finally:
             self.preparing = False
             self._tell()
@@ -156,7 +156,7 @@ class Story:
         try:
             self._follow()
         except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
-            self.message = noted(fault, "what if")
+            self.message = log_error(fault, "what if")
         self._tell()
 
     def _follow(self) -> None:
@@ -177,8 +177,8 @@ class Story:
         """Find the outcome beside the event loop: of a large team it takes its time."""
 
         async def concluded() -> None:
-            found = await looked(work)
-            if isinstance(found, Wrong):
+            found = await run_query(work)
+            if isinstance(found, ErrorText):
                 self.message = found
             else:
                 self.outcome = found

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from nicegui import ui
 
 from robochoc.app.pages.decide.answer import headline, table_html, took
-from robochoc.app.pages.decide.conflict import Doors
-from robochoc.app.pages.shell import while_shown
+from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
+from robochoc.app.pages.shell import on_leave
 from robochoc.app.pages.whatif.story import Story
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
@@ -29,9 +29,9 @@ class WaysOut:
         self._project, self._story, self._after = project, story, after
         self._end_following: Callable[[], None] | None = None
         self._deciding: asyncio.Task[None] | None = None
-        Doors(project, after, self._decide)
+        NoSolutionPanel(project, after, self._decide)
         self._box = ui.element("div").classes("whatif-aside").props("aria-live=polite")
-        while_shown(self._end)
+        on_leave(self._end)
         last = runs_of(project).latest_for(ASIDE)
         if last is not None and _is_of(last, after):
             self._follow(last)

@@ -13,7 +13,7 @@ import msgspec
 import pytest
 
 from robochoc.app.flights import state
-from robochoc.app.flights.names import file_name
+from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.state import MAX_BYTES, MOST_SAID, is_too_long, packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.runs.options import JOURNAL

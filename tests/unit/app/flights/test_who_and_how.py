@@ -10,13 +10,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from robochoc.app.flights.builder import FlightBuilder
 from robochoc.app.flights.captions import captioned
-from robochoc.app.flights.flown import FLOWN, flight_words, flown_of, refused
-from robochoc.app.flights.ground import changed_to, ground_of, happened_in
+from robochoc.app.flights.flight_map import changed_to, ground_of, happened_in
+from robochoc.app.flights.flight_result import FLOWN, flight_result_of, flight_words, refused
+from robochoc.app.flights.flying_robots import flying_robots_words
 from robochoc.app.flights.listing import run_words
-from robochoc.app.flights.making import Making
 from robochoc.app.flights.report import Pages, report
-from robochoc.app.flights.who import who_flies
 from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.run import CHANGE, Checked, Run, State
 from robochoc.app.sketch import edits
@@ -63,17 +63,17 @@ def test_what_decided_anew_or_is_damaged_changes_nothing(tmp_path: Path) -> None
 def test_a_team_that_was_not_drawn_has_no_map(tmp_path: Path) -> None:
     run = kept_run(tmp_path, Sketch("Foreign"))
     assert ground_of(run) is None
-    assert who_flies(run) == []
+    assert flying_robots_words(run) == []
 
 
 def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
     run = kept_run(tmp_path / "all", cube())
-    assert who_flies(run) == ["All 3 robots fly to where they decided to be."]
+    assert flying_robots_words(run) == ["All 3 robots fly to where they decided to be."]
     one = kept_run(tmp_path / "one", cube(1))
-    assert who_flies(one) == ["Drone1 flies to where it decided to be."]
+    assert flying_robots_words(one) == ["Drone1 flies to where it decided to be."]
     given = {"Drone1.level": 1, "Drone2.level": 2}
     aside = kept_run(tmp_path / "aside", cube(), assignment=given, withdrawn=["Drone3"])
-    assert who_flies(aside) == [
+    assert flying_robots_words(aside) == [
         "2 of 3 robots fly to where they decided to be.",
         "Stepped aside, so that the others can keep all rules: Drone3. Who steps aside lands at the edge.",
     ]
@@ -87,25 +87,25 @@ def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
     )
     given = {f"Drone{number}.level": number for number in (1, 2, 3)}
     cook = kept_run(tmp_path / "cook", sketch, assignment={**given, "Cook.dish": "soup"})
-    assert who_flies(cook)[1:] == ["Decided neither a level nor a place, and stay where they stand: Cook."]
+    assert flying_robots_words(cook)[1:] == ["Decided neither a level nor a place, and stay where they stand: Cook."]
     changing(run, edits.without_robot(cube(), "Drone2"))
-    assert who_flies(run) == [
+    assert flying_robots_words(run) == [
         "2 of 3 robots fly to where they decided to be.",
         "Left while the others were flying: Drone2. Who leaves lands at the edge.",
     ]
     nobody = kept_run(tmp_path / "nobody", cube(kind=Kind.SLOT))
-    assert who_flies(nobody) == []
+    assert flying_robots_words(nobody) == []
 
 
 def test_how_a_flight_went_is_told(tmp_path: Path) -> None:
     run = kept_run(tmp_path, cube())
     file = run.folder / FLOWN
-    assert flown_of(run) is None
+    assert flight_result_of(run) is None
     for broken in (b"", b"[" * 100_000, b'{"drones": 3}'):
         file.write_bytes(broken)
-        assert flown_of(run) is None
+        assert flight_result_of(run) is None
     file.write_bytes(refused("two are in one place."))
-    flown = flown_of(run)
+    flown = flight_result_of(run)
     assert flown is not None
     assert flight_words(flown) == [
         "It cannot be flown: two are in one place. The picture shows where all are to be in the end."
@@ -121,7 +121,7 @@ def test_how_a_flight_went_is_told(tmp_path: Path) -> None:
         "happenings": [{"at_s": 2.04, "drone": "A", "what": "hits the ground"}] * 9,
     }
     file.write_bytes(msgspec.json.encode(told))
-    flown = flown_of(run)
+    flown = flight_result_of(run)
     assert flown is not None
     assert flight_words(flown)[:3] == ["Fallen: A.", "Not where they should be: B.", "2.0 s, A: hits the ground."]
     assert len(flight_words(flown)) == 8
@@ -212,7 +212,7 @@ def test_the_last_answer_is_flown_if_there_is_none_in_the_end(tmp_path: Path, ve
     first = {"verdict": verdict, "assignment": {"Drone1.level": 1}}
     last = {"verdict": "no-solution", "assignment": {}}
     run = kept_run(tmp_path, cube(), verdict="no-solution", assignment={}, cost=None, epochs=[first, last])
-    making = Making(run)
+    making = FlightBuilder(run)
     assert making.has_answer is making.has_flight is flown
     page = report(run.sketch, run, Pages(), "1")
     assert (b"The flight shows the last answer that there was" in page) is flown

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.app.jobs.job import EndedError, Job, LateError, call_here, end_all, end_jobs_in, jobs_alive
+from robochoc.app.jobs.job import EndedError, Job, LateError, end_all, end_jobs_in, event_loop_caller, jobs_alive
 from robochoc.app.jobs.process import Command, Finished
 from robochoc.app.listeners import Listeners
-from robochoc.app.log import FAULTS
+from robochoc.app.log import ERROR_LOG
 from tests.support.limits import HANG_S, wait_until
 
 ENDLESS = """
@@ -172,7 +172,7 @@ class TestCalls:
     def test_that_the_loop_is_told_in_its_own_thread(self) -> None:
         async def told() -> threading.Thread:
             heard: asyncio.Future[threading.Thread] = asyncio.get_running_loop().create_future()
-            call = call_here()
+            call = event_loop_caller()
             thread = threading.Thread(target=call, args=(lambda: heard.set_result(threading.current_thread()),))
             thread.start()
             return await heard
@@ -181,13 +181,13 @@ class TestCalls:
 
     def test_that_nobody_is_told_after_the_loop_is_closed(self) -> None:
         async def call() -> object:
-            return call_here()
+            return event_loop_caller()
 
         heard: list[int] = []
         told = asyncio.run(call())
         assert callable(told)
         told(lambda: heard.append(1))
-        call_here()(lambda: heard.append(2))
+        event_loop_caller()(lambda: heard.append(2))
         assert heard == [2]
 
 
@@ -201,7 +201,7 @@ def test_a_listener_that_fails_keeps_nobody_from_being_told(caplog: pytest.LogCa
     listeners.add(lambda: heard.append(1))
     end = listeners.add(fails)
     listeners.add(lambda: heard.append(2))
-    with caplog.at_level(logging.ERROR, FAULTS.name):
+    with caplog.at_level(logging.ERROR, ERROR_LOG.name):
         listeners()
     assert heard == [1, 2]
     assert "listener: ZeroDivisionError" in caplog.text

@@ -11,14 +11,14 @@ from xml.etree import ElementTree as ET
 import msgspec
 
 from robochoc.app.pages.decide.answer import headline, table_html
-from robochoc.app.pages.decide.conflict import hints_about_rules
-from robochoc.app.pages.decide.ground import UNIT, Target, shown_part, targets_of
+from robochoc.app.pages.decide.map_picture import UNIT, Target, shown_part, targets_of
+from robochoc.app.pages.decide.no_solution_panel import hints_about_rules
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.runs.fitting import fitting
 from robochoc.app.runs.labels import value_of
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.paid import paid
 from robochoc.app.runs.result import RunResult, decoded
+from robochoc.app.runs.rule_costs import rule_costs
 from robochoc.app.runs.run import Record, Run, State
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.edits import with_importance
@@ -208,7 +208,7 @@ def test_that_a_rule_that_nobody_can_keep_is_explained() -> None:
 def test_that_what_rules_cost_adds_up_after_somebody_stepped_aside() -> None:
     sketch = slots(4, 3)
     values: dict[str, Value] = {"Drone1.slot": 2, "Drone2.slot": 1, "Drone4.slot": 3}
-    assert paid(sketch, values) == {"R2": 6}
+    assert rule_costs(sketch, values) == {"R2": 6}
 
 
 def test_that_what_rules_cost_is_the_cost_of_the_answer() -> None:
@@ -221,7 +221,7 @@ def test_that_what_rules_cost_is_the_cost_of_the_answer() -> None:
         if solution.cost is None:
             continue
         values: dict[str, Value] = {f"{name}.d": cast("Value", solution[f"{name}.d"]) for name in ("A", "B", "C")}
-        costs = [*paid(sketch, values).values()]
+        costs = [*rule_costs(sketch, values).values()]
         assert sum(costs) == solution.cost, seed
         seen += solution.cost > 0
     assert seen > 5
@@ -250,4 +250,4 @@ def test_that_rules_cost_in_any_answer_what_the_checker_says(seed: int) -> None:
     for _ in range(10):
         codes = {name: random.choice([*one.domain]) for name, one in model.team.variables.items() if one.domain}
         values = {name: value_of(model, name, code) for name, code in codes.items()}
-        assert sum(paid(sketch, values).values()) == assignment_cost(model.team, codes)
+        assert sum(rule_costs(sketch, values).values()) == assignment_cost(model.team, codes)

@@ -20,7 +20,7 @@ import pytest
 
 from robochoc.app.jobs.job import Job, end_all
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.runs.result import RunResult, decoded
 from robochoc.app.runs.run import RECORD, Record, Run, State
 from robochoc.app.runs.runs import Runs
@@ -183,7 +183,7 @@ class TestRun:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("robochoc.app.runs.live.LiveReader.advance", lambda _: True)
-        monkeypatch.setattr("robochoc.app.runs.watching.READ_ON_S", 0)
+        monkeypatch.setattr("robochoc.app.runs.run_job.READ_ON_S", 0)
         run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
         assert run.state is State.ENDED
         assert run.live.is_cut

@@ -43,7 +43,7 @@ def _decided(robot: str, value: int, t: float = 0) -> Decided:
 def _taken(*entries: JournalEntry) -> Tape:
     tape = _tape()
     for entry in (HEADER, Began(t=0, protocol="syncbb"), *entries):
-        tape.take(entry)
+        tape.add(entry)
     tape.end()
     return tape
 
@@ -168,7 +168,7 @@ def test_that_the_end_is_the_answer_where_robots_step_aside(protocol: str) -> No
     assert journal.outcome.withdrawn
     tape = _tape([*team.order])
     for event in journal.events:
-        tape.take(event)
+        tape.add(event)
     tape.end()
     assert tape.values_at(len(tape.moments) - 1) == journal.outcome.assignment
 
@@ -212,9 +212,9 @@ def test_that_steps_and_seeks_pause_and_stay_within() -> None:
     player.seek(10**400)
     assert player.moment == 9
     for odd in (None, "fast", 1e9, -1):
-        player.hurry(odd)
+        player.set_speed(odd)
     assert player.speed == 1.0
-    player.hurry(0.25)
+    player.set_speed(0.25)
     assert player.speed == 0.25
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.app.runs.fitting import fitting
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.troubles import NotReadyError

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 import msgspec
 
-from robochoc.app.flights.ground import changed_to
+from robochoc.app.flights.flight_map import changed_to
 from robochoc.app.runs.labels import value_of
 from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.result import RunResult
@@ -40,7 +40,7 @@ class _Told(msgspec.Struct):
     cost: int | Decimal | None = None
 
 
-def claimed(run: Run, claims: str) -> str:
+def claim_words(run: Run, claims: str) -> str:
     """Return what is told of a run. Of one that came in a file: that the file says so, and what a check has found.
 
     Args:

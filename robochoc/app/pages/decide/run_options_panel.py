@@ -6,8 +6,8 @@ from math import inf
 
 from nicegui import ui
 
-from robochoc.app.pages.looking import Wrong, looked
-from robochoc.app.pages.numbers import whole
+from robochoc.app.pages.background_query import ErrorText, run_query
+from robochoc.app.pages.numbers import bounded_integer
 from robochoc.app.projects import Project
 from robochoc.app.runs.fitting import Fitting, fitting
 from robochoc.app.runs.options import MAX_SEED, RunOptions
@@ -19,7 +19,7 @@ from robochoc.run.options import Runtime
 _MOST_REASONS = 12
 
 
-class How:
+class RunOptionsPanel:
     """The options, folded. `options` are those that are set."""
 
     def __init__(self, project: Project) -> None:
@@ -41,7 +41,7 @@ class How:
         return RunOptions(
             protocol=str(self._protocol.value or AUTO)[:MAX_LABEL],
             runtime=str(Runtime(self._runtime.value or Runtime.SIMULATOR)),
-            seed=whole(self._seed.value, 0, MAX_SEED, otherwise=0),
+            seed=bounded_integer(self._seed.value, 0, MAX_SEED, otherwise=0),
             timeout=float(limit) if limit and 0 < limit < inf else None,
             withdraw=withdraw,
         )
@@ -53,8 +53,8 @@ class How:
             return
         self._looked_at = sketch
         self._tell(say("decide.looking"))
-        found = await looked(fitting, sketch, self._project.files)
-        if isinstance(found, Wrong):
+        found = await run_query(fitting, sketch, self._project.files)
+        if isinstance(found, ErrorText):
             self._looked_at = None  # unfolded anew, it is looked at again
             self._tell(say("decide.fits-none", why=found))
         elif found is not None:

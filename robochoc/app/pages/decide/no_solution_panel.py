@@ -11,7 +11,7 @@ from nicegui import run, ui
 from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, Finder
 from robochoc.app.conflicts.rules import with_only
 from robochoc.app.pages.model.parts import TroubleLines
-from robochoc.app.pages.shell import told, while_shown
+from robochoc.app.pages.shell import edit_error_text, on_leave
 from robochoc.app.projects import Project
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError, with_rule, with_rule_switched
@@ -29,7 +29,7 @@ def hints_about_rules(sketch: Sketch) -> list[Trouble]:
     return [one for one in troubles(sketch) if one.about == About.RULE and not one.is_error]
 
 
-class Doors:
+class NoSolutionPanel:
     """The two doors out of a team without a solution.
 
     `decide` lets the team decide again, with `withdraw` so that robots may step aside.
@@ -46,7 +46,7 @@ class Doors:
                 self._door("decide.door-aside", partial(decide, withdraw=True))
                 self._door("decide.door-conflict", self._look)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
-        while_shown(self.end)
+        on_leave(self.end)
         ui.timer(0, self._look_at_once, once=True)
 
     async def _look_at_once(self) -> None:
@@ -137,6 +137,6 @@ class Doors:
         try:
             self._project.edit(change)
         except EditError as error:
-            ui.notify(told(error), type="negative")
+            ui.notify(edit_error_text(error), type="negative")
         else:
             self._decide()

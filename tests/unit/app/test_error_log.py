@@ -10,13 +10,13 @@ import pytest
 
 pytest.importorskip("nicegui")
 
-from robochoc.app import faults
-from robochoc.app.faults import ERRORS, keep_faults
-from robochoc.app.log import FAULTS, TOLD, words
+from robochoc.app import error_log
+from robochoc.app.error_log import ERRORS, log_errors_to
+from robochoc.app.log import ERROR_LOG, USER_LOG, error_text
 from robochoc.app.sketch.edits import EditError
 
 _LOGGERS = ("nicegui", "socketio", "socketio.server", "engineio", "engineio.server", "asyncio", "uvicorn",
-            "uvicorn.error", "uvicorn.access", "uvicorn.asgi", TOLD.name, FAULTS.name)  # fmt: skip
+            "uvicorn.error", "uvicorn.access", "uvicorn.asgi", USER_LOG.name, ERROR_LOG.name)  # fmt: skip
 
 
 @pytest.fixture
@@ -24,8 +24,8 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder in which errors are kept, as long as the test runs."""
     before = {name: ([*logging.getLogger(name).handlers], logging.getLogger(name).propagate) for name in _LOGGERS}
     monkeypatch.setattr("nicegui.app.on_exception", lambda _: None)
-    monkeypatch.setattr(faults, "MOST_BYTES", 1 << 16)
-    keep_faults(tmp_path)
+    monkeypatch.setattr(error_log, "MOST_BYTES", 1 << 16)
+    log_errors_to(tmp_path)
     yield tmp_path
     for name, (handlers, propagate) in before.items():
         logger = logging.getLogger(name)
@@ -56,13 +56,13 @@ def test_an_error_cannot_steer_the_terminal_nor_fill_the_disk(kept: Path) -> Non
     assert sorted(file.name for file in files) == [ERRORS, f"{ERRORS}.1"]
     for file in files:
         text = file.read_text(encoding="utf-8")
-        assert len(text) <= faults.MOST_BYTES + 2 * faults.MOST_CHARACTERS
+        assert len(text) <= error_log.MOST_BYTES + 2 * error_log.MOST_CHARACTERS
         assert all(letter.isprintable() or letter == "\n" for letter in text)
 
 
 def test_what_users_must_know_is_told_each_time(kept: Path, capfd: pytest.CaptureFixture[str]) -> None:
     for _ in range(2):
-        TOLD.error("not saved: %s", "\x1b[2J")
+        USER_LOG.error("not saved: %s", "\x1b[2J")
     assert capfd.readouterr().err == "not saved: \\x1b[2J\n" * 2
     assert not (kept / ERRORS).exists()
 
@@ -74,6 +74,6 @@ def test_a_file_that_cannot_be_written_is_no_error(kept: Path, capfd: pytest.Cap
 
 
 def test_the_page_says_what_somebody_can_understand() -> None:
-    assert words(EditError("app.removed")).startswith("This team was removed")
-    assert "No space left" in words(OSError(28, "No space left on device"))
-    assert "<b>" not in words(ValueError("<b>secret</b>"))
+    assert error_text(EditError("app.removed")).startswith("This team was removed")
+    assert "No space left" in error_text(OSError(28, "No space left on device"))
+    assert "<b>" not in error_text(ValueError("<b>secret</b>"))

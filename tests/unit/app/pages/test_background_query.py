@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("nicegui")
 
 from robochoc.app.jobs.job import end_all
-from robochoc.app.pages.looking import Wrong, looked
+from robochoc.app.pages.background_query import ErrorText, run_query
 from robochoc.app.pages.whatif import story as stories
 from robochoc.app.pages.whatif.story import Story
 from robochoc.app.projects import Projects
@@ -43,12 +43,12 @@ def test_a_mistake_is_told_in_its_words_and_a_fault_in_ours(caplog: pytest.LogCa
     def mistaken(text: str) -> None:
         raise ModelError(text)
 
-    told = asyncio.run(looked(mistaken, "no values"))
-    assert isinstance(told, Wrong)
+    told = asyncio.run(run_query(mistaken, "no values"))
+    assert isinstance(told, ErrorText)
     assert told.endswith("no values")
-    assert asyncio.run(looked(len, "abc")) == 3
+    assert asyncio.run(run_query(len, "abc")) == 3
     assert not caplog.records
-    assert asyncio.run(looked(_fails)) == Wrong(FAULT)
+    assert asyncio.run(run_query(_fails)) == ErrorText(FAULT)
     assert "ZeroDivisionError" in caplog.text
 
 

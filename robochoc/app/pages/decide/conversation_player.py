@@ -24,7 +24,7 @@ _ANSWERS_S = 20.0
 _CALM = "matchMedia('(prefers-reduced-motion: reduce)').matches"
 
 
-class Talk:
+class ConversationPlayer:
     """The list of messages, and below it, once the run is over, the controls that play it back.
 
     `draw` is called when the picture is to be drawn again: `shown` says which moment is to be seen.
@@ -53,7 +53,7 @@ class Talk:
         self._slider = ui.slider(min=0, max=1, step=1, value=0, on_change=self._sought)
         self._slider.props["aria-label"] = say("decide.talk-controls")
         choices = {speed: say("decide.talk-times", times=f"{speed:g}") for speed in SPEEDS}
-        self._speed = ui.select(choices, value=1.0, on_change=lambda event: self._player.hurry(event.value))
+        self._speed = ui.select(choices, value=1.0, on_change=lambda event: self._player.set_speed(event.value))
         self._speed.props("dense borderless").props["aria-label"] = say("decide.talk-speed")
         self._where = ui.label("").classes("soft where")
 
@@ -114,7 +114,7 @@ class Talk:
                 self._where.set_text(say("decide.talk-none"))
                 return False
             self._tape, self._player = tape, Player(len(tape.moments))
-            self._player.hurry(self._speed.value)
+            self._player.set_speed(self._speed.value)
             self._slider.props["max"] = self._player.count - 1
             self._slider.update()
         self._opened = self._tape is not None

@@ -28,7 +28,7 @@ class _Drone(msgspec.Struct, frozen=True):
     error_m: float | None = None
 
 
-class Flown(msgspec.Struct, frozen=True):
+class FlightResult(msgspec.Struct, frozen=True):
     """How a flight went.
 
     Attributes:
@@ -49,23 +49,23 @@ def refused(why: str) -> bytes:
     return msgspec.json.encode({"as_planned": False, "refused": why})
 
 
-def flown_of(run: Run) -> Flown | None:
+def flight_result_of(run: Run) -> FlightResult | None:
     """Return how the flight of a run went; None: that is not known."""
     file = run.artefact(FLOWN)
     try:
         if file is None or file.stat().st_size > _MAX_BYTES:
             return None
-        return msgspec.json.decode(file.read_bytes(), type=Flown)
+        return msgspec.json.decode(file.read_bytes(), type=FlightResult)
     except (OSError, msgspec.DecodeError, RecursionError):
         return None
 
 
-def flight_words(flown: Flown) -> list[str]:
+def flight_words(flown: FlightResult) -> list[str]:
     """Return what is to be told of a flight, in sentences: nothing of one in which all went well."""
     return [*_words(flown)]
 
 
-def _words(flown: Flown) -> Iterator[str]:
+def _words(flown: FlightResult) -> Iterator[str]:
     if flown.refused:
         yield say("fly.refused", why=flown.refused.rstrip("."))
         return

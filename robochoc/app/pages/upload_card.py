@@ -13,7 +13,7 @@ from starlette.datastructures import UploadFile
 from starlette.routing import Route
 
 from robochoc.app.jobs.job import EndedError
-from robochoc.app.opening import opening_of
+from robochoc.app.open_file import open_file_job
 from robochoc.app.projects import Projects
 from robochoc.app.sketch.opening import MAX_BYTES
 from robochoc.app.texts import say
@@ -21,12 +21,12 @@ from robochoc.system.plain_text import on_one_line
 from robochoc.system.temporary_files import PrivateFolder
 
 _LONGEST_NAME = 100
-_MOST_TOLD = 3
-"""Mistakes of a file that are told: where many files are wrong, the first ones say what is to be done."""
+_MOST_SHOWN = 3
+"""The maximum number of errors of a file that are shown."""
 
 
-def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
-    """Add the card that opens a file; `show` is called with the id of the team that is made of it."""
+def build_upload_card(projects: Projects, show: Callable[[str], None]) -> None:
+    """Add the card that opens a file; `show` is called with the id of the new team."""
     item = ui.element("li").classes("item")
     with item, ui.element("button").classes("card").props("type=button") as card:
         with ui.element("span").classes("picture").props("aria-hidden=true"):
@@ -36,50 +36,50 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
         ui.label(say("gallery.file-hint")).classes("soft")
         wrong = ui.label().classes("error mistakes").props("role=alert")
 
-    async def take(event: UploadEventArguments) -> None:
+    async def open_upload(event: UploadEventArguments) -> None:
         wrong.set_text("")
         upload.reset()
         with PrivateFolder() as folder:
             file = Path(folder) / (Path(event.file.name or "").name[-_LONGEST_NAME:] or "team")
             await event.file.save(file)
             try:
-                found = await asyncio.wrap_future(opening_of(file, projects.store).future)
-            except EndedError:  # the server ends
+                found = await asyncio.wrap_future(open_file_job(file, projects.store).future)
+            except EndedError:  # the server is shutting down
                 return
             if found.mistakes:
-                wrong.set_text(_told(found.mistakes.replace(f"{folder}/", "")))
+                wrong.set_text(_first_errors(found.mistakes.replace(f"{folder}/", "")))
             else:
                 show(found.team)
 
     with item:
         upload = ui.upload(
-            on_upload=take,
+            on_upload=open_upload,
             on_rejected=lambda: wrong.set_text(say("gallery.too-large", most=MAX_BYTES >> 20)),
             auto_upload=True,
             max_file_size=MAX_BYTES,
         ).classes("hidden")
-    _take_files_alone(str(upload.props["url"]))
-    # In the browser: it opens the dialog for a click alone.
+    _accept_only_files(str(upload.props["url"]))
+    # In the browser, since it opens the file dialog only in response to a click.
     card.on("click", js_handler=f"() => getElement({upload.id}).$el.querySelector('input[type=file]').click()")
 
 
-def _take_files_alone(url: str) -> None:
-    """Refuse forms without a file that are sent to the address of an upload: NiceGUI has no answer to text."""
+def _accept_only_files(url: str) -> None:
+    """Reject forms without a file at the address of an upload, which NiceGUI does not handle."""
     route = next(route for route in app.routes if isinstance(route, Route) and route.path == url)
     app.remove_route(url)
 
     @app.post(url)
-    async def taken(request: Request) -> dict[str, str]:
-        async with request.form() as form:  # it is read once: NiceGUI gets the same
+    async def upload(request: Request) -> dict[str, str]:
+        async with request.form() as form:  # the form is cached: NiceGUI gets the same one
             if not form or not all(isinstance(value, UploadFile) for value in form.values()):
                 raise HTTPException(400, say("gallery.no-file"))
             answer: dict[str, str] = await route.endpoint(request)
             return answer
 
 
-def _told(mistakes: str) -> str:
-    """Return the first mistakes, each in its line, and how many others there are."""
+def _first_errors(mistakes: str) -> str:
+    """Return the first errors, one per line, and the number of the others."""
     lines = mistakes.splitlines() or [say("app.fault")]
-    more = len(lines) - _MOST_TOLD
-    told = [on_one_line(line) for line in lines[:_MOST_TOLD]]
-    return "\n".join([*told, say("gallery.more-mistakes", count=f"{more:,}")] if more > 0 else told)
+    more = len(lines) - _MOST_SHOWN
+    first = [on_one_line(line) for line in lines[:_MOST_SHOWN]]
+    return "\n".join([*first, say("gallery.more-mistakes", count=f"{more:,}")] if more > 0 else first)

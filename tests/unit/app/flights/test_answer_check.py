@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.app.flights.checking import check, claimed
-from robochoc.app.flights.ground import changed_to
+from robochoc.app.flights.answer_check import check, claim_words
+from robochoc.app.flights.flight_map import changed_to
 from robochoc.app.flights.state import packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.pages.decide.answer import headline
@@ -122,7 +122,7 @@ def test_that_what_the_file_says_of_its_check_does_not_count(tmp_path: Path) -> 
 
 def test_that_ones_own_run_is_told_as_it_is(tmp_path: Path) -> None:
     run = kept_run(tmp_path, cube())
-    assert claimed(run, "It is so.") == "It is so."
+    assert claim_words(run, "It is so.") == "It is so."
 
 
 def test_that_values_of_two_words_are_checked(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_that_the_team_after_what_has_happened_is_the_one_that_counts(tmp_path: 
 
 
 def test_that_too_large_a_team_is_not_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.app.flights.checking.CHECK_S", -1.0)
+    monkeypatch.setattr("robochoc.app.flights.answer_check.CHECK_S", -1.0)
     assert _opened(tmp_path).record.checked is None
 
 
@@ -188,7 +188,7 @@ def test_that_a_worth_is_checked_in_the_users_numbers(tmp_path: Path, cost: floa
     check(run)
     assert (run.record.checked, run.record.maximised) == (found, True)
     right = "and what it is worth is right" if run.record.checked is Checked.KEPT else "is another number"
-    assert right in claimed(run, "")
+    assert right in claim_words(run, "")
 
 
 @looped(

@@ -14,8 +14,8 @@ from fastapi.responses import FileResponse
 from nicegui import app
 
 from robochoc import __version__
-from robochoc.app.flights.making import CONVERSATION, FLIGHT, RECORDING
-from robochoc.app.flights.names import file_name
+from robochoc.app.flights.builder import CONVERSATION, FLIGHT, RECORDING
+from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.report import Pages, report
 from robochoc.app.flights.state import packed, team_archive
 from robochoc.app.projects import Projects
@@ -43,7 +43,7 @@ def beside(run: Run, file: str) -> str:
     return f"kept/{run.id}/{file}"
 
 
-def install_kept(projects: Projects) -> None:
+def install_saved_files(projects: Projects) -> None:
     """Install the addresses of files."""
 
     @app.get("/team/{name}/kept/{number}/{file}")

@@ -7,15 +7,15 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from robochoc.app.flights.making import RECORDING, CannotMakeError, Making, can_record, flies
-from robochoc.app.flights.names import file_name
+from robochoc.app.flights.builder import RECORDING, CannotMakeError, FlightBuilder, can_record, flies
+from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.state import MOST_SAID, is_too_long
-from robochoc.app.pages.fly.kept import REPORT, STATE, TEAM, beside
+from robochoc.app.pages.fly.saved_files import REPORT, STATE, TEAM, beside
 from robochoc.app.pages.fly.stage import Stage
 from robochoc.app.texts import say
 
 
-def build_tell(making: Making, stage: Stage | None) -> None:
+def build_share_panel(making: FlightBuilder, stage: Stage | None) -> None:
     """Fill the current container."""
     run = making.run
     name = run.sketch.name
@@ -37,7 +37,7 @@ def build_tell(making: Making, stage: Stage | None) -> None:
                 _copy(run.id, stage)
 
 
-def _recording(making: Making) -> None:
+def _recording(making: FlightBuilder) -> None:
     with _card("tell.recording", "tell.recording-hint"):
         if not making.has_answer or not flies(making.run):
             ui.label(say("tell.recording-nothing")).classes("soft")

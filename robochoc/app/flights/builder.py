@@ -22,12 +22,12 @@ from pathlib import Path
 import msgspec
 
 from robochoc.app.flights.captions import captioned
-from robochoc.app.flights.flown import FLOWN, flown_of, refused
-from robochoc.app.flights.ground import MAP, ground_of
-from robochoc.app.jobs.job import Call, Job, call_here
+from robochoc.app.flights.flight_map import MAP, ground_of
+from robochoc.app.flights.flight_result import FLOWN, flight_result_of, refused
+from robochoc.app.jobs.job import Call, Job, event_loop_caller
 from robochoc.app.jobs.process import Command
 from robochoc.app.listeners import Listeners
-from robochoc.app.log import words
+from robochoc.app.log import error_text
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.building import model_of
@@ -46,7 +46,7 @@ MOST_MESSAGES = 100_000
 _NOT_AS_PLANNED = 4
 """The exit status of `robochoc fly` for a flight in which somebody has not arrived: it can be looked at."""
 _MAX_MESSAGE = 600
-_REFUSAL = "it cannot be flown: "
+_REFUSAL = "the result cannot be flown: "
 """What `robochoc fly` says before the reason."""
 
 
@@ -79,8 +79,8 @@ def can_record() -> bool:
     return find_spec("mcap") is not None
 
 
-class Making:
-    """Makes the files of one run that are looked at or handed on. `making_of` returns the one object of each."""
+class FlightBuilder:
+    """Makes the files of one run that are looked at or handed on. `builder_of` returns the one object of each."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -91,7 +91,7 @@ class Making:
         self._wanted = Listeners()
         self._job: Job[None] | None = None
         self._before: Job[None] | None = None
-        self._call: Call = call_here()
+        self._call: Call = event_loop_caller()
         self._recording = asyncio.Lock()
 
     @property
@@ -146,7 +146,7 @@ class Making:
         """Try again to make what could not be made, and a flight that was refused. Raises `OSError`."""
         if self.stage != Stage.DONE:
             return
-        flown = flown_of(self.run)
+        flown = flight_result_of(self.run)
         if flown and flown.refused:
             for name in (FLIGHT, FLOWN):
                 (self.run.folder / name).unlink(missing_ok=True)
@@ -172,13 +172,13 @@ class Making:
                 except CannotMakeError:
                     raise
                 except Exception as fault:  # noqa: BLE001 - it was ended, or the file of errors has it
-                    raise CannotMakeError(words(fault)) from None
+                    raise CannotMakeError(error_text(fault)) from None
             return file
 
     def _begin(self) -> None:
         self.troubles.clear()
         self._began = time.monotonic()
-        self._call = call_here()
+        self._call = event_loop_caller()
         self.stage = Stage.FLIGHT if self._wants_flight else Stage.CONVERSATION
         before, self._before = self._before, None
         self._job = job = Job(f"flight {self.run.folder}", partial(self._make, before), folder=self.run.folder)
@@ -276,6 +276,6 @@ class Making:
         self._call(self._wanted)
 
 
-def making_of(run: Run) -> Making:
+def builder_of(run: Run) -> FlightBuilder:
     """Return what is made of a run, the same object for all pages that show it."""
-    return run.part(Making)
+    return run.part(FlightBuilder)

@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.app.flights.flown import flown_of
-from robochoc.app.flights.making import FLIGHT, Making, Stage, flies, making_of
+from robochoc.app.flights.builder import FLIGHT, FlightBuilder, Stage, builder_of, flies
+from robochoc.app.flights.flight_result import flight_result_of
 from robochoc.app.jobs.job import jobs_alive
-from robochoc.app.log import words
+from robochoc.app.log import error_text
 from robochoc.app.runs.options import JOURNAL, RESULT, RunOptions
 from robochoc.app.runs.run import Record, Run
 from robochoc.app.sketch.sketch import Kind, Sketch
@@ -31,11 +31,11 @@ def test_only_who_decides_heights_or_places_flies(tmp_path: Path) -> None:
 
 def test_all_pages_share_what_is_made_of_a_run(tmp_path: Path) -> None:
     run = kept_run(tmp_path, cube())
-    making = making_of(run)
-    assert making_of(run) is making
+    making = builder_of(run)
+    assert builder_of(run) is making
 
 
-async def _made(making: Making) -> list[Stage]:
+async def _made(making: FlightBuilder) -> list[Stage]:
     """Make all of it; return the stages, as they were told."""
     stages: list[Stage] = []
     over = asyncio.Event()
@@ -52,7 +52,7 @@ async def _made(making: Making) -> list[Stage]:
 
 @pytest.mark.slow
 def test_a_run_without_its_teams_files_is_flown_and_a_damaged_journal_told(tmp_path: Path) -> None:
-    making = Making(kept_run(tmp_path, cube()))
+    making = FlightBuilder(kept_run(tmp_path, cube()))
     assert asyncio.run(_made(making)) == [Stage.FLIGHT, Stage.CONVERSATION, Stage.DONE]
     assert making.flight, making.troubles
     assert making.flight.read_bytes().startswith(b"<!doctype html>")
@@ -60,11 +60,11 @@ def test_a_run_without_its_teams_files_is_flown_and_a_damaged_journal_told(tmp_p
     assert JOURNAL in making.troubles[Stage.CONVERSATION]
     assert not making.has_conversation
     # What is there is not made again.
-    assert asyncio.run(_made(Making(making.run)))[0] is Stage.CONVERSATION
+    assert asyncio.run(_made(FlightBuilder(making.run)))[0] is Stage.CONVERSATION
 
 
 def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path) -> None:
-    making = Making(kept_run(tmp_path, cube()))
+    making = FlightBuilder(kept_run(tmp_path, cube()))
     one, other = making.wanted(lambda: None), making.wanted(lambda: None)
     (job,) = jobs_alive()
     wait_until(lambda: job.pid is not None, "it has no process")
@@ -77,16 +77,18 @@ def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path) -> None:
 
 
 def test_what_failed_can_be_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    making = Making(kept_run(tmp_path, cube()))
-    monkeypatch.setattr(Making, "_make_flight", _failing)
+    making = FlightBuilder(kept_run(tmp_path, cube()))
+    monkeypatch.setattr(FlightBuilder, "_make_flight", _failing)
     asyncio.run(_made(making))
-    assert making.troubles[Stage.FLIGHT] == words(ValueError())
+    assert making.troubles[Stage.FLIGHT] == error_text(ValueError())
     assert not making.has_flight
     making.wanted(lambda: None)
     assert making.stage is Stage.DONE  # not by itself
     monkeypatch.undo()
-    monkeypatch.setattr(Making, "_make_flight", lambda self, _: self.run.folder.joinpath(FLIGHT).write_bytes(b"scene"))
-    monkeypatch.setattr(Making, "_make_conversation", lambda *_: None)
+    monkeypatch.setattr(
+        FlightBuilder, "_make_flight", lambda self, _: self.run.folder.joinpath(FLIGHT).write_bytes(b"scene")
+    )
+    monkeypatch.setattr(FlightBuilder, "_make_conversation", lambda *_: None)
     making.again()
     wait_until(lambda: making.stage is Stage.DONE, "it is not made")
     assert making.flight
@@ -104,10 +106,10 @@ def test_a_flight_that_is_refused_tells_why_and_is_made_again(tmp_path: Path) ->
     sketch = msgspec.structs.replace(
         sketch, decisions=(msgspec.structs.replace(sketch.decisions[0], values=(1, 900_000)),)
     )
-    making = Making(kept_run(tmp_path, sketch, assignment={"Drone1.level": 1, "Drone2.level": 900_000}))
+    making = FlightBuilder(kept_run(tmp_path, sketch, assignment={"Drone1.level": 1, "Drone2.level": 900_000}))
     asyncio.run(_made(making))
     assert making.flight, making.troubles
-    flown = flown_of(making.run)
+    flown = flight_result_of(making.run)
     assert flown is not None
     assert "m are to be kept: ask for a larger scale" in flown.refused
     assert "cannot be flown" not in flown.refused
@@ -115,6 +117,6 @@ def test_a_flight_that_is_refused_tells_why_and_is_made_again(tmp_path: Path) ->
     (making.run.folder / RESULT).write_bytes((low.folder / RESULT).read_bytes())
     making.again()
     wait_until(lambda: making.stage is Stage.DONE, "it is not made")
-    flown = flown_of(making.run)
+    flown = flight_result_of(making.run)
     assert flown is not None
     assert (flown.refused, flown.as_planned) == ("", True)

@@ -1,6 +1,6 @@
 """Open a file as a new team in a separate process, since reading an untrusted file can take any time and memory.
 
-python -m robochoc.app.opening STORE FILE
+python -m robochoc.app.open_file STORE FILE
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ PATIENCE_S = 60.0
 """The time limit for opening a file."""
 
 
-class Opening(msgspec.Struct, frozen=True):
+class OpenedFile(msgspec.Struct, frozen=True):
     """The id of the new team, or the errors in the file, one on each line."""
 
     team: str = ""
     mistakes: str = ""
 
 
-def opening_of(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> Job[Opening]:
+def open_file_job(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> Job[OpenedFile]:
     """Start opening `file` as a new team in `store`; return the job."""
 
-    def work(job: Job[Opening]) -> Opening:
+    def work(job: Job[OpenedFile]) -> OpenedFile:
         try:
             finished = job.run(Command((str(store.folder), str(file)), module=__name__), within_s=within_s)
         except LateError:
-            return Opening(mistakes=say("gallery.too-slow", name=file.name, seconds=f"{within_s:g}"))
+            return OpenedFile(mistakes=say("gallery.too-slow", name=file.name, seconds=f"{within_s:g}"))
         if finished.status or not finished.out:
-            return Opening(mistakes=say("gallery.broken", name=file.name, why=finished.why.splitlines()[-1]))
-        return msgspec.json.decode(finished.out, type=Opening)
+            return OpenedFile(mistakes=say("gallery.broken", name=file.name, why=finished.why.splitlines()[-1]))
+        return msgspec.json.decode(finished.out, type=OpenedFile)
 
     return Job(f"opening of {file.name}", work).start()
 
@@ -52,12 +52,12 @@ def main() -> None:
     try:
         found = opened(file)
         team = store.add(found) if isinstance(found, Sketch) else store.add_foreign(found)
-        with suppress(OSError):  # the run that a state has beside its team
+        with suppress(OSError):  # a saved state also has a run
             unpack_run(file, store.path(team))
     except (InvalidInputError, OSError) as error:
-        answer = Opening(mistakes=str(error))
+        answer = OpenedFile(mistakes=str(error))
     else:
-        answer = Opening(team)
+        answer = OpenedFile(team)
     sys.stdout.buffer.write(msgspec.json.encode(answer))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robochoc.app.flights.ground import changed_to
+from robochoc.app.flights.flight_map import changed_to
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.sketch import Kind, Sketch
@@ -15,7 +15,7 @@ SENT_BY = frozenset({Kind.LEVEL, Kind.PLACE})
 """The kinds of decisions that say where a robot is to be."""
 
 
-def who_flies(run: Run) -> list[str]:
+def flying_robots_words(run: Run) -> list[str]:
     """Return sentences on how many robots fly, and which do not and why; none where nobody flies, or it is not known.
 
     Raises as `Run.sketch`.

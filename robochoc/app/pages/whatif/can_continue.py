@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robochoc.app.pages.whatif.story import goes_on
-from robochoc.app.runs.paid import costly
+from robochoc.app.runs.rule_costs import rules_with_costs
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.differences import AnewError, changing_model
 from robochoc.app.sketch.palette import Links
@@ -21,14 +21,14 @@ MOST_CHOSEN_FOR = 60
 """Of larger teams it is not looked at beforehand which protocol `auto` takes."""
 
 
-def why_anew(before: Sketch, after: Sketch) -> str:
+def why_not_continue(before: Sketch, after: Sketch) -> str:
     """Return why the team will begin anew after a change, in words; empty: it can go on from before.
 
     Args:
         before: The team before the change.
         after: The team after it.
     """
-    if costly(before) or costly(after):
+    if rules_with_costs(before) or rules_with_costs(after):
         return say("whatif.before-costs")
     if any(_has_secrets(sketch) for sketch in (before, after)):
         return say("whatif.before-secrets")

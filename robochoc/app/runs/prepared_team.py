@@ -1,0 +1,103 @@
+"""Preparation of a run: the team's files in the run's folder, and the conversion of values for the user."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from robochoc.app.foreign.facts import domains_of
+from robochoc.app.runs.labels import called_in, label_of, labels_of
+from robochoc.app.runs.run import Run
+from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.sketch import Sketch, Value
+from robochoc.formats import read_team, write_team
+from robochoc.model.problem import AddAgent, Change, Domain, Robot, ScenarioEvent, Team
+from robochoc.modelling.model import Model
+
+
+@dataclass(frozen=True)
+class PreparedTeam:
+    """A team that is ready for a run.
+
+    Attributes:
+        team: The team.
+        label: Converts the code of a variable to the user's value.
+        labels: The user's values with another spelling in files, by that spelling.
+        called: Converts the code of a variable to the short text in messages.
+    """
+
+    team: Team
+    label: Callable[[str, int], Value]
+    labels: dict[str, str]
+    called: Callable[[str, int], str]
+
+    @property
+    def robots(self) -> list[str]:
+        """The names of all robots, also of robots that join later."""
+        return [robot.name for robot in _robots(self.team)]
+
+
+@dataclass(frozen=True)
+class TeamFiles:
+    """The files of an imported team.
+
+    Attributes:
+        folder: Their folder.
+        flies: Whether its decisions are positions of robots.
+        maximised: Whether its costs are utilities, whose sum is maximised.
+        then: Changes of the team after the problem of its files, and its scenario, are solved.
+    """
+
+    folder: Path
+    flies: bool = True
+    maximised: bool = False
+    then: tuple[Change, ...] = ()
+
+
+def prepare_sketch(run: Run, model: Callable[[Sketch], Model]) -> PreparedTeam:
+    """Write the files of a run's sketch, converted by `model`. Raises as `model`, and `OSError`."""
+    converted = model(run.sketch)
+    converted.save(run.team)
+    return _of_model(converted, run.sketch)
+
+
+def prepare_files(run: Run, files: TeamFiles) -> PreparedTeam:
+    """Write the files of a run's team, unchanged or with later changes. Raises `InvalidInputError`, `OSError`.
+
+    Values have the spelling of the files.
+    """
+    team = read_team(files.folder)
+    if files.then:
+        team = replace(team, scenario=(*team.scenario, ScenarioEvent(files.then)))
+        write_team(team, run.team)
+    else:
+        shutil.copytree(files.folder, run.team)
+    return _of_files(team)
+
+
+def from_run(run: Run) -> PreparedTeam:
+    """Return the team of an earlier run, from its folder. Raises as `prepare_sketch` and `prepare_files`."""
+    if run.record.flies is not None:  # an imported team
+        return _of_files(read_team(run.team))
+    return _of_model(model_of(run.sketch), run.sketch)
+
+
+def _robots(team: Team) -> tuple[Robot, ...]:
+    joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
+    return (*team.robots, *joining)
+
+
+def _of_model(model: Model, sketch: Sketch) -> PreparedTeam:
+    return PreparedTeam(model.team, partial(label_of, model), labels_of(model), called_in(model, sketch))
+
+
+def _of_files(team: Team) -> PreparedTeam:
+    domains = domains_of(team)
+    return PreparedTeam(team, partial(_label, domains), {}, lambda name, code: str(_label(domains, name, code)))
+
+
+def _label(domains: Mapping[str, Domain], name: str, code: int) -> Value:
+    return domains[name].label(code) if name in domains else code
