@@ -41,7 +41,7 @@ class PartialSessions(CompAPO):
         if self.holder == self.name and session == self.session:
             self.absent.add(sender)
 
-    def _go_on(self) -> None:
+    def _advance(self) -> None:
         if len(self.replies) + len(self.absent) < len(self.asked):
             return
         more = self.good_list - self.asked

@@ -8,7 +8,7 @@ from functools import partial
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
-from robochoc.protocols.satisfaction.awc import AWC, Kept, NogoodList
+from robochoc.protocols.satisfaction.awc import AWC, NogoodList, StoredNogood
 from robochoc.protocols.satisfaction.awc_messages import AddLink, Nogood, Ok
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.cases import looped
@@ -142,7 +142,7 @@ def test_a_nogood_stands_when_all_that_it_names_is_known_to_be_so(said: Value | 
     nogoods = NogoodList()
     nogoods.add("RB", {"RA": (1, None), "RB": (1,)})
     view = {} if said is None else {"RA": said}
-    assert (nogoods.standing(view) == [Kept({"RA": (1, None)}, (1,))]) is stands
+    assert (nogoods.applicable(view) == [StoredNogood({"RA": (1, None)}, (1,))]) is stands
 
 
 def test_a_nogood_is_kept_once_and_waits_until_its_robot_says_so() -> None:
@@ -150,8 +150,8 @@ def test_a_nogood_is_kept_once_and_waits_until_its_robot_says_so() -> None:
     for _ in range(2):
         nogoods.add("RC", {"RA": (1,), "RB": (2,), "RC": (1,)})
     view = {"RA": (2,), "RB": (2,)}
-    assert nogoods.standing(view) == []
+    assert nogoods.applicable(view) == []
     nogoods.update("RB", (2,))
-    assert nogoods.standing({**view, "RA": (1,)}) == [], "it waits for RA alone, which has not said so"
+    assert nogoods.applicable({**view, "RA": (1,)}) == [], "it waits for RA alone, which has not said so"
     nogoods.update("RA", (1,))
-    assert len(nogoods.standing({**view, "RA": (1,)})) == 1
+    assert len(nogoods.applicable({**view, "RA": (1,)})) == 1

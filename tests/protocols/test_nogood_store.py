@@ -7,7 +7,7 @@ from random import Random
 
 from robochoc.model.message import Value
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.satisfaction.nogood import NOTHING, Explanation, LeftSide, NogoodStore, contradicts
+from robochoc.protocols.satisfaction.nogood import NO_EXPLANATION, Explanation, LeftSide, NogoodStore, contradicts
 from tests.support.cases import looped
 
 ROBOTS = ("A", "B", "C", "D")
@@ -71,7 +71,7 @@ def test_the_index_changes_nothing(seed: int) -> None:
         else:
             store.drop(keys)
             plain.drop(keys)
-        held = [plain.kept.get(index, (None, NOTHING)) for index in range(SIZE)]
+        held = [plain.kept.get(index, (None, NO_EXPLANATION)) for index in range(SIZE)]
         assert [store[index] for index in range(SIZE)] == [lhs for lhs, _ in held]
         assert [store.because(index) for index in plain.kept] == [because for _, because in plain.kept.values()]
         left = [index for index in range(SIZE) if index not in plain.kept]

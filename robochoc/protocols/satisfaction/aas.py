@@ -1,47 +1,49 @@
 """Asynchronous Aggregation Search (AAS).
 
-ABT in which robots propose aggregates, sets of values, instead of single ones. A robot sends lower-priority neighbours
-values that all go with every combination of the sets that it has heard from above. So what all robots propose stays a
-Cartesian product of solutions, a robot has something to fall back on, and one nogood rules out whole sets.
+ABT in which robots propose aggregates (sets of values) instead of single values. A robot sends lower-priority
+neighbours values that are all consistent with every combination of the sets received from above. So the proposals of
+all robots remain a Cartesian product of solutions, a robot has values in reserve, and one nogood rules out whole sets.
 
 - **When to use**: no costs, hard problems over numbers, with constraints such as x + 2 <= y, or times that must not
   overlap. On constraints without such a structure, and on easy problems, ABT does as well or better; it nearly always
-  makes fewer constraint checks, as each look here is at sets (docs/explanation/replications.md has figures).
+  makes fewer constraint checks, as AAS checks whole sets (docs/explanation/replications.md has figures).
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. At the end every
   combination of the robots' aggregates is a solution; each robot takes the first value of its own. Space is polynomial:
   one nogood for each value.
-- **Parameters (`--set`)**: `largest` (the most values in an aggregate; default 4). With 1 it is ABT, message by
-  message.
+- **Parameters (`--set`)**: `largest` (the maximum number of values in an aggregate; default 4). With 1 it sends the
+  same messages as ABT.
 - **Reference**: Silaghi, Sam-Haroud, Faltings: "Asynchronous search with aggregations", AAAI 2000. Only an abstract and
-  a digest of the paper were at hand. The methods that are not named here are those of ABT (`abt.py`), with the same
-  names.
+  a digest of the paper were available. Methods not listed here have the names of ABT's (`abt.py`).
 
 Where its rules are:
 
-    aggregates that go with all of the view         `_choose_aggregate`, `_gaps`
+    aggregates consistent with all of the view      `_choose_aggregate`, `_gaps`
     the largest Cartesian product                   `_best_part`, `_wanted`
     nogoods over aggregates                         `AggregateStore`, `_backtrack`, `_resolve_conflict`
     add-link                                        `_check_add_link`, `_set_link`
 
-What differs from the paper: there robots own constraints and share variables, and a robot narrows other robots'
-variables by itself, with a history of who did so. Here each robot owns one variable, and asks its owner:
+Differences from the paper: there robots own constraints and share variables, and a robot narrows other robots'
+variables by itself, with a history of the robots that did so. Here each robot owns one variable, and others ask the
+owner to narrow it:
 
-- A value of which a constraint excludes every combination of the sets it sees is ruled out by a nogood over these sets.
-  A robot all of whose values are ruled out sends the resolvent: no solution has one of the receiver's values while
-  the others keep to their sets. This is true whatever robots propose, so the end of the search is sound. It can be used
-  as long as what they propose is covered by the sets.
-- A robot of which no value goes with all of the view, but some with a part, takes the value with the largest part,
-  asks those that propose too much to propose no more than that part (`Narrow`), and assumes that they do. They keep the
-  rest for later; nothing is ruled out. Of an n-ary constraint the lowest robot with a choice is asked.
-- A robot keeps of its aggregate what still goes with the view; only when nothing is left it chooses anew.
+- If a constraint excludes a value with every combination of the sets in its scope, a nogood over these sets rules the
+  value out. A robot all of whose values are ruled out sends the resolvent: no solution has one of the receiver's values
+  while the others keep to their sets. This is true for any proposals, so the end of the search is sound. The nogood
+  applies as long as the sets cover the proposals.
+- If no value is consistent with the whole view, but some are with a part of it, the robot takes the value with the
+  largest part, asks the robots that propose too much to propose no more than that part (`Narrow`), and assumes that
+  they do. They keep the rest for later; nothing is ruled out. Of an n-ary constraint the lowest robot with a choice is
+  asked.
+- A robot keeps the values of its aggregate that are still consistent with the view; it chooses a new aggregate only
+  when none is left.
 
-Why it ends: the highest robot's view never changes. Whatever makes it change its aggregate makes that smaller, or rules
-out values for good; both happen finitely often. Then the view of the next robot changes no more, and so on. Who asks,
-or forgets an aggregate after a nogood, is always told the next one: the receiver either does as asked, and says so, or
-had proposed something else before the request came, and that is on its way.
+Termination: the highest robot's view never changes. Each change of its aggregate makes the aggregate smaller, or
+follows a value that is ruled out for good; both happen finitely often. Then the view of the next robot stops changing,
+and so on. A robot that sends a request, or forgets an aggregate after a nogood, always receives the next aggregate: the
+receiver either does as asked and sends its aggregate, or had sent a different one before the request arrived.
 
-What ABT's paper leaves open is chosen as in `abt.py`: n-ary constraints, packets, the choice among nogoods,
-interchangeable values. Partially known constraints are refused: a higher robot would have to hear lower ones' sets.
+Choices that ABT's paper leaves open are made as in `abt.py`: n-ary constraints, packets, the choice among nogoods,
+interchangeable values. Partially known constraints are refused: a higher robot would need the sets of lower ones.
 
 >>> from robochoc.generators.meetings import meetings
 >>> from robochoc.run import Options, Runtime, solve
@@ -98,17 +100,17 @@ def met(left: Aggregate, right: Aggregate) -> Aggregate:
 
 
 def matching(patterns: Iterable[Value], values: Iterable[Value]) -> Aggregate:
-    """Return those of `values` that agree with one of `patterns`."""
+    """Return the `values` that agree with one of `patterns`."""
     return tuple([value for value in values if any(not contradicts(one, value) for one in patterns)])
 
 
 def left_side(conflicts: Sequence[Mapping[str, Value]]) -> LeftSide:
-    """Return the aggregates whose combinations are `conflicts`: all combinations of what they contain."""
+    """Return the aggregates of which all combinations are `conflicts`."""
     return {agent: tuple(dict.fromkeys(one[agent] for one in conflicts)) for agent in conflicts[0]}
 
 
 class AggregateStore:
-    """The left sides of the nogoods that rule out own values, at most one for each value."""
+    """The left sides of the nogoods that rule out this robot's values, at most one for each value."""
 
     def __init__(self, order: PriorityOrder, size: int) -> None:
         self._order = order
@@ -139,7 +141,7 @@ class AggregateStore:
     def resolve(self, view: Mapping[str, Aggregate]) -> dict[str, Aggregate]:
         """Return the conjunction of all left sides: the resolvent, if every value has a nogood.
 
-        Where an intersection of sets in different variables would be larger than both, what is not in `view` is left
+        Where an intersection of sets in different variables would be larger than both, values outside `view` are left
         out.
         """
         found: dict[str, Aggregate] = {}
@@ -156,7 +158,7 @@ class AggregateStore:
 
 
 class AASSettings(Settings, frozen=True):
-    """`largest`: the most values in an aggregate. With 1 it is ABT."""
+    """`largest`: the maximum number of values in an aggregate. With 1 the protocol is ABT."""
 
     largest: int = 4
 
@@ -166,11 +168,11 @@ class AASSettings(Settings, frozen=True):
 
 
 MOST_PROVEN = 256
-"""Of more combinations than these a nogood's proof is left out."""
+"""A nogood with more combinations than these gives no proofs."""
 
 
 class Ok(Message, frozen=True):
-    """The sender's aggregate: any of these values, which all go with what it has heard from above (`ok?`)."""
+    """The sender's aggregate: its possible values, all consistent with the aggregates from above (`ok?`)."""
 
     values: tuple[Value, ...]
 
@@ -181,7 +183,7 @@ class Ok(Message, frozen=True):
         return f"{_one_of(words, words.sender, self.values)} from now on"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the sender stands at the first value of its aggregate."""
+        # The sender's value is the first one of its aggregate.
         return [StandsAt(hearing.sender, self.values[0])] if self.values else NOTHING
 
 
@@ -201,7 +203,7 @@ class Nogood(Message, frozen=True):
         return f"{condition}it cannot be that {_one_of(words, words.receiver, self.values)}{rest}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        # A nogood of any but the lowest robot may follow from constraints of those below it.
+        # A nogood of any robot but the lowest may follow from constraints of the robots below it.
         if not hearing.fixed_holders or not hearing.is_lowest(hearing.sender):
             return NOTHING
         broken: Mapping[str, tuple[Value, ...]] = {**self.lhs, hearing.receiver: self.values}
@@ -212,7 +214,7 @@ class Nogood(Message, frozen=True):
 
 
 class Narrow(Message, frozen=True):
-    """A request to keep no more than these values in the receiver's aggregate: the others do not go with the sender."""
+    """A request to keep only these values in the receiver's aggregate: the others conflict with the sender."""
 
     values: tuple[Value, ...]
 
@@ -236,7 +238,7 @@ class AddLink(Message, frozen=True):
 
 
 def _one_of(words: Wording, robot: str, values: Sequence[Value]) -> str:
-    """Return an aggregate: `V1.1 is 1, 2 or 3`, `(A, B) is (1, 2) or (1, 3)`, without variables that do not matter."""
+    """Return an aggregate in words: `V1.1 is 1, 2 or 3`, `(A, B) is (1, 2) or (1, 3)`; without irrelevant variables."""
     parts = [words.parts(robot, value) for value in values]
     names = [name for name, _ in parts[0]] if parts else []
     if len(names) == 1:
@@ -248,8 +250,8 @@ def _one_of(words: Wording, robot: str, values: Sequence[Value]) -> str:
 class AAS(Protocol):
     """One agent of AAS.
 
-    `aggregate` are the own values that it proposes, by their places; `told` those that others last heard. `sets` are
-    the aggregates of higher robots (the view), `store` the nogoods. `asked` are requests that are not yet sent.
+    `aggregate` are the places of the values that it proposes; `sent` those that it last sent. `sets` are the aggregates
+    of higher robots (the view), `store` the nogoods. `asked` are requests not yet sent.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | Narrow | AddLink
@@ -268,7 +270,7 @@ class AAS(Protocol):
         self.higher = set(problem.parents)
         self.lower = list(problem.children)
         self.aggregate: list[int] = []
-        self.told: list[int] = []
+        self.sent: list[int] = []
         self.asked: dict[str, Aggregate] = {}
 
     def start(self) -> None:
@@ -276,7 +278,6 @@ class AAS(Protocol):
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Ok | Nogood | Narrow | AddLink", message):
@@ -295,7 +296,7 @@ class AAS(Protocol):
         """Check the view once the inbox is empty."""
         self._check_agent_view()
 
-    # What the messages do
+    # Messages
 
     def _process_info(self, sender: str, values: Aggregate) -> None:
         if not 0 < len(values) <= self.settings.largest:
@@ -313,11 +314,11 @@ class AAS(Protocol):
             for value in nogood.values:
                 for index in self.problem.interchangeable(value):
                     self.store.add(index, nogood.lhs)
-            self._hold(left)
+            self._propose(left)
             if not left:
-                self.told = []
+                self.sent = []
         else:
-            # The sender's picture of others was old, and it has forgotten my aggregate: say it again.
+            # The sender's view was outdated, and it has forgotten this robot's aggregate: send it again.
             self.send(sender, self._ok())
 
     def _validate(self, sender: str, nogood: Nogood) -> None:
@@ -329,9 +330,9 @@ class AAS(Protocol):
 
     def _narrow_down(self, values: Aggregate) -> None:
         """Keep no more than `values`; if none of the aggregate is among them, the request is obsolete."""
-        kept = [index for index in self.aggregate if self._is_in(values, index)]
-        if kept:
-            self._hold(kept)
+        remaining = [index for index in self.aggregate if self._is_in(values, index)]
+        if remaining:
+            self._propose(remaining)
 
     def _set_link(self, sender: str) -> None:
         if sender not in self.lower:
@@ -344,29 +345,29 @@ class AAS(Protocol):
     def _check_agent_view(self) -> None:
         """Keep what the view allows of the aggregate; otherwise choose another, ask, or backtrack."""
         while self.verdict is None:
-            kept = [index for index in self.aggregate if self._is_consistent(index)]
-            if not kept:
-                kept, partly = self._choose_aggregate()
-                if not kept:
-                    self._hold([])
-                    self.told = []
+            remaining = [index for index in self.aggregate if self._is_consistent(index)]
+            if not remaining:
+                remaining, partly = self._choose_aggregate()
+                if not remaining:
+                    self._propose([])
+                    self.sent = []
                     if partly:
                         self._assume_less(self._best_part(partly))
                     else:
                         self._backtrack()
                     continue
-            self._hold(kept)
-            if kept != self.told:
-                self._tell()
+            self._propose(remaining)
+            if remaining != self.sent:
+                self._send_aggregate()
             break
         self._ask()
 
     def _is_consistent(self, index: int) -> bool:
-        """Return whether the value at `index` goes with every combination of the view."""
+        """Return whether the value at `index` is consistent with every combination of the view."""
         return self.store[index] is None and self._gaps(index) == []
 
     def _choose_aggregate(self) -> tuple[list[int], dict[int, list[Gap]]]:
-        """Return the first values that go with every combination of the view, and those that go with some."""
+        """Return the first values that are consistent with every combination of the view, and those with some."""
         whole: list[int] = []
         partly: dict[int, list[Gap]] = {}
         for index in self.store.all_open():
@@ -382,7 +383,7 @@ class AAS(Protocol):
     def _gaps(self, index: int) -> list[Gap] | None:
         """Return the constraints that the value at `index` violates for a part of the view.
 
-        None: it violates one for all of the view, which is a nogood, and is stored.
+        None: it violates a constraint for all of the view; this nogood is stored.
         """
         gaps: list[Gap] = []
         for gap in self.problem.gaps(index, self.sets):
@@ -393,11 +394,11 @@ class AAS(Protocol):
         return gaps
 
     def _best_part(self, partly: Mapping[int, Sequence[Gap]]) -> Sequence[Gap]:
-        """Return the constraints of the value that goes with the largest part of the view."""
+        """Return the violated constraints of the value that is consistent with the largest part of the view."""
         return max(partly.values(), key=_share)
 
     def _assume_less(self, gaps: Iterable[Gap]) -> None:
-        """Assume that robots of violated constraints propose less: what goes with a value. They are to be asked."""
+        """Assume that robots of violated constraints propose only consistent values; note the requests to send."""
         for gap in gaps:
             agent, wanted = self._wanted(gap)
             less = matching(wanted, self.sets[agent])
@@ -406,9 +407,10 @@ class AAS(Protocol):
                 self.asked[agent] = less
 
     def _wanted(self, gap: Gap) -> tuple[str, Sequence[Value]]:
-        """Return the lowest robot of a violated constraint that has a choice, and which of its values are wanted.
+        """Return the lowest robot of a violated constraint that has a choice, and the values that it should keep.
 
-        That is, all that go with every combination of the others; if there are none, the one that goes with most.
+        They are all values that are consistent with every combination of the others; if there are none, the one that is
+        consistent with most.
         """
         combinations = [*gap.allowed, *gap.broken]
         choices = left_side(combinations)
@@ -424,9 +426,9 @@ class AAS(Protocol):
             self.send(agent, Narrow(values))
         self.asked.clear()
 
-    def _tell(self) -> None:
-        """Send the aggregate to all robots that it matters to."""
-        self.told = list(self.aggregate)
+    def _send_aggregate(self) -> None:
+        """Send the aggregate to all robots that depend on it."""
+        self.sent = list(self.aggregate)
         ok = self._ok()
         for neighbour in self.lower:
             self.send(neighbour, ok)
@@ -443,8 +445,8 @@ class AAS(Protocol):
         self.asked.pop(culprit, None)
         self._update(culprit, None)
 
-    def _hold(self, aggregate: list[int]) -> None:
-        """Propose `aggregate`; its first value is the own value."""
+    def _propose(self, aggregate: list[int]) -> None:
+        """Propose `aggregate`; its first value becomes this robot's value."""
         self.aggregate = aggregate
         self.value = aggregate[0] if aggregate else None
 
@@ -484,7 +486,7 @@ class AAS(Protocol):
 
 
 def _share(gaps: Sequence[Gap]) -> Fraction:
-    """Return the part of all combinations that a value goes with, as if no robot were in two constraints."""
+    """Return the share of combinations that a value is consistent with, as if no robot were in two constraints."""
     share = Fraction(1)
     for gap in gaps:
         share *= Fraction(len(gap.allowed), len(gap.allowed) + len(gap.broken))

@@ -62,8 +62,8 @@ from robochoc.system.compiling import mypyc_attr
 class ABT(Backtracking):
     """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+.
 
-    For lower-priority robots that share a PKC, `below` holds the values they sent. `allowed` holds the own value under
-    which each of these values was last found to be allowed by the own part of the PKC.
+    For lower-priority robots that share a PKC, `below` holds the values they sent. `allowed` holds, for each of them,
+    this robot's value with which its part of the PKC was last found to allow that value.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | AddLink
@@ -86,7 +86,6 @@ class ABT(Backtracking):
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Ok | Nogood | AddLink", message):
@@ -100,12 +99,12 @@ class ABT(Backtracking):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Check the view, then check the values of lower-priority robots against the own parts of PKCs."""
+        """Check the view, then check the values of lower-priority robots against this robot's parts of PKCs."""
         if self.verdict is None:
             self._check_agent_view()
             self._refuse_below()
 
-    # What the messages do
+    # Messages
 
     def _process_info(self, sender: str, value: Value) -> None:
         if sender in self.problem.children:
@@ -124,7 +123,7 @@ class ABT(Backtracking):
             self._learn(nogood)
             self.value = None
         else:
-            # The sender's picture of others was old, and it has forgotten my value: say it again.
+            # The sender's view was outdated, and it has forgotten this robot's value: send it again.
             self.send(sender, Ok(current))
 
     def _set_link(self, sender: str) -> None:
@@ -145,11 +144,11 @@ class ABT(Backtracking):
             if self.value is None:
                 self._backtrack()
                 continue
-            self._tell(self.problem.values[self.value])
+            self._send_value(self.problem.values[self.value])
             return
 
-    def _tell(self, value: Value) -> None:
-        """Send the own value to all robots that it matters to."""
+    def _send_value(self, value: Value) -> None:
+        """Send the value to all robots that depend on it."""
         ok = Ok(value)
         for neighbour in (*self.lower, *self.problem.pkc_parents):
             self.send(neighbour, ok)
@@ -163,10 +162,10 @@ class ABT(Backtracking):
         culprit = self.order.lowest(lhs)
         value = lhs.pop(culprit)
         self.send(culprit, self._nogood(lhs, value))
-        self._backtracked(culprit)
+        self._after_backtrack(culprit)
 
-    def _backtracked(self, culprit: str) -> None:
-        """Go on after a nogood to `culprit`, which is expected to change its value: forget the old one."""
+    def _after_backtrack(self, culprit: str) -> None:
+        """Continue after a nogood to `culprit`, which is expected to change its value: forget the old value."""
         self._update(culprit, None)
 
     def _nogood(self, lhs: dict[str, Value], value: Value) -> Nogood:
@@ -178,7 +177,7 @@ class ABT(Backtracking):
             self.store.add(index, nogood.lhs)
 
     def _refuse_below(self) -> None:
-        """Send nogoods for lower robots' values that the own parts of PKCs forbid; check each pair once."""
+        """Send nogoods for lower robots' values that this robot's parts of PKCs forbid; check each pair once."""
         if self.value is None or not self.below:
             return
         for child, theirs in list(self.below.items()):
@@ -204,5 +203,5 @@ class ABT(Backtracking):
 
     def _check_add_link(self, nogood: Nogood) -> None:
         """Request links to robots of the nogood that send no values yet; assume the nogood's values for now."""
-        for agent in self._believe(nogood.lhs):
+        for agent in self._assume(nogood.lhs):
             self.send(agent, AddLink())

@@ -97,7 +97,7 @@ class ABTDORetro(Backtracking):
 
     - `left`: the numbers of remaining values that other robots sent.
     - `higher`: robots that send this one their values while they have higher priority.
-    - `tells`: robots that this one sends its value to while they have lower priority.
+    - `tells`: robots to which this one sends its value while they have lower priority.
     - `owed`: robots that must be sent the value after the packet, even if it has not changed.
     """
 
@@ -124,7 +124,6 @@ class ABTDORetro(Backtracking):
         self.settle()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Ok | Nogood | Order | AddLink", message):
@@ -144,9 +143,9 @@ class ABTDORetro(Backtracking):
         """Check the view, then send the value to the robots that need it."""
         if self.verdict is None:
             self._check_agent_view()
-            self._tell()
+            self._send_value()
 
-    # What the messages do
+    # Messages
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
         """Accept a nogood about the current value that agrees with view and order; others are obsolete."""
@@ -219,7 +218,7 @@ class ABTDORetro(Backtracking):
         self._update(culprit, None)
         self.send(culprit, Nogood(lhs, value, self._left()))
 
-    def _tell(self) -> None:
+    def _send_value(self) -> None:
         """Send the value to all robots that need it."""
         current = self._current()
         if current is None:
@@ -242,7 +241,7 @@ class ABTDORetro(Backtracking):
 
     def _check_add_link(self, nogood: Nogood) -> None:
         """Request links to robots of the nogood that send no values yet; assume its values for now."""
-        for agent in self._believe(nogood.lhs):
+        for agent in self._assume(nogood.lhs):
             self.send(agent, AddLink())
 
     def _is_higher(self, agent: str) -> bool:
@@ -253,5 +252,5 @@ class ABTDORetro(Backtracking):
         return [name for name in self.tells if not self._is_higher(name)]
 
     def _left(self) -> int:
-        """Return the number of own values that no stored nogood rules out."""
+        """Return the number of this robot's values that no stored nogood rules out."""
         return self.store.open

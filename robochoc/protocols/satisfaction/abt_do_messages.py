@@ -10,7 +10,7 @@ from robochoc.model.wording import Wording, listed
 from robochoc.protocols import acts
 
 Counters = tuple[tuple[int, str], ...]
-"""For each place how often robots from there on were reordered, and who did so last; zeros at the end left out."""
+"""For each place: how often the robots from there on were reordered, and by whom last; trailing zeros are omitted."""
 
 
 class Ok(Message, frozen=True):
@@ -25,7 +25,7 @@ class Ok(Message, frozen=True):
         return f"{words.own_value(self.value)} from now on; {_not_ruled_out(self.left)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        # Once the order has changed, the sender need not say when it takes another value.
+        # Once the order has changed, the sender need not send its next value.
         return [can_take(hearing.sender, self.value)]
 
 
@@ -41,7 +41,7 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
-    # It may follow from any robot's constraints.
+    # The nogood may follow from any robot's constraints.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:

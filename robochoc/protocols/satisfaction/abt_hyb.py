@@ -1,36 +1,36 @@
 """Hybrid Asynchronous Backtracking (ABT-Hyb).
 
 ABT that waits after a nogood. A robot of ABT without a value left sends a nogood, assumes that its receiver changes
-the value, and takes a new value at once, often against what other robots are about to tell it. A robot of ABT-Hyb
-sends nothing until it knows that the conflict is over. So fewer values and fewer nogoods go astray.
+the value, and takes a new value at once, which often conflicts with messages in transit. A robot of ABT-Hyb sends
+nothing until it knows that the conflict is over. So fewer values and nogoods are obsolete on arrival.
 
-- **When to use**: no costs, and messages are what counts.
+- **When to use**: no costs, and the number of messages matters most.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
 - **Parameters**: none.
 - **Reference**: Brito, Meseguer: "Synchronous, asynchronous and hybrid algorithms for DisCSP", CP 2004. Only a digest
-  of the paper was at hand. The parts that are not here are ABT's (`abt.py`), with the same methods.
+  of the paper was available. All other methods are inherited from ABT (`abt.py`).
 
 The rules of waiting, and where they are:
 
-    a robot waits once it has sent a nogood         `_backtracked`
+    a robot waits once it has sent a nogood         `_after_backtrack`
     it waits until a value is consistent again      `_check_agent_view`
     or until the nogood's receiver sends a value    `_process_info`
-    while it waits it refuses nogoods               `_resolve_conflict` (ABT's: it has no value that one could be about)
+    while it waits it refuses nogoods               `_resolve_conflict` (ABT's: it has no value to be ruled out)
 
 While it waits, a robot keeps its view as it is: it does not forget the value of the nogood's receiver. So the stored
 nogoods, one for each value, stay as well, and the wait ends only with a change that matters.
 
-No robot waits for ever. The receiver of a nogood about another value than its own has sent its value after the one that
-the nogood is about, so that value is on its way. If the nogood is about the current value but old in something else,
-the receiver sends its value again. This ends the wait also though the value is the same: the sender's view is newer by
-then, or it sends the nogood anew. If the receiver accepts the nogood, it sends the next value that it takes. It may
-have to wait itself before, but only for a robot of higher priority, and the highest of those that wait is answered by a
-robot that does not. A robot without a value has sent nothing that a nogood could be about: it drops a nogood, and
-sends its next value to all who have a link to it, the nogood's sender among them.
+No robot waits for ever. If a nogood is about another value than the receiver's current one, the receiver has sent its
+current value later, so that value is in transit. If the nogood is about the current value but otherwise outdated, the
+receiver sends its value again. This ends the wait although the value is the same: the sender's view is newer by then,
+or it sends the nogood again. If the receiver accepts the nogood, it sends its next value. It may have to wait first,
+but only for a robot of higher priority, and the highest waiting robot is answered by a robot that does not wait. A
+robot without a value drops nogoods, and sends its next value to all robots with a link to it, the nogood's sender among
+them.
 
-What it leaves open is chosen as in ABT: n-ary constraints, packets, the choice among nogoods, interchangeable values,
-partially known constraints. A robot that waits tests no pairs of partially known constraints, as it has no value; it
-tests all of them once it has one.
+Choices that the paper leaves open are made as in ABT: n-ary constraints, packets, the choice among nogoods,
+interchangeable values, partially known constraints. A waiting robot tests no pairs of partially known constraints, as
+it has no value; it tests all of them once it has one.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -66,22 +66,22 @@ class ABTHyb(ABT):
         self.awaited: str | None = None
 
     def _process_info(self, sender: str, value: Value) -> None:
-        """Store a value; the one that was waited for ends the wait, even if it is the same."""
+        """Store a value; the awaited value ends the wait, even if it is unchanged."""
         super()._process_info(sender, value)
         if sender == self.awaited:
             self.awaited = None
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it; otherwise choose another, backtrack, or go on waiting."""
+        """Keep the value if the view allows it; otherwise choose another, backtrack, or continue to wait."""
         if self.value is not None and self._consistent(self.value, self.view):
             return
         self.value = self._choose_value(self.view)
         if self.value is not None:
             self.awaited = None
-            self._tell(self.problem.values[self.value])
+            self._send_value(self.problem.values[self.value])
         elif self.awaited is None:
             self._backtrack()
 
-    def _backtracked(self, culprit: str) -> None:
+    def _after_backtrack(self, culprit: str) -> None:
         """Wait after a nogood to `culprit`, and keep the view and the stored nogoods."""
         self.awaited = culprit

@@ -86,7 +86,6 @@ class AFC(Protocol):
             self._assign_cpa(0)
 
     def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - who speaks does not matter
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("CPA | FcCPA | NotOk | BacktrackCPA", message):
@@ -109,7 +108,7 @@ class AFC(Protocol):
         elif self.consistent:
             self._forward_check()
 
-    # The one who holds the CPA
+    # The holder of the CPA
 
     def _receive_cpa(self, held: CPA | BacktrackCPA) -> None:
         """Add a value to the CPA, unless it is known to be inconsistent."""
@@ -152,7 +151,7 @@ class AFC(Protocol):
         else:
             self.conclude(Verdict.NO_SOLUTION)
 
-    # The others
+    # The other robots
 
     def _update_agent_view(self, assignments: Assignments, sc: int) -> None:
         """Replace the view by the CPA of a later step; it is inconsistent if it extends the known inconsistency."""
@@ -188,7 +187,7 @@ class AFC(Protocol):
 
 
 class FilteredDomain:
-    """The own domain, filtered by a partial assignment, without repeated checks.
+    """This robot's domain, filtered by a partial assignment, without repeated checks.
 
     For each value that is ruled out, it stores the length of the shortest prefix that rules the value out. For a new
     partial assignment with a common prefix, values that this prefix rules out are not checked again. For the others,

@@ -56,7 +56,7 @@ class NotOk(Message, frozen=True):
         return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        # The sender has found it by forward checking, with its own constraints alone.
+        # The sender has found it by forward checking, with only its own constraints.
         return [EveryValuePays(hearing.sender, dict(zip(hearing.branch, self.assignments, strict=False)), INFINITE)]
 
 
@@ -79,6 +79,6 @@ class BacktrackCPA(Message, frozen=True):
 
 
 def _partial(assignments: Assignments, sc: int, hearing: Hearing) -> Sequence[Proof]:
-    """Return what a consistent CPA of step `sc` proves."""
+    """Return the proofs of a consistent CPA of step `sc`."""
     stands = [StandsAt(robot, value, (sc,)) for robot, value in zip(hearing.branch, assignments, strict=False)]
     return [*stands, *partial_assignment(hearing.branch, assignments)]

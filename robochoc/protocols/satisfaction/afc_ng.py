@@ -66,7 +66,7 @@ from robochoc.system.compiling import mypyc_attr
 _NEVER: Final = sys.maxsize
 """Below all places in the order."""
 _FEW: Final = 32
-"""So many assignments are compared one by one."""
+"""The number of assignments that are compared one by one; longer ranges are halved."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -76,12 +76,12 @@ class AFCng(Protocol):
     - `view`: the values of the robots whose values a CPA contains, or of the highest of them.
     - `successors`: the robots that may assign a value after this one.
     - `cpa_receivers`: all robots that are sent its CPAs.
-    - `checked`: for each own value, the place in the order up to which all constraints were known to hold in the view
-      when the values were last checked.
-    - `_known`: what is in `view`, as it came.
+    - `checked`: for each value of this robot, the place in the order up to which all constraints were known to hold in
+      the view when the values were last checked.
+    - `_known`: the content of `view`, as received.
     - `_changed`: the place of the highest robot that has changed in the view since then.
-    - `_forgotten`: the counters of robots that are not in the view any more.
-    - `_seen`: what constraints see of the view; `_near`: the robots that they look at, with their places in a CPA.
+    - `_forgotten`: the counters of robots that are no longer in the view.
+    - `_seen`: the part of the view in the scopes of constraints; `_near`: its robots, with their places in a CPA.
     """
 
     messages: ClassVar[Any] = CPA | Nogood | Solved
@@ -114,7 +114,6 @@ class AFCng(Protocol):
         self.settle()
 
     def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - a CPA says itself who has sent it
-        """Dispatch on the message's type."""
         if self.solved or self.verdict is not None:
             return
         if isinstance(message, CPA):  # before `match`, which is slower: most messages are CPAs
@@ -144,7 +143,7 @@ class AFCng(Protocol):
         """The last known counters of the robots above, the highest robot's first."""
         return [*_counters(self._known), *self._forgotten]
 
-    # What the messages do
+    # Messages
 
     def _process_cpa(self, assignments: tuple[Assignment, ...]) -> None:
         """Accept a CPA that is stronger than the view: the first counter that differs is larger."""
@@ -154,8 +153,8 @@ class AFCng(Protocol):
             if assignments[first][1] <= known[first][1]:
                 return
         else:
-            told = _counters(assignments[first:])
-            if told <= self._forgotten[: len(told)]:
+            counters = _counters(assignments[first:])
+            if counters <= self._forgotten[: len(counters)]:
                 return
         if size < common:
             self._forgotten[:0] = _counters(known[size:])
@@ -275,17 +274,17 @@ class AFCng(Protocol):
         return True
 
     def _depth(self) -> int:
-        """Return the place in the order of the first robot that is not in the view; the own one if it is complete."""
+        """Return the place in the order of the first robot outside the view; this robot's if the view is complete."""
         known = len(self._known)
         return self.order.rank[self._line[known]] if known < self._above else self._rank
 
     def _place_above(self, name: str) -> int | None:
-        """Return the place of `name` in a CPA; None: it stands below."""
+        """Return the place of `name` in a CPA; None if the robot is below this one."""
         place = self._places.get(name)
         return None if place is None or place >= self._above else place
 
     def _cpa_order(self) -> tuple[Sequence[str], Mapping[str, int], int]:
-        """Return a line of robots, their places, and how many of them, from the first on, have values in a CPA."""
+        """Return a sequence of robots, their places, and the number of its first robots with values in a CPA."""
         return self.order.names, self.order.rank, self._rank
 
     def _successors(self) -> Sequence[str]:
@@ -316,6 +315,6 @@ def _counters(assignments: tuple[Assignment, ...]) -> list[int]:
 def _grouped(indices: list[int], places: Sequence[int]) -> list[tuple[int, list[int]]]:
     """Return `indices` by their `places`, the first place first."""
     found = {places[index] for index in indices}
-    if len(found) == 1:  # so it is almost always
+    if len(found) == 1:  # the usual case
         return [(found.pop(), indices)]
     return [(place, [index for index in indices if places[index] == place]) for place in sorted(found)]

@@ -11,7 +11,7 @@ from robochoc.model.wording import Wording
 from robochoc.protocols import acts
 
 Assignment = tuple[Value, int]
-"""A robot's value, and the counter that says how many it has taken so far."""
+"""A robot's value, and the number of values that it has taken so far."""
 
 
 class CPA(Message, frozen=True):
@@ -36,7 +36,7 @@ class CPA(Message, frozen=True):
 
 
 class Solved(Message, frozen=True):
-    """The end of the search: a solution was found (`stp`). Its receivers only look it up."""
+    """The end of the search: a solution was found (`stp`). Its receivers only read it."""
 
     solution: dict[str, Value]
 

@@ -1,4 +1,4 @@
-"""What a robot of AFC-ng knows of others: the current partial assignment, looked up by robot."""
+"""The agent view of AFC-ng, a mapping of the current partial assignment: apart, as mypyc cannot compile its base."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.protocols.satisfaction.afc_ng_messages import Assignment
 class AgentView(Mapping[str, Value]):
     """The values in `assignments`, by robot: they belong to the first robots of `line`, whose places are `places`.
 
-    All robots of a process share a line; the assignments are those of the message that they came with.
+    All robots of a process share `line`; `assignments` is the tuple of the received message itself.
     """
 
     def __init__(self, line: Sequence[str], places: Mapping[str, int]) -> None:

@@ -27,7 +27,7 @@ Correctness does not depend on accepts. At quiescence each root has a value. Sup
 values, each chosen for the current ones above it. The CPA of its parent then holds the highest counters, so the robot
 has accepted it. Without a value left, it would have sent a nogood to an ancestor. No value above has changed since, so
 that ancestor had the nogood's value and a compatible view, and has taken another value: a contradiction. So the robot
-has a value, chosen for the current ones above it. Accepts are kept because they tell a root that its component is
+has a value, chosen for the current ones above it. Accepts exist because they inform a root that its component is
 solved; they cost at least one message for each robot.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -73,7 +73,6 @@ class AFCTree(AFCng):
         self.parent = self._tree.parents[problem.agent]
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("CPA | Nogood | Accept | Solved", message):
             case Accept(counters, subtree):
                 self._process_accept(sender, counters, subtree)
@@ -104,7 +103,7 @@ class AFCTree(AFCng):
             self.send(self.parent, Accept(self.counters, subtree))
 
     def _build_pa(self) -> dict[str, Value] | None:
-        """Return the values of the own subtree; None while a child has not accepted."""
+        """Return the values of this robot's subtree; None while a child has not accepted."""
         if self.value is None or len(self.accepts) < len(self.successors):
             return None
         own = {self.problem.agent: self.problem.values[self.value]}

@@ -108,7 +108,6 @@ class AgileABT(Backtracking):
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Ok | Nogood | Order | AddLink", message):
@@ -124,11 +123,10 @@ class AgileABT(Backtracking):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Check the view."""
         if self.verdict is None:
             self._check_agent_view()
 
-    # What the messages do
+    # Messages
 
     def _process_info(self, sender: str, ok: Ok) -> None:
         """Store a received value and its explanation."""
@@ -140,7 +138,7 @@ class AgileABT(Backtracking):
         """Accept a nogood about the current value that agrees with order and view; others are obsolete."""
         last = self.sent_values.get(sender)
         if last is not None and not contradicts(nogood.value, last):
-            del self.sent_values[sender]  # it has forgotten my value; if I have told it another one, that is on its way
+            del self.sent_values[sender]  # it has forgotten the value; a newer one would be in transit
         current = self._current()
         if current is None or contradicts(nogood.value, current) or not self._coherent(nogood):
             return
@@ -167,11 +165,11 @@ class AgileABT(Backtracking):
             if self.value is None or not self._consistent(self.value, above):
                 self.value = self._choose_value(above)
             if self.value is not None:
-                self._tell(self.problem.values[self.value])
+                self._send_value(self.problem.values[self.value])
                 return
             self._backtrack()
 
-    def _tell(self, value: Value) -> None:
+    def _send_value(self, value: Value) -> None:
         """Send the value to all lower listeners that were last sent another one, or none."""
         rank = self.present.rank
         below = [
@@ -235,7 +233,7 @@ class AgileABT(Backtracking):
                 self.store.add(index, lhs)
 
     def _own_explanation(self, forgotten: str = "") -> Explanation:
-        """Return the own explanation without nogoods that contain the robot `forgotten`."""
+        """Return this robot's explanation without nogoods that contain the robot `forgotten`."""
         kept = [lhs for lhs in self.store if forgotten not in lhs]
         union: dict[str, Value] = {}
         for lhs in kept:
@@ -256,7 +254,7 @@ class AgileABT(Backtracking):
     # The view
 
     def _above(self) -> dict[str, Value]:
-        """Return the known values of higher-priority robots, on which constraint checks and nogoods may rest."""
+        """Return the known values of higher-priority robots, on which constraint checks and nogoods may depend."""
         rank = self.present.rank
         return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
 
@@ -270,7 +268,7 @@ class AgileABT(Backtracking):
 
     def _check_add_link(self, nogood: Nogood) -> None:
         """Request links to robots of the nogood that send no values yet; assume its values for now."""
-        for agent in self._believe(nogood.lhs):
+        for agent in self._assume(nogood.lhs):
             self.send(agent, AddLink())
 
 

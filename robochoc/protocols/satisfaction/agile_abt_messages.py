@@ -28,7 +28,7 @@ class Ok(Message, frozen=True):
         return f"{words.own_value(self.value)} from now on; {words.condition(self.lhs)}{left}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        # Once the order has changed, the sender need not say when it takes another value.
+        # Once the order has changed, the sender need not send its next value.
         return [can_take(hearing.sender, self.value)]
 
 

@@ -1,14 +1,14 @@
-"""Orders of Agile-ABT: explanations, termination vectors, and the smaller order that a dead end looks for.
+"""Orders of Agile-ABT: explanations, termination vectors, and the search for a smaller order at a dead end.
 
 Bessiere, Bouyakhf, Mechqrane, Wahbi: "Agile asynchronous backtracking for distributed constraint satisfaction
 problems", ICTAI 2011. Pure functions; the protocol is in `agile_abt.py`.
 
-An explanation says how many values are left to a robot because of the nogoods that it keeps, and that these hold
-only as long as all robots of their left sides stand above it. A termination vector lists how many values are left
-to each robot, in the order of the robots; vectors are compared lexicographically.
+An explanation contains the number of values that a robot's nogoods leave it, and the condition of these nogoods: all
+robots of their left sides have higher priority. A termination vector lists the number of remaining values of each
+robot, in the order of the robots; vectors are compared lexicographically.
 
-Here R3 stands below R1 and R2 and has nothing left. It finds that R1 = 1 and R2 = 4 cannot both stay. R2 may
-change its value as the order is, R1 only if it moves below R2:
+In this example R3 is below R1 and R2 and has no value left. It finds that R1 = 1 and R2 = 4 cannot both stay. R2 may
+change its value in the current order, R1 only if it moves below R2:
 
 >>> names = ("R1", "R2", "R3", "R4")
 >>> sizes = {"R1": 3, "R2": 3, "R3": 3, "R4": 5}
@@ -32,7 +32,7 @@ UNKNOWN = 2**31 - 1
 """The number of remaining values of a robot whose domain size is unknown."""
 
 TerminationVector = tuple[int, ...]
-"""TV: how many values are left to the first robot of an order, to the second, and so on."""
+"""TV: the numbers of remaining values of the first robot of an order, the second, and so on."""
 
 
 class Explanation(NamedTuple):

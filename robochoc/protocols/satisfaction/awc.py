@@ -57,8 +57,8 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 
-class Kept(NamedTuple):
-    """A nogood as one of its robots stores it: the others' values and the own value that it rules out."""
+class StoredNogood(NamedTuple):
+    """A nogood as one of its robots stores it: the others' values and this robot's value that it rules out."""
 
     others: LeftSide
     own: Value
@@ -78,8 +78,8 @@ class NogoodList:
 
     def __init__(self) -> None:
         self._known: set[frozenset[tuple[str, Value]]] = set()
-        self._waiting: dict[str, dict[Value, list[Kept]]] = {}
-        self._awake: list[Kept] = []
+        self._waiting: dict[str, dict[Value, list[StoredNogood]]] = {}
+        self._awake: list[StoredNogood] = []
 
     def __iter__(self) -> Iterator[Mapping[str, Value]]:
         return map(dict, self._known)
@@ -90,7 +90,7 @@ class NogoodList:
         if key not in self._known:
             self._known.add(key)
             own = nogood.pop(agent)
-            self._awake.append(Kept(nogood, own))
+            self._awake.append(StoredNogood(nogood, own))
 
     def update(self, agent: str, value: Value) -> None:
         """Re-examine the nogoods that watch the new value of `agent`."""
@@ -98,8 +98,8 @@ class NogoodList:
         for part in [part for part in waiting if agrees(part, value)]:
             self._awake += waiting.pop(part)
 
-    def standing(self, view: LeftSide) -> list[Kept]:
-        """Return the nogoods whose other assignments all hold in `view`."""
+    def applicable(self, view: LeftSide) -> list[StoredNogood]:
+        """Return the nogoods that apply in `view`: their other assignments all hold."""
         awake = []
         for kept in self._awake:
             missing = next((agent for agent, value in kept.others.items() if not agrees(value, view.get(agent))), None)
@@ -113,7 +113,7 @@ class NogoodList:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class AWC(Protocol):
-    """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
+    """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, its own `priority`."""
 
     messages: ClassVar[Any] = Ok | Nogood | AddLink
     traits: ClassVar[Traits] = Traits(
@@ -134,7 +134,7 @@ class AWC(Protocol):
         self.sent: set[frozenset[tuple[str, Value]]] = set()
         self._alike: dict[Value, list[int]] = {}
         self._higher: dict[str, Value] = {}
-        self._standing: list[list[LeftSide]] = []
+        self._applicable: list[list[LeftSide]] = []
         self._conflicts: dict[int, LeftSide | None] = {}
 
     def start(self) -> None:
@@ -142,7 +142,6 @@ class AWC(Protocol):
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Ok | Nogood | AddLink", message):
@@ -156,11 +155,10 @@ class AWC(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Check the view."""
         if self.verdict is None:
             self._check_agent_view()
 
-    # What the messages do
+    # Messages
 
     def _received_ok(self, agent: str, value: Value, priority: int) -> None:
         self.view[agent] = value
@@ -168,7 +166,7 @@ class AWC(Protocol):
         self.nogoods.update(agent, value)
 
     def _received_nogood(self, nogood: dict[str, tuple[Value, int]]) -> None:
-        """Store a nogood; link to its robots that are no neighbours and assume its values for them for now."""
+        """Store a nogood; request links to its robots that are not neighbours, and assume its values for now."""
         for agent, (value, priority) in nogood.items():
             if agent != self.problem.agent and agent not in self.neighbours:
                 self.send(agent, AddLink())
@@ -185,12 +183,12 @@ class AWC(Protocol):
 
     def _check_agent_view(self) -> None:
         """Keep the value if all higher robots allow it; else take another that they allow, else backtrack."""
-        self._look_up()
+        self._recompute()
         if self.value is not None and self._reason(self.value) is None:
             return
         allowed = self._allowed()
         if allowed:
-            self._take(allowed)
+            self._choose_value(allowed)
         else:
             self._backtrack()
 
@@ -211,10 +209,10 @@ class AWC(Protocol):
         for agent in nogood:
             self.send(agent, message)
         self.priority = 1 + max(self.priorities.values())
-        self._look_up()
-        self._take(self._allowed())
+        self._recompute()
+        self._choose_value(self._allowed())
 
-    def _take(self, allowed: list[int]) -> None:
+    def _choose_value(self, allowed: list[int]) -> None:
         """Take the value with the fewest conflicts (the first of equals) and send it to all neighbours."""
         self.value = allowed[0] if len(allowed) == 1 else min(allowed, key=self._violations)
         for agent in self.neighbours:
@@ -222,14 +220,14 @@ class AWC(Protocol):
 
     def _violations(self, index: int) -> int:
         """Return the number of constraints and nogoods that the value at `index` violates, at any priority."""
-        return self.problem.violation_count(index, self.view) + len(self._standing[index])
+        return self.problem.violation_count(index, self.view) + len(self._applicable[index])
 
     def _allowed(self) -> list[int]:
         return [index for index in range(len(self.problem.values)) if self._reason(index) is None]
 
     def _reason(self, index: int) -> LeftSide | None:
         """Return the higher robots' values that rule out `index`: the shortest nogood, or a violated constraint."""
-        against = [others for others in self._standing[index] if others.keys() <= self._higher.keys()]
+        against = [others for others in self._applicable[index] if others.keys() <= self._higher.keys()]
         if against:
             return min(against, key=len)
         if index not in self._conflicts:
@@ -250,7 +248,7 @@ class AWC(Protocol):
 
     # The view
 
-    def _look_up(self) -> None:
+    def _recompute(self) -> None:
         """Recompute the higher robots and the nogoods that hold; drop counts of conflicts that changed."""
         higher = {agent: value for agent, value in self.view.items() if self._is_higher(agent)}
         if higher != self._higher:
@@ -260,12 +258,12 @@ class AWC(Protocol):
                 if conflict is not None and all(higher.get(agent) == self._higher[agent] for agent in conflict)
             }
             self._higher = higher
-        self._standing = [[] for _ in self.problem.values]
-        for others, own in self.nogoods.standing(self.view):
+        self._applicable = [[] for _ in self.problem.values]
+        for others, own in self.nogoods.applicable(self.view):
             if own not in self._alike:
                 self._alike[own] = list(self.problem.interchangeable(own))
             for index in self._alike[own]:
-                self._standing[index].append(others)
+                self._applicable[index].append(others)
 
     def _is_higher(self, agent: str) -> bool:
         """Return whether `agent` has higher priority than this robot; ties go by the static order."""

@@ -32,7 +32,7 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
-    # It may follow from any robot's constraints.
+    # The nogood may follow from any robot's constraints.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:

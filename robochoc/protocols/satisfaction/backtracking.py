@@ -1,7 +1,7 @@
 """The common base of ABT and its variants with other orders: the view, and the nogoods that depend on it.
 
-Of the kernel (Bessiere, Maestre, Brito, Meseguer, AIJ 161, 2005, Figure 1) `Update` and `ChooseValue`
-are here; what a protocol says, to whom, and when, is in its own file.
+Of the kernel (Bessiere, Maestre, Brito, Meseguer, AIJ 161, 2005, Figure 1) `Update` and `ChooseValue` are here; the
+sending of messages is in each protocol's file.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Backtracking(Protocol):
             self.view[agent] = value
         self.store.forget(agent, value)
 
-    def _believe(self, lhs: Mapping[str, Value]) -> list[str]:
+    def _assume(self, lhs: Mapping[str, Value]) -> list[str]:
         """Assume the values in `lhs`; return the robots that do not send this one their values yet."""
         strangers = [agent for agent in lhs if agent not in self.higher]
         self.higher.update(strangers)
@@ -66,5 +66,5 @@ class Backtracking(Protocol):
         return strangers
 
     def _current(self) -> Value | None:
-        """Return the own value as others see it; None while unassigned."""
+        """Return this robot's value as others see it; None while unassigned."""
         return None if self.value is None else self.problem.values[self.value]

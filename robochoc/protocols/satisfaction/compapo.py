@@ -1,9 +1,9 @@
 """Complete Asynchronous Partial Overlay (CompAPO).
 
-Cooperative mediation: a robot in conflict first tries to repair it by its own value. If it cannot, it mediates: it asks
-the robots of its good_list, those whose constraints it knows, to keep their values, solves their common problem by
-itself, and tells each its value. If that is in conflict with robots outside, these join the good_list. So mediators
-come to know as much of the problem as is hard, and in the worst case all of it.
+Cooperative mediation: a robot in conflict first tries to repair it by changing its own value. If it cannot, it
+mediates: it asks the robots of its good_list (those whose constraints it knows) to keep their values, solves their
+common problem by itself, and sends each robot its value. Robots outside that are then in conflict join the good_list.
+So mediators learn the hard parts of the problem, and in the worst case all of it.
 
 - **When to use**: no costs, robots may learn each other's constraints, and messages are few but may be long.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. A mediator's search is
@@ -12,43 +12,43 @@ come to know as much of the problem as is hard, and in the worst case all of it.
 - **References**: Mailler, Lesser: "Solving distributed constraint satisfaction problems using cooperative mediation",
   AAMAS 2004 (APO); "Asynchronous partial overlay: a new algorithm for solving distributed constraint satisfaction
   problems", JAIR 25 (2006). APO is not complete: Grinshpoun, Meisels: "Completeness and performance of the APO
-  algorithm", JAIR 33 (2008), which is CompAPO. Only digests of the papers were at hand.
+  algorithm", JAIR 33 (2008), which is CompAPO. Only digests of the papers were available.
 
 The methods, beside the papers' names:
 
     init            `_introduce`          evaluate?         `_evaluate`, `_serve`
     check_agent     `_check_agent_view`   evaluate!, wait!  `_evaluated`, `_abandon`
-    mediate         `_open`, `_go_on`     accept!           `_accept`
+    mediate         `_open`, `_advance`   accept!           `_accept`
     choose_solution `_choose_solution`    good_list         `good_list`
 
-As in CompAPO there are no partial sessions: a mediator goes on only once all robots it asked have agreed. What is ours
-is how this ends under every schedule, with no clock and no chance:
+As in CompAPO there are no partial sessions: a mediator continues only once all robots it asked have agreed. Our
+addition is a way to terminate under every schedule, without clock or random numbers:
 
-- **Sessions also hold the robots around the good_list**: all that share a constraint with one of it. They keep their
-  values, too, so what the mediator knows of them is true. It is told values, not conflicts.
-- **Who waits for whom** is settled as in wait-die of databases. Priority is the paper's: the mediator with the larger
-  good_list, then the higher robot. A robot that is held by a session lets requests of higher priority wait, and refuses
-  those of lower priority (`wait!`). Who is refused releases all robots it holds, and tries again when the robot that
-  refused it says that it is free. So a mediator only waits for sessions of lower priority, and no cycle can form. The
-  session of highest priority is never refused: it is carried out.
-- **Only the highest robot of a conflict acts**, and it repairs by itself no more often than its good_list has robots.
+- **Sessions also include the robots around the good_list**: all that share a constraint with one of its robots. They
+  keep their values, too, so the mediator's knowledge of them is true. They send values, not conflicts.
+- **Waiting** follows the wait-die scheme of databases. Priority is the paper's: the mediator with the larger good_list,
+  then the higher robot. A robot in a session lets requests of higher priority wait, and refuses those of lower priority
+  (`wait!`). A refused mediator releases all robots in its session, and tries again when the robot that refused it
+  reports that it is free. So a mediator only waits for sessions of lower priority, and no cycle can form. The session
+  of highest priority is never refused, and finishes.
+- **Only the highest robot of a conflict acts**, and it repairs by itself at most as often as its good_list has robots.
 
-It ends: repairs are bounded, since good_lists are. After the last repair values change in sessions only. A session has
-its mediator in a conflict of its own, whose robots are all in the good_list. If no conflict with robots outside is
-left, there are fewer conflicts than before, as all around it kept their values. Otherwise its good_list grows. So there
-are finitely many sessions that change anything. A session that finds its conflict gone follows a change of value that
-the mediator had not heard of, and one that is refused follows one of higher priority: these are finitely many, too. At
-rest no robot is the highest of a conflict, so there is none. That there is no solution is what a mediator finds whose
-good_list has none.
+Termination: the number of repairs is bounded, since good_lists are. After the last repair values change in sessions
+only. A session's mediator is in a conflict whose robots are all in the good_list. If no conflict with robots outside
+remains, there are fewer conflicts than before, as all robots around kept their values. Otherwise the good_list grows.
+So finitely many sessions change anything. A session whose conflict has disappeared follows a change of value that had
+not reached the mediator, and a refused session follows one of higher priority: these are finitely many, too. At
+quiescence no robot is the highest of a conflict, so there is no conflict. A mediator whose good_list has no solution
+proves that there is none.
 
-APO itself is left out. With its sessions, of those robots that agree, in place of ours, values may change in circles
-for ever: so on 8 of 150 random problems of 6 robots, of which this protocol ended all. Where it ended, it was right.
+APO itself is not offered. With its sessions (of those robots that agree) values may change in circles for ever: this
+happened on 8 of 150 random problems of 6 robots, all of which this protocol solved. When APO ended, it was right.
 
 Other choices and differences:
 
 - A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems never.
-- New values are numbered, so that an old `ok?` never replaces what a mediator has said. A mediator tells the new values
-  to all neighbours of those that change, so no `ok?` follows an `accept!`.
+- New values are numbered, so that an old `ok?` never replaces a mediator's decision. A mediator sends the new values to
+  all neighbours of the robots that change, so no `ok?` follows an `accept!`.
 - The mediator's search and its tables of constraints are in `mediation.py`; its checks are counted.
 
 Privacy: a mediator learns the domains' sizes, the constraints and the values of all robots in its good_list, and the
@@ -81,9 +81,9 @@ from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 Changes = dict[str, tuple[int, int]]
-"""New values of robots: the place in the robot's domain, and how often it has changed its value by then."""
+"""New values of robots: the place in the robot's domain, and the number of changes of its value so far."""
 MOST_PROOFS = 4096
-"""For constraints with more combinations of values no rule says what they prove: it would take too long."""
+"""Constraints with more combinations of values give no proofs: computing them would take too long."""
 
 
 class Init(Message, frozen=True):
@@ -101,7 +101,7 @@ class Init(Message, frozen=True):
 
 
 class Ok(Message, frozen=True):
-    """The sender's new value, and how often it has changed (`ok?`)."""
+    """The sender's new value, and the number of its changes (`ok?`)."""
 
     value: Value
     count: int
@@ -116,7 +116,7 @@ class Ok(Message, frozen=True):
 
 
 class Evaluate(Message, frozen=True):
-    """The request to join a mediation session with this priority; with `tables`, to send constraints (`evaluate?`)."""
+    """A request to join a mediation session with this priority; with `tables`, to send constraints (`evaluate?`)."""
 
     session: int
     priority: int
@@ -132,7 +132,7 @@ class Evaluate(Message, frozen=True):
 
 
 class Evaluation(Message, frozen=True):
-    """The receiver may mediate: the sender's value, its number of changes, and its constraints if they are wanted.
+    """The permission to mediate: the sender's value, its number of changes, and its constraints if requested.
 
     The paper's `evaluate!`.
     """
@@ -145,15 +145,15 @@ class Evaluation(Message, frozen=True):
     act = Act(Performative.AGREE, "the sender keeps its value until the mediation session is over")
 
     def in_words(self, _: Wording) -> str:
-        told = f"; my constraints are {counted(len(self.tables), 'table')}" if self.tables else ""
-        return f"do mediate: I keep my value number {self.place + 1}{told}"
+        shown = f"; my constraints are {counted(len(self.tables), 'table')}" if self.tables else ""
+        return f"do mediate: I keep my value number {self.place + 1}{shown}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
-        """Return what the message proves to its receiver: the sender's value, and what its constraints allow."""
+        # The sender's value, and the combinations that its constraints allow.
         if sum(math.prod(table.sizes) for table in self.tables) > MOST_PROOFS:
             return None
-        told = [proof for table in self.tables for proof in _table_proves(table, self.tables, hearing)]
-        return [*_stands({hearing.sender: (self.place, self.count)}, hearing), *told]
+        shown = [proof for table in self.tables for proof in _table_proves(table, self.tables, hearing)]
+        return [*_current_values({hearing.sender: (self.place, self.count)}, hearing), *shown]
 
 
 class Wait(Message, frozen=True):
@@ -169,7 +169,7 @@ class Wait(Message, frozen=True):
 
 
 class Free(Message, frozen=True):
-    """The sender, which told the receiver to wait, is in no session any more."""
+    """The end of a wait: the sender, which refused the receiver, has left its session."""
 
     act = Act(Performative.INFORM, "the receiver may ask again to mediate")
     proves_nothing = True
@@ -187,13 +187,13 @@ class Assign(Message, frozen=True):
     act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
 
     def in_words(self, _: Wording) -> str:
-        return f"the mediation is over: take your value number {self.place + 1}{_with(self.changes)}"
+        return f"the mediation is over: take your value number {self.place + 1}{_shown(self.changes)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver, and to its sender of the receiver's value."""
+        # The sender learns the receiver's value, too.
         agreed = hearing.last(Evaluation, hearing.receiver, hearing.sender)
         count = 0 if agreed is None else agreed.count + (agreed.place != self.place)
-        return _stands({**self.changes, hearing.receiver: (self.place, count)}, hearing)
+        return _current_values({**self.changes, hearing.receiver: (self.place, count)}, hearing)
 
 
 class Release(Message, frozen=True):
@@ -204,28 +204,28 @@ class Release(Message, frozen=True):
     act = Act(Performative.INFORM, "the receiver need not keep its value any more")
 
     def in_words(self, words: Wording) -> str:
-        return f"the mediation is over: {words.variables(words.receiver)} may change again{_with(self.changes)}"
+        return f"the mediation is over: {words.variables(words.receiver)} may change again{_shown(self.changes)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return _stands(self.changes, hearing)
+        return _current_values(self.changes, hearing)
 
 
-def _with(changes: Changes) -> str:
+def _shown(changes: Changes) -> str:
     """Return the new values of others in words; empty if there are none."""
-    told = [f"{robot} now has its value number {place + 1}" for robot, (place, _) in changes.items()]
-    return f"; {listed(told)}" if told else ""
+    shown = [f"{robot} now has its value number {place + 1}" for robot, (place, _) in changes.items()]
+    return f"; {listed(shown)}" if shown else ""
 
 
-def _stands(changes: Changes, hearing: Hearing) -> list[Proof]:
-    """Return where robots stand, as far as the observer knows their values."""
+def _current_values(changes: Changes, hearing: Hearing) -> list[Proof]:
+    """Return the values of robots, as far as the observer knows their domains."""
     known = [(robot, hearing.values(robot), place, count) for robot, (place, count) in changes.items()]
     return [StandsAt(robot, values[place], (count,)) for robot, values, place, count in known if values is not None]
 
 
 def _table_proves(table: Table, tables: Sequence[Table], hearing: Hearing) -> Iterator[Proof]:
-    """Yield what one of the sender's `tables` proves: which values clash, and which go with all of its constraints.
+    """Yield the proofs of one of the sender's `tables`: the values that clash, and those that all constraints allow.
 
-    Nothing is concluded if the receiver does not know whose values the places stand for.
+    There are none if the receiver does not know the domains that the places refer to.
     """
     values = [hearing.values(robot) for robot in table.robots]
     if any(known is None for known in values):
@@ -244,9 +244,9 @@ class CompAPO(Protocol):
     """One agent of CompAPO.
 
     State: `view` (agent_view), with `counts` of changes; the neighbours' `domains`; `good_list` and `tables`, the
-    constraints of the robots in it as far as they are known. `holder` is the robot whose session holds this one, with
-    `held` its priority; `requests` are sessions that wait, `refused` robots that were told to wait. Of the own session:
-    its number `session`, the robots `asked`, and `replies`. `waits_for` is the robot that has refused it.
+    constraints of its robots as far as they are known. `holder` is the mediator of the session that this robot is in,
+    and `held` that session's priority; `requests` are sessions that wait, `refused` the robots it has refused. Of its
+    own session: its number `session`, the robots `asked`, and `replies`. `waits_for` is the robot that has refused it.
     """
 
     messages = Init | Ok | Evaluate | Evaluation | Wait | Free | Assign | Release
@@ -281,7 +281,7 @@ class CompAPO(Protocol):
         """Whether this robot is the highest of a conflict; None: not known since the last change."""
 
     def start(self) -> None:
-        """Take the first value, and tell the domain to all neighbours."""
+        """Take the first value, and send the domain to all neighbours."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -290,14 +290,13 @@ class CompAPO(Protocol):
             self.send(neighbour, Init(self.problem.values))
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Init | Ok | Evaluate | Evaluation | Wait | Free | Assign | Release", message):
             case Init(values):
                 self._introduce(sender, values)
             case Ok(value, count):
-                self._hear(sender, value, count)
+                self._update_value(sender, value, count)
             case Evaluate() as request:
                 self.requests[sender] = request
             case Evaluation() as reply:
@@ -314,41 +313,41 @@ class CompAPO(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Go on with a session, or begin one; answer requests. Nothing is done before all domains are known."""
+        """Continue a session, or begin one; answer requests. Do nothing before all domains are known."""
         if self.verdict is not None or len(self.domains) < len(self.linked):
             return
         if self.holder == self.name:
-            self._go_on()
+            self._advance()
         if self.verdict is None:
             self._serve()
 
-    # What is told
+    # Received values
 
     def _introduce(self, sender: str, values: tuple[Value, ...]) -> None:
         if not values:
             raise ValueError(f"{sender} has no values")
         self.domains[sender] = values
-        self._hear(sender, values[0], 0)
+        self._update_value(sender, values[0], 0)
 
-    def _hear(self, sender: str, value: Value, count: int) -> None:
+    def _update_value(self, sender: str, value: Value, count: int) -> None:
         """Store a value, unless a newer one is known."""
         if sender in self.domains and count >= self.counts.get(sender, 0):
             self.view[sender], self.counts[sender] = value, count
             self._conflict = None
 
     def _learn(self, changes: Changes) -> None:
-        """Store what a mediator says of neighbours."""
+        """Store a mediator's new values of neighbours."""
         for robot, (place, count) in changes.items():
             if robot not in self.domains or not 0 <= place < len(self.domains[robot]):
-                raise ValueError(f"value number {place + 1} of {robot}, which has no such value that is known here")
-            self._hear(robot, self.domains[robot][place], count)
+                raise ValueError(f"{robot} has no known value number {place + 1}")
+            self._update_value(robot, self.domains[robot][place], count)
 
     # In a session of another robot
 
     def _serve(self) -> None:
-        """Agree to the first of the sessions that wait, or do what there is to do oneself; then refuse and wake others.
+        """Agree to the first waiting session, or act alone; then refuse requests and report that this robot is free.
 
-        Who asks with a lower priority than the session that holds this robot is refused.
+        Requests of lower priority than this robot's present session are refused.
         """
         if self.holder is None and self.requests:
             first = min(self.requests, key=self._priority)
@@ -367,14 +366,14 @@ class CompAPO(Protocol):
                 self.refused.add(robot)
 
     def _evaluate(self, mediator: str, request: Evaluate) -> None:
-        """Agree to a session: keep the value, and tell it and, if wanted, the constraints."""
+        """Agree to a session: keep the value, and send it and, if requested, the constraints."""
         tables = self._own_tables() if request.tables else ()
         self.send(mediator, Evaluation(request.session, self._place(), self.count, tables))
 
     def _accept(self, mediator: str, place: int, changes: Changes) -> None:
-        """Take the value that the mediator gives; it has told all neighbours."""
+        """Take the value from the mediator, which has sent it to all neighbours."""
         if mediator != self.holder or not 0 <= place < len(self.problem.values):
-            raise ValueError(f"{mediator} gives a value number {place + 1} that it cannot give")
+            raise ValueError(f"{mediator} assigns value number {place + 1}, which it must not")
         if place != self.value:
             self._change(place)
         self._release(mediator, changes)
@@ -387,10 +386,10 @@ class CompAPO(Protocol):
         if mediator == self.holder:
             self.holder = None
 
-    # The own search
+    # This robot's search
 
     def _check_agent_view(self) -> None:
-        """Repair a conflict by the own value, or else begin to mediate, unless told to wait."""
+        """Repair a conflict by changing the value, or else begin to mediate, unless refused."""
         if not self._in_conflict() or self._repair():
             return
         if self.waits_for is None:
@@ -405,7 +404,7 @@ class CompAPO(Protocol):
         return self._conflict
 
     def _repair(self) -> bool:
-        """Take a value without conflicts, and tell it to all neighbours; return whether there is one."""
+        """Take a value without conflicts, and send it to all neighbours; return whether there is one."""
         if self.repairs >= len(self.good_list):
             return False
         places = range(len(self.problem.values))
@@ -426,10 +425,10 @@ class CompAPO(Protocol):
         self.asked = {self.name}
         self.replies = {self.name: Evaluation(self.session, self._place(), self.count, ())}
         self.tables[self.name] = self._own_tables()
-        self._go_on()
+        self._advance()
 
-    def _go_on(self) -> None:
-        """Ask who has not been asked; once all have agreed, solve the problem."""
+    def _advance(self) -> None:
+        """Send the requests that are missing; once all robots have agreed, solve the problem."""
         if len(self.replies) < len(self.asked):
             return
         around = {robot for table in self._known_tables() for robot in table.robots}
@@ -439,36 +438,36 @@ class CompAPO(Protocol):
             self.send(robot, Evaluate(self.session, len(self.good_list), wanted))
         self.asked |= more
         if not more:
-            self._see_replies()
+            self._apply_replies()
             self._choose_solution()
 
     def _evaluated(self, sender: str, reply: Evaluation) -> None:
-        """Store a reply to the session that goes on."""
+        """Store a reply of the current session."""
         if self.holder != self.name or reply.session != self.session or sender not in self.asked:
             return
         if sender in self.good_list and sender not in self.tables:
             if not reply.tables or not all(
                 sender in table.robots and {*table.robots} <= {*self.order.names} for table in reply.tables
             ):
-                raise ValueError(f"{sender} tells constraints that are none of its own")
+                raise ValueError(f"{sender} sends constraints that it is not part of")
             self.tables[sender] = reply.tables
         self.replies[sender] = reply
 
     def _abandon(self, sender: str, session: int) -> None:
-        """End the own session without a result: a robot is in one of higher priority, and will say when it is free."""
+        """End the session without a result: a robot is in one of higher priority, and will report when it is free."""
         if self.holder != self.name or session != self.session:
             return
         self.waits_for = sender
         self._end({}, {}, self.asked - {self.name, sender})
 
-    def _see_replies(self) -> None:
-        """Take over the neighbours' values, which stand now."""
+    def _apply_replies(self) -> None:
+        """Store the neighbours' values from the replies; they are fixed during the session."""
         for robot in self.linked:
             reply = self.replies[robot]
             self._learn({robot: (reply.place, reply.count)})
 
     def _choose_solution(self) -> None:
-        """Solve the problem of the good_list, and tell everybody; whoever is outside and in conflict joins the list."""
+        """Solve the problem of the good_list and send the result; outside robots in conflict join the list."""
         places = {robot: reply.place for robot, reply in self.replies.items()}
         found = self._solved(places) if self._in_conflict() else {}
         if found is None:
@@ -480,7 +479,7 @@ class CompAPO(Protocol):
         self._end(found, changes, self.asked - {self.name})
 
     def _solved(self, places: Mapping[str, int]) -> dict[str, int] | None:
-        """Return values for the good_list, which grows by whoever is in conflict with them; None: there are none."""
+        """Return values for the good_list, and add the robots in conflict with them; None: there are no values."""
         tables = self._known_tables()
         sizes = sizes_in(tables, places)
         mediation = Mediation(tables, {robot: sizes[robot] for robot in self._ranked(self.good_list)}, places)
@@ -492,7 +491,7 @@ class CompAPO(Protocol):
         return found
 
     def _end(self, found: Mapping[str, int], changes: Changes, held: Iterable[str]) -> None:
-        """End the session: tell the robots that it has `held` their values, and what changes for them."""
+        """End the session: send the robots in it (`held`) their values, and their neighbours' changes."""
         met: dict[str, set[str]] = {}
         for table in self._known_tables() if changes else ():
             for robot in table.robots:
@@ -508,7 +507,7 @@ class CompAPO(Protocol):
     # Constraints
 
     def _own_tables(self) -> tuple[Table, ...]:
-        """Return the own constraints, those over the same robots in one table."""
+        """Return this robot's constraints, those over the same robots in one table."""
         if self.name not in self.tables:
             self.tables[self.name] = own_tables(self.problem, self.linked, self.domains)
         return self.tables[self.name]
@@ -517,7 +516,7 @@ class CompAPO(Protocol):
         """Return the constraints of the good_list, each once."""
         return distinct(table for robot in self._ranked(self.good_list) for table in self.tables.get(robot, ()))
 
-    # Small things
+    # Helpers
 
     def _change(self, place: int) -> None:
         self.value = place

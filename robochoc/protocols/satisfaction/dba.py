@@ -1,16 +1,15 @@
 """The Distributed Breakout Algorithm (DBA), for problems without costs.
 
-Local search in cycles: hill climbing on weighted violations. All robots send their values, then by how much their best
-move would reduce the weight of what they violate; among neighbours the one with the largest reduction moves. In a
-quasi-local minimum, where neither a robot nor one of its neighbours can reduce anything, the robot's violated
-constraints weigh one more from then on, until it is worth moving away. Robots find out by themselves that all
-constraints hold, by a termination counter.
+Local search in cycles: hill climbing on weighted violations. All robots send their values, then the reduction of their
+violated weight by their best move; among neighbours the one with the largest reduction moves. In a quasi-local minimum,
+where neither a robot nor one of its neighbours can reduce anything, the weights of the robot's violated constraints
+grow by one, until a move reduces them. Robots detect by a termination counter that all constraints hold.
 
 - **When to use**: a large team without costs, where a solution surely exists.
-- **Guarantees**: incomplete; a solution is one, as all robots know that no constraint is violated when they stop. It
-  never proves that there is none (but for a robot with an empty domain), and gives up after `cycles` cycles. On a
+- **Guarantees**: incomplete; a solution is correct, as all robots know that no constraint is violated when they stop.
+  It never proves that there is none (except for a robot with an empty domain), and gives up after `cycles` cycles. On a
   constraint graph without cycles it finds a solution if there is one (Zhang, Wittenburg 2002).
-- **Parameters (`--set`)**: `cycles` (after so many without a solution it gives up; default 1000).
+- **Parameters (`--set`)**: `cycles` (the number of cycles after which it gives up; default 1000).
 - **References**: Yokoo, Hirayama: "Distributed breakout algorithm for solving distributed constraint satisfaction
   problems", ICMAS 1996; Hirayama, Yokoo: "The distributed breakout algorithms", AIJ 161, 2005; Zhang, Wittenburg:
   "Distributed breakout revisited", AAAI 2002.
@@ -24,10 +23,10 @@ The papers' procedures:
     quasi-local minimum              `_move`
 
 The counter: a robot without violations, whose neighbours have none, adds one to the least counter among them and
-itself; any violation sets it to 0. So a counter of c says that all robots within distance c have had none for long
-enough, and once c is as large as any distance, nobody has. The papers leave that bound to the user; one that is too
-small stops wrongly. Here it is the number of robots less one, which no distance exceeds. Then all counters of connected
-robots reach it in the same cycle, so nobody has to be told the end.
+itself; any violation sets it to 0. So a counter of c means that all robots within distance c have had no violation for
+long enough, and once c is as large as any distance, there is none. The papers leave that bound to the user; with a
+bound that is too small the search stops wrongly. Here it is the number of robots less one, which no distance exceeds.
+Then the counters of all connected robots reach it in the same cycle, so no message has to announce the end.
 
 Choices that the papers leave open, and differences:
 
@@ -35,9 +34,9 @@ Choices that the papers leave open, and differences:
 - The first value is chosen at random, and so is one of several best values.
 - Of equal reductions, that of the first robot in the priority order counts.
 - Constraints may be n-ary, as all robots of a scope are neighbours.
-- Where a value is lost, the last one known stands for it, and the robot tells that something may be violated; one that
-  misses a reduction stays, and counts from 0. So counters seldom get far. A robot that has missed anything does not
-  give up for all, and the best cycle is the answer, if it passes the check.
+- If a value is lost, the last known one is used, and the robot reports a possible violation; a robot that misses a
+  reduction does not move, and counts from 0. So with losses counters rarely grow large. A robot that has missed
+  anything does not end the search for all, and the best cycle is the answer, if it passes the check.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -77,9 +76,9 @@ Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class Improve(wire.Message, frozen=True):
-    """By how much the sender's best move reduces the weight of what it violates (`improve`).
+    """The reduction of the sender's violated weight by its best move (`improve`).
 
-    `weight` is the weight of what it violates now, `counter` its termination counter.
+    `weight` is the total weight of its violated constraints, `counter` its termination counter.
     """
 
     reduction: Count
@@ -94,18 +93,17 @@ class Improve(wire.Message, frozen=True):
         return f"what I violate weighs {self.weight:,}, and my move would make that {self.reduction:,} less"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: whether the sender's present value goes with the own one.
-
-        That it does not, only where no other robot's value is in it.
-        """
+        # Whether the two values are consistent; an inconsistency only if no other robot can have caused it.
         own = hearing.last(Value, hearing.receiver, hearing.sender)
-        told = hearing.last(Value, hearing.sender, hearing.receiver)
-        if own is None or told is None:
+        theirs = hearing.last(Value, hearing.sender, hearing.receiver)
+        if own is None or theirs is None:
             return NOTHING
         view = {hearing.receiver: own.value}
         if not self.weight:
-            return [Pays(hearing.sender, told.value, view, 0, FINITE)]
-        return [Pays(hearing.sender, told.value, view, INFINITE, INFINITE)] if hearing.is_only_neighbour() else NOTHING
+            return [Pays(hearing.sender, theirs.value, view, 0, FINITE)]
+        return (
+            [Pays(hearing.sender, theirs.value, view, INFINITE, INFINITE)] if hearing.is_only_neighbour() else NOTHING
+        )
 
 
 class DBA(CycleProtocol):
@@ -133,7 +131,7 @@ class DBA(CycleProtocol):
         self.counter = 0
         self._distance = len(order.names) - 1
         self._violated: list[int] = []
-        self._told = Improve(0, 0, 0)
+        self._sent = Improve(0, 0, 0)
         self._target = 0
         self._missed = False
 
@@ -143,7 +141,7 @@ class DBA(CycleProtocol):
         self.tell_value(self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the reduction by the best own move, with all neighbours' values known."""
+        """Send the reduction by this robot's best move, with all neighbours' values known."""
         charged = self.problem.charged(self.checked_values(messages))
         complete = self._are_complete(messages)
         weighed = [self._weight(charged, place) for place in range(len(self.problem.values))]
@@ -154,49 +152,49 @@ class DBA(CycleProtocol):
             self._target = self.any_of([place for place, weight in enumerate(weighed) if weight == least])
         if now or not complete:
             self.counter = 0
-        self._told = Improve(now - least, now if complete else max(now, 1), self.counter)
-        self.tell(self.problem.neighbours, self._told)
+        self._sent = Improve(now - least, now if complete else max(now, 1), self.counter)
+        self.tell(self.problem.neighbours, self._sent)
         self.listen(self.problem.neighbours, self._move)
 
     def _weight(self, charged: list[Charged], place: int) -> int:
-        """Return the weight of all that the value at `place` violates (eval)."""
+        """Return the weight of all constraints that the value at `place` violates (eval)."""
         return sum(self.weights.get(one.number, 1) for one in charged if one.costs[place] == INFINITE)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Stop, move, or let violated constraints weigh more, with all neighbours' reductions known."""
-        told = {name: said for name, said in messages.items() if isinstance(said, Improve)}
+        """Stop, move, or increase the weights of violated constraints, with all neighbours' reductions known."""
+        theirs = {name: improve for name, improve in messages.items() if isinstance(improve, Improve)}
         complete = self._are_complete(messages)
         if not complete:
             self.counter = 0
-        elif self._has_ended([self._told, *told.values()]):
+        elif self._has_ended([self._sent, *theirs.values()]):
             self.finish()
             return
-        if complete and not max(said.reduction for said in (self._told, *told.values())):
+        if complete and not max(improve.reduction for improve in (self._sent, *theirs.values())):
             for number in self._violated:
                 self.weights[number] = self.weights.get(number, 1) + 1
-        self.take(self._target if complete and self._wins(told) else self.present)
+        self.take(self._target if complete and self._wins(theirs) else self.present)
         if not self.over:
             self.tell_value(self._weigh)
         elif not self._missed:
             self.conclude(Verdict.UNKNOWN)
 
     def _are_complete(self, messages: Mapping[str, wire.Message]) -> bool:
-        """Return whether a message of each neighbour has come in this phase, and note if not."""
+        """Return whether a message of each neighbour has arrived in this phase; note a missing one."""
         complete = len(messages) == len(self.problem.neighbours)
         self._missed = self._missed or not complete
         return complete
 
-    def _has_ended(self, told: list[Improve]) -> bool:
-        """Count on, or begin again; return whether no robot of the component violates anything."""
-        self.counter = min(said.counter for said in told)
-        if any(said.weight for said in told):
+    def _has_ended(self, theirs: list[Improve]) -> bool:
+        """Increment or reset the counter; return whether no robot of the component violates anything."""
+        self.counter = min(improve.counter for improve in theirs)
+        if any(improve.weight for improve in theirs):
             return False
         self.counter += 1
         return self.counter >= self._distance
 
-    def _wins(self, told: Mapping[str, Improve]) -> bool:
-        """Return whether the own reduction is positive and the largest; ties go to the first robot in the order."""
-        rank, own = self.order.rank, self._told.reduction
+    def _wins(self, theirs: Mapping[str, Improve]) -> bool:
+        """Return whether this robot's reduction is positive and largest; ties go to the first robot in the order."""
+        rank, own = self.order.rank, self._sent.reduction
         return own > 0 and all(
-            (own, rank[name]) > (said.reduction, rank[self.problem.agent]) for name, said in told.items()
+            (own, rank[name]) > (improve.reduction, rank[self.problem.agent]) for name, improve in theirs.items()
         )

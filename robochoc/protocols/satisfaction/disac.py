@@ -1,29 +1,30 @@
 """Distributed arc consistency (DisAC-9), which `--preprocess ac` runs before any protocol.
 
-A robot removes each value that some constraint allows with no values of the others that are left: such a value is in no
-solution. It tells its neighbours, who remove values in turn. The end is the same as that of a central algorithm: the
-largest arc consistent domains. Some robot finds that there is no solution if it has no value left.
+A robot removes each of its values that has no support: some constraint allows it with none of the others' remaining
+values, so it is in no solution. It sends its removals to its neighbours, who remove values in turn. The result is that
+of a central algorithm: the largest arc consistent domains. A robot without a value left proves that there is no
+solution.
 
-It is no search: at the end robots have values left, not one value each. The run then takes the protocol that was asked
-for, with the domains restricted to what is left.
+This is not a search: at the end each robot has a reduced domain, not one value. The run then continues with the
+requested protocol on these domains.
 
 - **Guarantees**: no value of a solution is removed. It terminates. At most n d messages to each neighbour.
 - **Parameters**: none.
-- **Reference**: Hamadi: "Optimal distributed arc-consistency", Constraints 7 (2002). Only a digest was at hand.
+- **Reference**: Hamadi: "Optimal distributed arc-consistency", Constraints 7 (2002). Only a digest was available.
 
-The rule that saves messages is the paper's: a robot tells a neighbour its removals only if one of them was the last
-that went with a value of the neighbour that is left, but then all of them so far. It knows that the neighbour removes
-that value, and is not told of it.
+The rule that saves messages is the paper's: a robot sends a neighbour its removals, all of them so far, only if one of
+them was the last support of a remaining value of the neighbour. It then knows that the neighbour removes that value,
+without a message.
 
 Choices and differences:
 
-- Constraints over the same robots count as one, which removes more than each by itself does.
-- Constraints over more than two robots: their robots are told all removals, as one robot alone does not see when the
+- Constraints over the same robots count as one, which removes more than each does by itself.
+- Constraints over more than two robots: their robots receive all removals, as a single robot cannot detect that the
   last combination for a value of another one is gone.
-- Each robot evaluates its constraints once, as tables (`LocalProblem.allowed`); constraint checks are those, so both
-  robots of a constraint make them. The paper makes each once, as robots also learn each other's constraints.
-- A constraint whose table would be too large is left out. What is removed is right nevertheless.
-- Of costs only infinite ones count.
+- Each robot evaluates its constraints once, as tables (`LocalProblem.allowed`); these are its constraint checks, so
+  both robots of a constraint make them. The paper makes each once, as robots also learn each other's constraints.
+- A constraint whose table would be too large is ignored. All removals are correct nevertheless.
+- Only infinite costs count.
 - The runtime detects quiescence.
 """
 
@@ -77,10 +78,10 @@ _Table = tuple[tuple[str, ...], dict[tuple[int, ...], int]]
 
 
 class DisAC(Protocol):
-    """One agent. State: `domains` of the neighbours, and what is `left` of them and of the own one, as bitmaps.
+    """One agent. State: `domains` of the neighbours, and the values `left` in them and in its own, as bitmaps.
 
-    `removed` are own removals in their order, `told` how many of them each neighbour knows. `always` are those who are
-    told all: they share a constraint of more than two robots.
+    `removed` are its removals in their order, `sent` the number of them that each neighbour knows. `always` are the
+    neighbours that receive all removals: they share a constraint of more than two robots.
     """
 
     messages = Domain | Del
@@ -103,11 +104,11 @@ class DisAC(Protocol):
         self.left: dict[str, int] = {}
         self.own = (1 << len(problem.values)) - 1
         self.removed: list[int] = []
-        self.told: dict[str, int] = dict.fromkeys(self.linked, 0)
+        self.sent: dict[str, int] = dict.fromkeys(self.linked, 0)
         self._tables: list[_Table] | None = None
 
     def start(self) -> None:
-        """Tell the domain to all that share a constraint."""
+        """Send the domain to all robots that share a constraint."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -115,7 +116,6 @@ class DisAC(Protocol):
             self.send(neighbour, Domain(self.problem.values))
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | Del", message):
             case Domain(values):
                 self.domains[sender] = values
@@ -126,13 +126,13 @@ class DisAC(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Revise the own domain, and tell the removals. Nothing is done before all domains are known."""
+        """Revise the domain, and send the removals. Do nothing before all domains are known."""
         if self.verdict is not None or len(self.domains) < len(self.linked):
             return
         if self._tables is None:
             self._tables = self._evaluated()
         if self._revise():
-            self._tell()
+            self._send_removals()
         else:
             self.conclude(Verdict.NO_SOLUTION)
 
@@ -163,7 +163,7 @@ class DisAC(Protocol):
         return list(found.items())
 
     def _revise(self) -> bool:
-        """Remove the own values without a support; return whether one is left."""
+        """Remove this robot's values without support; return whether a value is left."""
         assert self._tables is not None  # noqa: S101 - made before
         before = self.own
         for others, masks in self._tables:
@@ -175,19 +175,19 @@ class DisAC(Protocol):
         self.removed += _places(before & ~self.own)
         return bool(self.own)
 
-    def _tell(self) -> None:
-        """Tell removals to each neighbour that needs them: all that it has not been told."""
+    def _send_removals(self) -> None:
+        """Send each neighbour that needs removals all those that it does not know yet."""
         unsupported = self._unsupported()
         for robot in self.linked:
-            news = tuple(self.removed[self.told[robot] :])
+            news = tuple(self.removed[self.sent[robot] :])
             if news and (robot in self.always or unsupported[robot]):
                 self.send(robot, Del(news))
-                self.told[robot] = len(self.removed)
+                self.sent[robot] = len(self.removed)
             if robot not in self.always:
                 self.left[robot] &= ~unsupported[robot]
 
     def _unsupported(self) -> dict[str, int]:
-        """Return, for each neighbour, its values that go with no own value that is left."""
+        """Return, for each neighbour, its values without support by a remaining value of this robot."""
         assert self._tables is not None  # noqa: S101 - made before
         lost = dict.fromkeys(self.linked, 0)
         for others, masks in self._tables:

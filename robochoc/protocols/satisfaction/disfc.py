@@ -58,7 +58,7 @@ from robochoc.system.compiling import mypyc_attr
 class DisFC(Protocol):
     """One agent of DisFC.
 
-    - `counter`: names the own assignment.
+    - `counter`: names this robot's assignment.
     - `view`: the counters of higher-priority robots. `filters`: the filters they sent.
     - `below`: counters and filters of lower-priority robots with parts of PKCs, not yet checked.
 
@@ -93,7 +93,6 @@ class DisFC(Protocol):
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Ok | Nogood | AddLink", message):
@@ -107,12 +106,12 @@ class DisFC(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Check the view, then check the own value against the filters of lower-priority robots."""
+        """Check the view, then check the value against the filters of lower-priority robots."""
         if self.verdict is None:
             self._check_agent_view()
             self._refuse_below()
 
-    # What the messages do
+    # Messages
 
     def _process_info(self, sender: str, ok: Ok) -> None:
         if sender in self.problem.children:
@@ -130,14 +129,14 @@ class DisFC(Protocol):
             self.store.add(self.value, {agent: (counter,) for agent, counter in nogood.lhs.items()})
             self.value = None
         else:
-            # The sender's picture of others was old, and it has forgotten my assignment: say it again.
-            self._tell(sender, self.value)
+            # The sender's view was outdated, and it has forgotten this robot's assignment: send it again.
+            self._send_filter(sender, self.value)
 
     def _set_link(self, sender: str) -> None:
         if sender not in self.lower:
             self.lower.append(sender)
         if self.value is not None:
-            self._tell(sender, self.value)
+            self._send_filter(sender, self.value)
 
     # The search
 
@@ -152,10 +151,10 @@ class DisFC(Protocol):
                 continue
             self.counter += 1
             for neighbour in (*self.lower, *self.problem.pkc_parents):
-                self._tell(neighbour, self.value)
+                self._send_filter(neighbour, self.value)
             return
 
-    def _tell(self, receiver: str, index: int) -> None:
+    def _send_filter(self, receiver: str, index: int) -> None:
         self.send(receiver, Ok(self.counter, self.problem.filter(index, receiver)))
 
     def _choose_value(self) -> int | None:
@@ -177,7 +176,7 @@ class DisFC(Protocol):
         self._update(culprit, None)
 
     def _refuse_below(self) -> None:
-        """Send nogoods to lower-priority robots whose filters do not contain the own value (PKC)."""
+        """Send nogoods to lower-priority robots whose filters do not contain this robot's value (PKC)."""
         if self.value is None:
             return
         for child, (counter, allowed) in list(self.below.items()):

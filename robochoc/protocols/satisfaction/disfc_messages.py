@@ -37,7 +37,7 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
-    # Only the senders of these counters know which values they stand for.
+    # Only the senders of these counters know the values that they name.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:

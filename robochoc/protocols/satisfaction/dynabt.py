@@ -2,7 +2,7 @@
 
 ABT (see `abt.py`) that continues when the problem changes. Its nogoods have an *explanation*, `because`: the
 constraints, and the domains, that they were derived from. A direct conflict is explained by its constraint. A resolvent
-is explained by the union of the explanations that it resolves, and by the own domain.
+is explained by the union of the explanations that it resolves, and by the resolving robot's domain.
 
 - **When to use**: the problem changes during the run, for example when a robot is "lost if hit by a meteor" (paper,
   Section 3.1).
@@ -22,7 +22,7 @@ Choices that the paper leaves open, and differences:
 
 - The runtime propagates the changes to all robots before any robot continues. In the paper the robots send them to
   each other.
-- Messages under way are lost if a search was interrupted or had concluded. Then links are requested again and values
+- Messages in transit are lost if a search was interrupted or had concluded. Then links are requested again and values
   sent again before the search continues. If the search had reached quiescence, nothing was lost, and only new values
   are sent.
 
@@ -43,7 +43,7 @@ from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
-from robochoc.protocols.satisfaction.nogood import NOTHING, Explanation, NogoodStore
+from robochoc.protocols.satisfaction.nogood import NO_EXPLANATION, Explanation, NogoodStore
 from robochoc.protocols.satisfaction.nogood_messages import Nogood as PlainNogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
@@ -70,13 +70,13 @@ class DynABT(ABT, DynamicProtocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.proof: Explanation = NOTHING
-        self.untold = list(self.lower)
-        """Lower robots that have never been told the own value."""
+        self.proof: Explanation = NO_EXPLANATION
+        self.uninformed = list(self.lower)
+        """Lower robots to which this robot has never sent its value."""
 
     def start(self) -> None:
         """Choose a first value and send it."""
-        self.untold = []
+        self.uninformed = []
         super().start()
 
     def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
@@ -85,14 +85,14 @@ class DynABT(ABT, DynamicProtocol):
             self._update(agent, None)
         self.store.drop(invalidated.keys)
         if not invalidated.keys.isdisjoint(self.proof):
-            self.verdict, self.proof = None, NOTHING
+            self.verdict, self.proof = None, NO_EXPLANATION
         self._adjust_nogoods(problem, order, invalidated)
         known = (
-            {*self.lower} - invalidated.agents - {*self.untold}
-        )  # a change may follow another before the search goes on
-        self.untold = [child for child in problem.children if child not in known]
+            {*self.lower} - invalidated.agents - {*self.uninformed}
+        )  # a change may follow another before the search continues
+        self.uninformed = [child for child in problem.children if child not in known]
         self.higher = {*problem.parents, *(self.higher - invalidated.agents)}
-        # Who has asked for the own value and is still there keeps being told, even if others see it differently now.
+        # Robots that requested the value, and are still present, keep receiving it, even if its variables have changed.
         self.lower = list(dict.fromkeys((*problem.children, *(robot for robot in self.lower if robot in order.rank))))
         self.problem, self.order = problem, order
 
@@ -105,9 +105,9 @@ class DynABT(ABT, DynamicProtocol):
         self._check_agent_view()
         current = self._current()
         if current is not None and self.value == before:
-            for child in self.untold if lossless else self.lower:
+            for child in self.uninformed if lossless else self.lower:
                 self.send(child, Ok(current))
-        self.untold = []
+        self.uninformed = []
 
     def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
         """Move the nogoods and the value to their places in the changed domain."""
@@ -121,7 +121,7 @@ class DynABT(ABT, DynamicProtocol):
         current = self._current() if known else None
         self.value = None if current is None or current not in problem.values else problem.values.index(current)
 
-    # What ABT does, with explanations
+    # ABT's procedures, with explanations
 
     def _backtrack(self) -> None:
         super()._backtrack()
@@ -132,7 +132,7 @@ class DynABT(ABT, DynamicProtocol):
         return Nogood(lhs, value, sorted(self._explanation()))
 
     def _learn(self, nogood: PlainNogood) -> None:
-        because = frozenset(nogood.because) if isinstance(nogood, Nogood) else NOTHING
+        because = frozenset(nogood.because) if isinstance(nogood, Nogood) else NO_EXPLANATION
         for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs, because)
 

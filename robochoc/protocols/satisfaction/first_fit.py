@@ -6,7 +6,7 @@ its constraints with the flying parents allow, or withdraws, and sends its decis
 - **When to use**: some robots may withdraw, and any set of them will do. The minimum number of withdrawals is an
   optimisation problem for a protocol with costs.
 - **Guarantees**: it terminates after one message for each edge. The set of withdrawn robots is minimal by inclusion:
-  no robot could be added, as all that ruled it out fly. It is not a minimum.
+  no robot could be added, as all robots that ruled it out fly. It is not a minimum.
 - **Parameters**: none.
 - **Reference**: paper, Section 5.2: "the robots who can't belonging to the solution will be taken from the operational
   scene. Thus only robots that will satisfy all constraints will fly to take their positions."

@@ -1,10 +1,10 @@
 """A mediator's local problem (CompAPO): a value for each robot of its good_list, by depth-first branch and bound.
 
-All constraints among these robots hold in the answer. Constraints with robots outside, whose values stand, are broken
-as seldom as possible. Forward checking removes values of the robots that follow; the robot with the fewest values left
-is next; values that break little come first, and of these the one that the robot has.
+All constraints among these robots hold in the result. As few constraints as possible with robots outside, whose values
+are fixed, are broken. Forward checking removes values of later robots; the robot with the fewest remaining values is
+next; values that break the fewest constraints come first, and among these the robot's present value.
 
-Each look into a table, for one value, is a constraint check, and is counted.
+Each access to a table, for one value, is a constraint check, and is counted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from robochoc.solver.compiled import LocalProblem
 class Table(msgspec.Struct, frozen=True, array_like=True):
     """All constraints over the same robots in one table: a bit for each combination of their values, set if allowed.
 
-    The place of the last robot's value runs fastest; bit i of the table is bit i % 8 of byte i // 8.
+    The place of the last robot's value varies fastest; bit i of the table is bit i % 8 of byte i // 8.
     """
 
     robots: tuple[str, ...]
@@ -32,9 +32,9 @@ class Table(msgspec.Struct, frozen=True, array_like=True):
     def __post_init__(self) -> None:
         """Check that the table is complete."""
         if not len({*self.robots}) == len(self.robots) == len(self.sizes) > 0 or min(self.sizes) < 1:
-            raise ValueError("a table does not say how many values each of its robots has")
+            raise ValueError(f"a table over {', '.join(self.robots)} has invalid domain sizes: {self.sizes}")
         if len(self.allowed) != -(-math.prod(self.sizes) // 8):
-            raise ValueError("a table does not have a bit for each combination of values")
+            raise ValueError(f"a table of {len(self.allowed)} bytes does not have a bit for each combination of values")
 
     def allows(self, places: Iterable[int]) -> bool:
         """Return whether the values at these `places` of the robots are allowed."""
@@ -57,7 +57,7 @@ def own_tables(
 
 
 def distinct(tables: Iterable[Table]) -> list[Table]:
-    """Return the first of `tables` over the same robots each: all of these robots tell the same."""
+    """Return one of `tables` for each set of robots, the first one: all of these robots send the same table."""
     found: dict[frozenset[str], Table] = {}
     for table in tables:
         found.setdefault(frozenset(table.robots), table)
@@ -68,13 +68,13 @@ def sizes_in(tables: Iterable[Table], places: Mapping[str, int]) -> dict[str, in
     """Return the sizes of the domains of all robots in `tables`, whose values are at these `places`.
 
     Raises:
-        ValueError: if a table and a value do not go together, or two tables.
+        ValueError: if tables contradict each other or the places.
     """
     sizes: dict[str, int] = {}
     for table in tables:
         for robot, size in zip(table.robots, table.sizes, strict=True):
             if sizes.setdefault(robot, size) != size or not 0 <= places[robot] < size:
-                raise ValueError(f"what is told of the values of {robot} does not agree")
+                raise ValueError(f"messages contradict each other on the values of {robot}")
     return sizes
 
 
@@ -94,7 +94,7 @@ def _table(
 
 
 class _Node(NamedTuple):
-    """A partial assignment, what is left of the other robots' domains (bitmaps), and what their values would break."""
+    """A partial assignment, the other robots' remaining domains (bitmaps), and the constraints each value breaks."""
 
     assigned: dict[str, int]
     left: dict[str, int]
@@ -103,9 +103,9 @@ class _Node(NamedTuple):
 
 
 class _Seen:
-    """A table as the mediator sees it: with the values of robots outside in their places.
+    """A table restricted to the mediator's robots: the values of robots outside are fixed.
 
-    `inside` are the robots that the mediator decides on. `hard`: all of the table's robots are.
+    `inside` are the robots that the mediator decides on. `hard`: all robots of the table are inside.
     """
 
     def __init__(self, table: Table, members: Mapping[str, int], places: Mapping[str, int]) -> None:
@@ -123,7 +123,7 @@ class _Seen:
         self.hard = len(self.inside) == len(table.robots)
 
     def mask(self, robot: str, assigned: Mapping[str, int], left: int) -> int:
-        """Return the values of `robot`, of those in `left`, that are allowed with all other robots inside assigned."""
+        """Return the values of `robot` in `left` that are allowed, when all other robots inside are assigned."""
         base = self._base + sum(
             [stride * assigned[name] for name, stride in self._strides.items() if name != robot], start=0
         )
@@ -140,7 +140,7 @@ class Mediation:
     """One mediator's problem. `checks` counts its constraint checks."""
 
     def __init__(self, tables: Sequence[Table], members: Mapping[str, int], places: Mapping[str, int]) -> None:
-        """Take the tables in which one of `members` is.
+        """Select the tables that contain one of `members`.
 
         Args:
             tables: all constraints of the members.
@@ -181,7 +181,7 @@ class Mediation:
         return node
 
     def _children(self, node: _Node) -> Iterator[_Node]:
-        """Yield `node` with a value of the next robot each, without those that cannot be better than the best."""
+        """Yield `node` extended by each value of the next robot, except those that cannot improve on the best."""
         robot = min(node.left, key=lambda name: node.left[name].bit_count())
         prices = node.broken.get(robot)
         current = self._places[robot]
@@ -207,7 +207,7 @@ class Mediation:
                 yield child
 
     def _pruned(self, node: _Node, seen: _Seen, robot: str) -> _Node | None:
-        """Return `node` after a look ahead into one table, in which only `robot` is open; None: no value is left."""
+        """Return `node` after forward checking with a table in which only `robot` is open; None: no value is left."""
         left = node.left[robot]
         self.checks += left.bit_count()
         mask = seen.mask(robot, node.assigned, left)

@@ -1,8 +1,8 @@
-"""Nogoods and the store that keeps at most one for each value of the own domain.
+"""Nogoods and the store that keeps at most one for each value of a robot's domain.
 
-A nogood `lhs => x_i != v` says that x_i cannot take v while all assignments of its left side stand. One per
-value is enough to stay complete, and bounds the space by O(n d) (Bessiere, Maestre, Brito and Meseguer, AIJ 161,
-2005, Section 3).
+A nogood `lhs => x_i != v` means that x_i cannot take v while all assignments of its left side hold. One for each value
+is enough for completeness, and bounds the space by O(n d) (Bessiere, Maestre, Brito and Meseguer, AIJ 161, 2005,
+Section 3).
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ LeftSide = Mapping[str, Value]
 
 
 Explanation = frozenset[str]
-"""Keys of constraints and domains (`solver/explanation.py`): a nogood holds as long as all of them stand."""
+"""Keys of constraints and domains (`solver/explanation.py`): a nogood is valid as long as all of them are."""
 
-NOTHING: Explanation = frozenset()
+NO_EXPLANATION: Explanation = frozenset()
 
 
 def contradicts(value: Value, other: Value) -> bool:
     """Return whether two views of one robot's value differ in a component that both contain."""
     if value == other:
         return False
-    for part, told in zip(value, other, strict=True):  # noqa: SIM110 - a generator takes twice as long
-        if part != told and part is not None and told is not None:
+    for part, known in zip(value, other, strict=True):  # twice as fast as a generator
+        if part != known and part is not None and known is not None:
             return True
     return False
 
@@ -36,22 +36,22 @@ def joined(value: Value | None, other: Value) -> Value:
     """Return the union of two views of one robot's value, which do not contradict each other."""
     if value is None or value == other:
         return other
-    return tuple([told if part is None else part for part, told in zip(value, other, strict=True)])
+    return tuple([known if part is None else part for part, known in zip(value, other, strict=True)])
 
 
 class NogoodStore:
-    """The left sides of the nogoods that rule out own values, by the value's place in the domain.
+    """The left sides of the nogoods that rule out this robot's values, by the value's place in the domain.
 
     Each has an explanation: the keys of the constraints and domains it was derived from (empty if the protocol keeps
-    none). Many values often share one left side. Left sides are indexed by the robots in them, so that a new value of
-    a robot costs what depends on it. `open` is the number of values that no nogood rules out.
+    none). Many values often share one left side. Left sides are indexed by their robots, so that a new value of a robot
+    only costs time for the nogoods that contain it. `open` is the number of values that no nogood rules out.
     """
 
     def __init__(self, order: PriorityOrder, size: int) -> None:
         self.open = size
         self._order = order
         self._by_value: list[LeftSide | None] = [None] * size
-        self._because: list[Explanation] = [NOTHING] * size
+        self._because: list[Explanation] = [NO_EXPLANATION] * size
         self._places: dict[int, set[int]] = {}
         """The values that a left side rules out, by its `id`."""
         self._naming: dict[str, dict[int, LeftSide]] = {}
@@ -82,7 +82,7 @@ class NogoodStore:
             return []
         return [index for index, lhs in enumerate(self._by_value) if lhs is None]
 
-    def add(self, index: int, lhs: LeftSide, because: Explanation = NOTHING) -> None:
+    def add(self, index: int, lhs: LeftSide, because: Explanation = NO_EXPLANATION) -> None:
         """Store `lhs` against the value at `index`, unless a better nogood is stored there."""
         present = self._by_value[index]
         if present is not None:
@@ -118,9 +118,9 @@ class NogoodStore:
     def forget_others(
         self, assignments: Sequence[tuple[Value, int]], places: Mapping[str, int], first: int = 0
     ) -> None:
-        """Drop all nogoods that contain another value of a robot than `assignments`, or a robot that is not in them.
+        """Drop all nogoods that contain a value that is not in `assignments`, or a robot that is not in them.
 
-        `places` says where each robot stands in them; those before `first` are known to have the same values.
+        `places` are the robots' places in them; the assignments before `first` are known to be unchanged.
         """
         stale: dict[int, LeftSide] = {}
         size = len(assignments)
@@ -150,8 +150,8 @@ class NogoodStore:
         return union
 
     def explanation(self) -> Explanation:
-        """Return the union of all explanations, without the own domain."""
-        return NOTHING.union(*self._because)
+        """Return the union of all explanations, without this robot's domain."""
+        return NO_EXPLANATION.union(*self._because)
 
     def _distinct(self) -> Iterable[LeftSide]:
         """Yield each left side once, in the order of the values."""
@@ -164,7 +164,7 @@ class NogoodStore:
             for place in places:
                 self._by_value[place] = None
             self.open += len(places)
-            self._unname(lhs)
+            self._unindex(lhs)
 
     def _remove(self, index: int, lhs: LeftSide) -> None:
         """Drop the nogood against the value at `index`, which has this left side."""
@@ -174,7 +174,7 @@ class NogoodStore:
         places.remove(index)
         if not places:
             del self._places[id(lhs)]
-            self._unname(lhs)
+            self._unindex(lhs)
 
     def _index(self, lhs: LeftSide, indices: Iterable[int]) -> None:
         """Add a left side that is new, with the values that it rules out."""
@@ -187,7 +187,7 @@ class NogoodStore:
             else:
                 named[key] = lhs
 
-    def _unname(self, lhs: LeftSide) -> None:
+    def _unindex(self, lhs: LeftSide) -> None:
         key = id(lhs)
         for agent in lhs:
             named = self._naming[agent]

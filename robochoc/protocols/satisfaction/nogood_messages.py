@@ -28,5 +28,5 @@ class Nogood(Message, frozen=True):
             return NOTHING
         if hearing.order.index(hearing.sender) < hearing.order.index(hearing.receiver):
             return [Clash(broken)]  # the sender's part of a partially known constraint
-        # A nogood of any other robot may follow from constraints of those below it, and then says nothing of its own.
+        # A nogood of any other robot may follow from constraints of robots below it, not from its own.
         return [EveryValuePays(hearing.sender, broken, INFINITE)] if hearing.is_lowest(hearing.sender) else NOTHING

@@ -1,8 +1,8 @@
 """Synchronous Backtracking (SBT).
 
 Chronological backtracking, distributed. One current partial assignment (CPA) goes from robot to robot in priority
-order. Its holder adds the first own value that agrees with it and sends it on; without such a value, it sends the CPA
-back. One robot acts at a time, so no message is ever obsolete.
+order. Its holder adds its first consistent value and sends the CPA on; without such a value, it sends the CPA back. One
+robot acts at a time, so no message is ever obsolete.
 
 - **When to use**: as a simple baseline without costs.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is linear.
@@ -70,7 +70,6 @@ class SBT(Protocol):
             self._assign(0)
 
     def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - only neighbours in the order speak
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("CPA | Backtrack", message):
