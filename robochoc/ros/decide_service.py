@@ -20,7 +20,7 @@ from robochoc.model.change import apply_changes
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import AddValue, Change, RemoveAgent, RemoveValue, Team
 from robochoc.model.team_edits import ChangeError
-from robochoc.ros.sink import Fields
+from robochoc.robots.sink import Fields
 from robochoc.run.options import Options
 from robochoc.system.decode_errors import describe_decode_error
 

@@ -15,17 +15,7 @@ from types import MappingProxyType
 
 from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
-
-REPORTS: Mapping[str, str] = MappingProxyType(
-    {
-        "battery": "sensor_msgs/BatteryState",
-        "pose": "geometry_msgs/PoseStamped",
-        "blocked": "geometry_msgs/PointStamped",
-        "cleared": "geometry_msgs/PointStamped",
-        "out_of_order": "std_msgs/String",
-    }
-)
-"""The topics in a drone's namespace, besides its waypoints: the last token, and the ROS type."""
+from robochoc.robots.source import REPORTS
 
 TEAM_TOPICS: Mapping[str, str] = MappingProxyType(
     {

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import assert_never
 
 import numpy as np
@@ -13,11 +14,12 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.mappings import NoMappingError, WaypointMapping, mapping_of, point
-from robochoc.ros.names import REPORTS, TEAM_TOPICS, TopicNames
-from robochoc.ros.sink import Fields, Sink
+from robochoc.robots.sink import Fields, Sink
+from robochoc.robots.source import REPORTS
+from robochoc.robots.waypoint import Waypoint
+from robochoc.ros.names import TEAM_TOPICS, TopicNames
 from robochoc.ros.team_topics import BODY, GOAL, WAYPOINTS_ALONE, PublishOptions, status, transform, transforms
-from robochoc.ros.waypoint import Waypoint, waypoints
+from robochoc.ros.waypoint_types import NoMappingError, WaypointMapping, mapping_of, point
 
 _NOT_MEASURED = {
     name: float("nan")
@@ -147,6 +149,26 @@ class Publisher:
     def _publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         for sink in self._sinks:
             sink.publish(topic, kind, fields, at_ns)
+
+
+def waypoints(
+    leg: Leg,
+    drones: Sequence[Drone],
+    names: TopicNames,
+    frame: str,
+    stamp: int,
+    before: Mapping[int, Point] = MappingProxyType({}),
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints of flying and landing drones in `leg`. Drones without a topic have none.
+
+    `before` are the goals of the previous decision, by the drones' numbers.
+    """
+    found = []
+    for number, goal in sorted(leg.goals.items()):
+        topic, name = drones[number].topic, names.waypoint(number)
+        if topic is not None and name is not None:
+            found.append(Waypoint(number, name, topic.type, goal.at, goal.lands, frame, stamp, before.get(number)))
+    return tuple(found)
 
 
 def _with_kind(drone: Drone, kind: str) -> Drone:

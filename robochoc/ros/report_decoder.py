@@ -13,8 +13,8 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.names import REPORTS, TopicNames
-from robochoc.ros.source import ReceivedMessage
+from robochoc.robots.source import REPORTS, ReceivedMessage
+from robochoc.ros.names import TopicNames
 
 REASON_MAX = 200
 """Characters of a reason that are kept."""

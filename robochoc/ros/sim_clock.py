@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.ros.source import ReceivedMessage
+from robochoc.robots.source import ReceivedMessage
 
 CLOCK = "/clock"
 CLOCK_KIND = "rosgraph_msgs/Clock"

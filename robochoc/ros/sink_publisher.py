@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.log import FlightLog
-from robochoc.flight.mission import Drone, Leg, Mission
-from robochoc.flight.reports import OutOfOrder, Report
-from robochoc.ros.publisher import Publisher
-from robochoc.ros.sink import Sink
+from robochoc.flight.mission import Drone, Leg
+from robochoc.flight.reports import Report
+from robochoc.robots.mission_publisher import MissionPublisher, nanoseconds
+from robochoc.robots.sink import Sink
+from robochoc.ros.publisher import Publisher, waypoints
 from robochoc.ros.team_topics import WAYPOINTS_ALONE, PublishOptions
-from robochoc.ros.waypoint import waypoints
-
-SECOND_NS = 1_000_000_000
-POSES_HZ = 20
 
 
-class SinkPublisher:
+class SinkPublisher(MissionPublisher):
     """Publishes decisions, poses and reports of `drones` of `team` into one `sink`. Raises what `Publisher` raises."""
 
     def __init__(
@@ -59,53 +53,3 @@ class SinkPublisher:
             f"{count:,} {name}{'s' * (count != 1)}" for name, count in self._counts.items() if count or name in first
         ]
         return "; ".join(filter(None, [", ".join(words), self._sink.summary]))
-
-
-class FlightBroadcast:
-    """Publishes a flight as its time goes by: reports, and all poses `POSES_HZ` times a second."""
-
-    def __init__(self) -> None:
-        self._ticks = 0
-
-    def publish(
-        self, publishers: Sequence[SinkPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
-    ) -> None:
-        """Publish what of `flown` was not published yet, up to `until_s`, and `reports` among it.
-
-        Raises `SinkError`.
-        """
-        untold = deque(reports)
-        while (at_s := self._ticks / POSES_HZ) <= until_s:
-            while untold and untold[0].at_s <= at_s:
-                _report(publishers, untold.popleft())
-            after = min(int(np.searchsorted(flown.times, at_s)), len(flown.times) - 1)
-            for publisher in publishers:
-                publisher.poses(flown.positions[after], flown.attitudes[after], at_s)
-            self._ticks += 1
-        for report in untold:
-            _report(publishers, report)
-
-
-def publish_flight(mission: Mission, flown: FlightLog, publishers: Sequence[SinkPublisher]) -> None:
-    """Publish a whole flight: each leg's waypoints as it begins, poses, and drones that fall. Raises `SinkError`."""
-    if not publishers:
-        return
-    fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
-    falls = {one.drone: one for one in reversed(flown.events) if one.drone in fallen}
-    reports = sorted((OutOfOrder(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s)
-    broadcast = FlightBroadcast()
-    begins_s = [0.0, *(times.begins_s for times in flown.legs[1:]), flown.simulated_s]
-    for leg, (begin_s, end_s) in zip(mission.legs, pairwise(begins_s), strict=True):
-        for publisher in publishers:
-            publisher.decide(leg, nanoseconds(begin_s))
-        broadcast.publish(publishers, flown, [one for one in reports if begin_s < one.at_s <= end_s], end_s)
-
-
-def _report(publishers: Sequence[SinkPublisher], report: Report) -> None:
-    for publisher in publishers:
-        publisher.report(report)
-
-
-def nanoseconds(at_s: float) -> int:
-    """Return a time in seconds as nanoseconds."""
-    return round(at_s * SECOND_NS)

@@ -10,13 +10,12 @@ from itertools import starmap
 from robochoc.flight.mission import Leg, MissionBuilder
 from robochoc.flight.reports import Report
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.closed_loop import TOGETHER_S, Feedback
-from robochoc.ros.live.inbox import RosInbox, weight_of
-from robochoc.ros.mappings import short_kind
-from robochoc.ros.names import REPORTS
+from robochoc.robots.closed_loop import TOGETHER_S, Feedback
+from robochoc.robots.inbox import RosInbox, weight_of
+from robochoc.robots.source import REPORTS, ReceivedMessage, Source, SourceError
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sim_clock import CLOCK, SimClock, with_clock
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.waypoint_types import short_kind
 
 PATIENCE_S = 10.0
 """The default time to wait for reports of a live source after a decision, in seconds."""

@@ -10,9 +10,9 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Leg
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.model.outcome import Verdict
-from robochoc.ros.mappings import UPRIGHT, point
+from robochoc.robots.sink import Fields
 from robochoc.ros.names import TEAM_TOPICS
-from robochoc.ros.sink import Fields
+from robochoc.ros.waypoint_types import UPRIGHT, point
 
 GOAL, BODY = "goal", "base_link"
 """The last part of the frame where a drone is to be, and of the frame of the drone itself."""

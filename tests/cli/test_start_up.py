@@ -14,7 +14,8 @@ HEAVY = {
     "numpy", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
     "robochoc.solver.ace", "robochoc.solver.central", "robochoc.verification.second_opinion",
     "robochoc.communication.simulator.channel", "robochoc.sniffer", "robochoc.flight",
-    "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.replay",
+    "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.robots",
+    "robochoc.vehicles", "robochoc.replay",
 }  # fmt: skip
 """What a run of ABT in a pipe has no use for."""
 HERE = {**unmeasured(), "PYTHONPATH": str(ROOT)}

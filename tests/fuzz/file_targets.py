@@ -24,7 +24,7 @@ from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, PseudoTreeNod
 from robochoc.model.problem import Team
 from robochoc.protocols.inference.dpop import DPOP
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.ros.source import SourceError
+from robochoc.robots.source import SourceError
 from tests.fuzz.harness import Target, assert_clear
 from tests.fuzz.mutations import (
     files_of,

@@ -18,7 +18,7 @@ from robochoc.authority.certificates import (
     signing_request,
 )
 from robochoc.formats.result import ResultError, read_result
-from robochoc.ros.recordings.types import types_of
+from robochoc.ros.message_types import types_of
 from tests.fuzz.file_targets import TARGETS as FILES
 from tests.fuzz.foreign_targets import TARGETS as FOREIGN
 from tests.fuzz.harness import Findings, Target, TooDearError, spoilt, tried

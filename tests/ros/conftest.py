@@ -1,4 +1,4 @@
-"""Fixtures of the tests of ROS: played autopilots, a zenoh router, a far end that is not ours, and no ROS sourced."""
+"""Fixtures of the tests of ROS: a zenoh router, a far end that is not ours, and no ROS sourced."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.support.played_autopilot import Ordered, Played
 from tests.support.zenoh_ros2 import FarEnd, Router
 
 
@@ -32,15 +31,3 @@ def end(router: Router) -> Iterator[FarEnd]:
     pytest.importorskip("zenoh_ros2_sdk")
     with FarEnd(router) as end:
         yield end
-
-
-@pytest.fixture
-def played() -> Played:
-    """An autopilot that is played."""
-    return Played()
-
-
-@pytest.fixture
-def pilot(played: Played) -> Ordered:
-    """The pilot that flies by it."""
-    return Ordered(played)

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from robochoc.generators.queens3d import queens3d
+from robochoc.robots.decision import FollowedDecision
 from robochoc.ros.decide_service import DecideService
-from robochoc.ros.decision import FollowedDecision
 from robochoc.run import Options, Runtime, solve
 from tests.support.example_teams import hangar
 from tests.support.limits import HANG_S, wait_until

@@ -16,14 +16,13 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import REPORTS, ReceivedMessage, SourceError
 from robochoc.ros.live import dds as dds_module
 from robochoc.ros.live.dds import DdsSink, DdsSource
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.names import REPORTS
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import SinkError
-from robochoc.ros.source import ReceivedMessage, SourceError
+from robochoc.ros.message_types import types_of
 from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE, free_domain, reporter, subscriber
 from tests.support.limits import HANG_S, wait_until

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from robochoc.ros.live.dds_types import described, raw_type, topic_name
-from robochoc.ros.recordings.types import types_of
+from robochoc.ros.message_types import types_of
 from tests.support.cases import looped
 
 STAMP = 1_700_000_000_123_456_789

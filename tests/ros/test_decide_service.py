@@ -20,12 +20,12 @@ from robochoc.cli.group import cli
 from robochoc.formats.result import read_result
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
+from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.decide_service import CHANGES_CHARACTERS_MAX, DECIDE, TRIGGER, DecideService, refusal
 from robochoc.ros.live import dds_service
 from robochoc.ros.live.dds_service import DdsServices
 from robochoc.ros.live.services import WAITING_MAX
-from robochoc.ros.recordings.types import FieldsError, types_of
-from robochoc.ros.sink import Fields, SinkError
+from robochoc.ros.message_types import FieldsError, types_of
 from robochoc.run import Options, Runtime, solve
 from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE, ServiceClient, free_domain, subscriber

@@ -13,9 +13,9 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
+from robochoc.robots.sink import SinkError
 from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
 from robochoc.ros.live.rclpy_service import RclpyServices
-from robochoc.ros.sink import SinkError
 from tests.support import rclpy_stand_in
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT

@@ -14,14 +14,14 @@ import zenoh
 import zenoh.ext
 
 from robochoc.communication.network.zenoh_config import config
+from robochoc.robots.connections import open_sink, open_source
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live import rmw_zenoh_session
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX, RmwZenohSink, RmwZenohSource
 from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment
 from robochoc.ros.live.rmw_zenoh_session import RouterAddress
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import SinkError
-from robochoc.ros.sinks import open_sink, open_source
-from robochoc.ros.source import SourceError
+from robochoc.ros.message_types import types_of
 from tests.support.cases import looped
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S, wait_until

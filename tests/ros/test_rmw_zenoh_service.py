@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from robochoc.app.sketch.building import model_of
 from robochoc.cli.group import cli
 from robochoc.communication.network.zenoh_config import config
+from robochoc.robots.sink import SinkError
 from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
 from robochoc.ros.live import rmw_zenoh_session
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX
@@ -23,8 +24,7 @@ from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, sender
 from robochoc.ros.live.rmw_zenoh_service import RmwZenohServices
 from robochoc.ros.live.service_hashes import service_hash
 from robochoc.ros.live.services import WAITING_MAX
-from robochoc.ros.recordings.types import UnknownTypeError, types_of
-from robochoc.ros.sink import SinkError
+from robochoc.ros.message_types import UnknownTypeError, types_of
 from tests.support.cases import looped
 from tests.support.faults import running
 from tests.support.limits import HANG_S, wait_until

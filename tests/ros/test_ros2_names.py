@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live.ros2_names import dds_type_name, domain_id
-from robochoc.ros.recordings.types import UnknownTypeError, types_of
-from robochoc.ros.sink import SinkError
-from robochoc.ros.source import SourceError
+from robochoc.ros.message_types import UnknownTypeError, types_of
 from tests.support.cases import looped
 
 

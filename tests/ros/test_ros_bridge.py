@@ -16,13 +16,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robochoc.robots.inbox import RosInbox
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.live import rosbridge_connection
-from robochoc.ros.live.inbox import RosInbox
 from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
 from robochoc.ros.live.rosbridge_connection import RosbridgeAddress
 from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
-from robochoc.ros.sink import SinkError
-from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.fake_servers import fake_server
@@ -252,7 +252,7 @@ def test_a_server_that_dies_wakes_who_waits(server: Server) -> None:
 PROGRAM = """
 import sys
 from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
-from robochoc.ros.sink import SinkError
+from robochoc.robots.sink import SinkError
 source = RosbridgeSource(sys.argv[1])
 source.listen({"/a": "std_msgs/String"})
 sink = RosbridgeSink(sys.argv[1])

@@ -17,10 +17,10 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as BagWriter
 
+from robochoc.robots.connections import open_source
+from robochoc.robots.source import SourceError
+from robochoc.ros.message_types import types_of
 from robochoc.ros.recordings import recording
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sinks import open_source
-from robochoc.ros.source import SourceError
 from tests.support.cases import looped
 from tests.support.examples import count
 from tests.support.ros_recordings import (

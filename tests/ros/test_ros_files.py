@@ -19,10 +19,10 @@ from rosbags.rosbag1 import Reader as BagReader
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
+from robochoc.robots.connections import UnknownSinkError, UnknownSourceError, open_sink, open_source
+from robochoc.robots.sink import SinkError
+from robochoc.ros.message_types import types_of
 from robochoc.ros.recordings.mcap_file import NAMES
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import SinkError
-from robochoc.ros.sinks import UnknownSinkError, UnknownSourceError, open_sink, open_source
 from tests.support.cases import looped
 from tests.support.program import unmeasured
 from tests.support.ros_recordings import (
@@ -218,8 +218,8 @@ def test_a_full_disk_is_told_and_nothing_is_left(text: str) -> None:
     """The process may write 40 kB to a file: its next write fails."""
     program = f"""
 import resource, signal, sys
-from robochoc.ros.sink import SinkError
-from robochoc.ros.sinks import open_sink
+from robochoc.robots.sink import SinkError
+from robochoc.robots.connections import open_sink
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 import random
@@ -243,7 +243,7 @@ except SinkError as failed:
 def test_not_even_a_kill_leaves_a_trace(text: str) -> None:
     program = f"""
 import os
-from robochoc.ros.sinks import open_sink
+from robochoc.robots.connections import open_sink
 sink = open_sink({text!r})
 for at in range(20_000):
     sink.publish("/b", "geometry_msgs/PointStamped", {{}}, at)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from robochoc.flight.mission import Drone
 from robochoc.model.problem import Topic
-from robochoc.ros.names import NAME_MAX, REPORTS, NameClashError, TopicNames, ros_name
+from robochoc.robots.source import REPORTS
+from robochoc.ros.names import NAME_MAX, NameClashError, TopicNames, ros_name
 from tests.support.cases import looped
 
 TOKEN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

@@ -12,11 +12,11 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live import ros_master
 from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
 from robochoc.ros.live.rospy_node import RospySink, RospySource
-from robochoc.ros.sink import SinkError
-from robochoc.ros.source import SourceError
 from tests.support.cases import looped
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S

@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.cli.group import cli
+from robochoc.robots.connections import open_source
+from robochoc.robots.source import ReceivedMessage
 from robochoc.ros.recordings.mcap_file import McapSink
 from robochoc.ros.sim_clock import CLOCK, CLOCK_KIND
-from robochoc.ros.sinks import open_source
-from robochoc.ros.source import ReceivedMessage
 from tests.support import rclpy_stand_in
 from tests.support.dds import LOOPBACK_ALONE, free_domain
 from tests.support.program import ROOT

@@ -17,11 +17,11 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.live import rclpy_node, subscribers
 from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.rclpy_node import MESSAGE_BYTES_MAX, RclpyNode, RclpySink, RclpySource
-from robochoc.ros.sink import SinkError
-from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support import rclpy_stand_in
 from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE

@@ -12,9 +12,9 @@ import zstandard
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import Fields
-from robochoc.ros.source import SourceError
+from robochoc.robots.sink import Fields
+from robochoc.robots.source import SourceError
+from robochoc.ros.message_types import types_of
 from tests.support.cases import looped
 from tests.support.ros_recordings import POINT, TOPICS, check, messages, read
 

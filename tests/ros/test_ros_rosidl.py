@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.ros.mappings import kinds
-from robochoc.ros.names import REPORTS, TEAM_TOPICS
-from robochoc.ros.recordings.types import FieldType, types_of
+from robochoc.robots.source import REPORTS
+from robochoc.ros.message_types import FieldType, types_of
+from robochoc.ros.names import TEAM_TOPICS
 from robochoc.ros.sim_clock import CLOCK_KIND
+from robochoc.ros.waypoint_types import kinds
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 from tests.support.ros2_python import ros2_python

@@ -9,18 +9,18 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
-from robochoc.ros.closed_loop import ClosedLoop, drones_of
+from robochoc.robots.closed_loop import ClosedLoop, drones_of
+from robochoc.robots.connections import open_source
+from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.recordings.mcap_file import McapSink
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sim_clock import CLOCK, CLOCK_KIND, SimClock
-from robochoc.ros.sinks import open_source
-from robochoc.ros.source import ReceivedMessage, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import Options, Runtime, solve
 from tests.support.cases import looped
 from tests.support.example_teams import hangar
 from tests.support.program import ROOT
-from tests.support.ros_ends import SECOND, KeptSink, Tape, WaitedClock
+from tests.support.ros_ends import SECOND, KeptSink, Tape, WaitedClock, publishers
 
 FOLDER = ROOT / "docs" / "examples" / "hangar"
 PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
@@ -61,7 +61,7 @@ def run(source: Tape, patience_s: float = 60.0) -> KeptSink:
     sink = KeptSink()
     feedback = SourceFeedback(source, ReportDecoder(drones_of(hangar()), "map"), patience_s, sim_time=True)
     options = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
-    solve(hangar(), options, environment=ClosedLoop(hangar(), [sink], feedback))
+    solve(hangar(), options, environment=ClosedLoop(hangar(), publishers(hangar(), sink), feedback))
     return sink
 
 

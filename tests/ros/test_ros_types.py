@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
-from robochoc.ros.names import REPORTS
-from robochoc.ros.recordings.definitions import DEFINITION_MAX, same_fields
-from robochoc.ros.recordings.types import FieldsError, FieldType, UnknownTypeError, Version, types_of
+from robochoc.robots.source import REPORTS
+from robochoc.ros.message_definitions import DEFINITION_MAX, same_fields
+from robochoc.ros.message_types import FieldsError, FieldType, UnknownTypeError, Version, types_of
 from tests.support.cases import looped
 
 POSE = "geometry_msgs/PoseStamped"

@@ -13,14 +13,14 @@ from robochoc.flight.mission import Drone, Goal, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Topic
-from robochoc.ros import mappings
-from robochoc.ros.mappings import NoMappingError, WaypointMapping, kinds, mapping_for, short_kind
-from robochoc.ros.names import REPORTS
+from robochoc.robots.sink import Fields
+from robochoc.robots.source import REPORTS
+from robochoc.robots.waypoint import Waypoint
+from robochoc.ros import waypoint_types
+from robochoc.ros.message_types import UnknownTypeError, types_of
 from robochoc.ros.publisher import NothingToPublishError, Publisher
-from robochoc.ros.recordings.types import UnknownTypeError, types_of
-from robochoc.ros.sink import Fields
 from robochoc.ros.team_topics import PublishOptions
-from robochoc.ros.waypoint import Waypoint
+from robochoc.ros.waypoint_types import NoMappingError, WaypointMapping, kinds, mapping_for, short_kind
 from tests.support.cases import looped
 from tests.support.installed_packages import install_entry_points
 from tests.support.ros_ends import KeptSink
@@ -61,10 +61,10 @@ LANDS = Leg("begin", Verdict.SOLUTION, {0: Goal((-2.0, 0.0, 0.0), lands=True)})
 def installed(monkeypatch: pytest.MonkeyPatch, **places: str) -> None:
     """As if a package offered these mappings: types are written with a double underscore here."""
     install_entry_points(
-        monkeypatch, mappings.GROUP, **{name.replace("__", "/"): place for name, place in places.items()}
+        monkeypatch, waypoint_types.GROUP, **{name.replace("__", "/"): place for name, place in places.items()}
     )
     mapping_for.cache_clear()
-    monkeypatch.setattr(mappings, "mapping_for", mapping_for.__wrapped__)
+    monkeypatch.setattr(waypoint_types, "mapping_for", mapping_for.__wrapped__)
 
 
 def target(waypoint: Waypoint) -> Fields:

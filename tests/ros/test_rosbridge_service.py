@@ -12,13 +12,13 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
+from robochoc.robots.decision import FollowedDecision
+from robochoc.robots.sink import SinkError
 from robochoc.ros.decide_service import DECIDE, TRIGGER, DecideService, refusal
-from robochoc.ros.decision import FollowedDecision
 from robochoc.ros.live import rosbridge_connection
 from robochoc.ros.live.rosbridge_connection import Connection
 from robochoc.ros.live.rosbridge_service import RosbridgeServices
 from robochoc.ros.live.services import WAITING_MAX
-from robochoc.ros.sink import SinkError
 from robochoc.run import Options, Runtime
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT

@@ -16,8 +16,8 @@ from typing import Any, Self
 
 import pytest
 
+from robochoc.robots.sink import SinkError
 from robochoc.ros.live.rospy_node import RospySink
-from robochoc.ros.sink import SinkError
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 

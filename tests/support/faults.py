@@ -28,7 +28,7 @@ _PROGRAMS = {
     "solver": b"robochoc.solver.ace_process",
     "router": b"robochoc.communication.network.router_process",
     "viewer": b"robochoc.sniffer.viewer_process",
-    "guard": b"robochoc.ros.autopilots.guard",
+    "guard": b"robochoc.vehicles.guard",
 }
 """Processes of a run that are programs of their own, and no robots."""
 

@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from robochoc.flight.layout import Point
-from robochoc.ros.autopilots.fleet import Fleet, read_fleet
+from robochoc.vehicles.fleet import Fleet, read_fleet
 from tests.support.mavlink_vehicles import Vehicle, Vehicles
 from tests.support.wgs84 import Geodetic, geodetic_of
 

@@ -13,8 +13,8 @@ from io import FileIO
 import msgspec
 
 from robochoc.flight.layout import Point
-from robochoc.ros.autopilots.guard import Guard, Orders, watch
-from robochoc.ros.autopilots.messages import Ended, FromGuard, Setup, ToGuard, line_of
+from robochoc.vehicles.guard import Guard, Orders, watch
+from robochoc.vehicles.messages import Ended, FromGuard, Setup, ToGuard, line_of
 from tests.support.limits import HANG_S
 from tests.support.played_autopilot import GROUND, Played
 

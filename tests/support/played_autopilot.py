@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from robochoc.flight.layout import Point
-from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
-from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link, point_text
-from robochoc.ros.autopilots.messages import State, Target
-from robochoc.ros.autopilots.pilot import Pilot
-from robochoc.ros.autopilots.traffic import Traffic
+from robochoc.vehicles.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
+from robochoc.vehicles.fleet import AtEnd, Fence, Fleet, Link, point_text
+from robochoc.vehicles.messages import State, Target
+from robochoc.vehicles.pilot import Pilot
+from robochoc.vehicles.traffic import Traffic
 
 GROUND = Telemetry((0, 0, 0), 1.0, "HOLD", healthy=True)
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robochoc.ros.recordings.types import FieldType, types_of
+from robochoc.ros.message_types import FieldType, types_of
 from tests.support.limits import HANG_S
 
 PACKAGES = (

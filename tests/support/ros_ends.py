@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.source import ReceivedMessage, Source
+from robochoc.model.problem import Team
+from robochoc.robots.closed_loop import drones_of
+from robochoc.robots.sink import Fields, Sink
+from robochoc.robots.source import ReceivedMessage, Source
+from robochoc.ros.sink_publisher import SinkPublisher
 
 SECOND = 1_000_000_000
 
@@ -87,3 +90,8 @@ class KeptSink(Sink):
 
     def topics(self) -> list[str]:
         return [topic for topic, *_ in self.said]
+
+
+def publishers(team: Team, *sinks: Sink) -> list[SinkPublisher]:
+    """Return publishers of the waypoints of `team` to `sinks`."""
+    return [SinkPublisher(team.name, drones_of(team), sink, "map") for sink in sinks]

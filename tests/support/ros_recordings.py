@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from robochoc.ros.sink import Fields
-from robochoc.ros.sinks import open_sink, open_source
-from robochoc.ros.source import ReceivedMessage
+from robochoc.robots.connections import open_sink, open_source
+from robochoc.robots.sink import Fields
+from robochoc.robots.source import ReceivedMessage
 
 POSE, BATTERY, TEXT, POINT = (
     "geometry_msgs/PoseStamped",

@@ -9,7 +9,7 @@ from typing import Any
 from click.testing import CliRunner, Result
 
 from robochoc.cli.group import cli
-from robochoc.ros.sinks import open_source
+from robochoc.robots.connections import open_source
 from tests.support.program import ROOT
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"

@@ -93,7 +93,8 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flight
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line
-    from robochoc.ros.sink_publisher import SinkPublisher, publish_flight
+    from robochoc.robots.mission_publisher import publish_flight
+    from robochoc.ros.sink_publisher import SinkPublisher
 
     conditions = conditions_of(given, mission)
     with ros_errors_as_failures(), ExitStack() as stack:

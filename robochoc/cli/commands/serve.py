@@ -87,10 +87,10 @@ def serve(
     if kind not in _MIDDLEWARES:
         raise click.UsageError(f"--ros {place}: unknown middleware; use {', '.join(_MIDDLEWARES)}, such as dds:5")
     teams = _teams(paths)
+    from robochoc.robots.connections import lacking_for
+    from robochoc.robots.decision import FollowedDecision
     from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
-    from robochoc.ros.decision import FollowedDecision
     from robochoc.ros.names import ros_name
-    from robochoc.ros.sinks import lacking_for
     from robochoc.run.options import Options
 
     lacking = lacking_for(kind)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from robochoc.journal.journal import JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
-    from robochoc.ros.closed_loop import ClosedLoop
+    from robochoc.robots.closed_loop import ClosedLoop
     from robochoc.run.choice import Choice
     from robochoc.run.improvement import Audience
     from robochoc.run.options import Options

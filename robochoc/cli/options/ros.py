@@ -71,7 +71,7 @@ class FailureType(click.ParamType["tuple[str, float]"]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:  # noqa: ANN401 - click's signature
         """Return the name and the seconds of `Robot3.1@5`."""
-        from robochoc.ros.simulated_feedback import FAILS_S
+        from robochoc.robots.simulated_feedback import FAILS_S
 
         if isinstance(value, tuple):
             return value

@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     from robochoc.flight.mission import Drone, Leg, Mission
     from robochoc.flight.quadrotor.conditions import FlightConditions
     from robochoc.model.problem import Assignment, Robot, Team
-    from robochoc.ros.closed_loop import ClosedLoop, Feedback
-    from robochoc.ros.simulated_feedback import FlightSettings
-    from robochoc.ros.sink import Sink
+    from robochoc.robots.closed_loop import ClosedLoop, Feedback
+    from robochoc.robots.simulated_feedback import FlightSettings
+    from robochoc.robots.sink import Sink
     from robochoc.ros.team_topics import PublishOptions
 
 
 @contextmanager
 def ros_errors_as_failures() -> Iterator[None]:
     """Turn errors of sinks, sources and names into `Failure`, with one line."""
-    from robochoc.ros.mappings import NoMappingError
+    from robochoc.robots.connections import UnknownSinkError, UnknownSourceError
+    from robochoc.robots.sink import SinkError
+    from robochoc.robots.source import SourceError
     from robochoc.ros.names import NameClashError
     from robochoc.ros.publisher import NothingToPublishError
-    from robochoc.ros.sink import SinkError
-    from robochoc.ros.sinks import UnknownSinkError, UnknownSourceError
-    from robochoc.ros.source import SourceError
+    from robochoc.ros.waypoint_types import NoMappingError
 
     try:
         yield
@@ -55,7 +55,7 @@ def ros_errors_as_failures() -> Iterator[None]:
 @contextmanager
 def flight_errors_as_failures() -> Iterator[None]:
     """Turn a decision that cannot be flown into `Failure`, with one line."""
-    from robochoc.ros.simulated_feedback import CannotFlyError
+    from robochoc.robots.simulated_feedback import CannotFlyError
 
     try:
         yield
@@ -65,7 +65,7 @@ def flight_errors_as_failures() -> Iterator[None]:
 
 def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
     """Return the sinks, which `stack` closes. Raises `SinkError`."""
-    from robochoc.ros.sinks import open_sink
+    from robochoc.robots.connections import open_sink
 
     return [stack.enter_context(open_sink(text)) for text in texts]
 
@@ -90,7 +90,7 @@ def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
 
 def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
     """Return the settings of a simulated flight from the `given` options."""
-    from robochoc.ros.simulated_feedback import FlightSettings
+    from robochoc.robots.simulated_feedback import FlightSettings
 
     return FlightSettings(seed=seed, **given)
 
@@ -98,7 +98,7 @@ def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
 @contextmanager
 def _flight_usage() -> Iterator[None]:
     """Turn an unknown drone or invalid weather into `click.UsageError`."""
-    from robochoc.ros.simulated_feedback import UnknownDroneError
+    from robochoc.robots.simulated_feedback import UnknownDroneError
 
     try:
         yield
@@ -137,44 +137,42 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
     if not ros:
         yield None
         return
-    from robochoc.ros.closed_loop import ClosedLoop, drones_of
-    from robochoc.ros.situation import BATTERY
+    from robochoc.flight.mission import check_scale
+    from robochoc.robots.closed_loop import ClosedLoop, drones_of
+    from robochoc.robots.situation import BATTERY
+    from robochoc.ros.sink_publisher import SinkPublisher
 
     with (
         flight_errors_as_failures() if ros.situation == FLIGHT else nullcontext(),
         ros_errors_as_failures(),
         ExitStack() as stack,
     ):
-        feedback = _feedback(ros, drones_of(team), seed, stack) if ros.situation else None
+        drones = drones_of(team)
+        feedback = _feedback(ros, drones, seed, stack) if ros.situation else None
         battery = BATTERY if ros.battery is None else ros.battery
         sinks = open_sinks(ros.sinks, stack)
         if ros.arm:
             _allow_arming(ros.sinks, sinks)
+        ground = ground_map(None, folder)
         with scale_usage():
-            loop = ClosedLoop(
-                team,
-                sinks,
-                feedback,
-                frame=ros.frame,
-                scale=ros.scale,
-                battery=battery,
-                publish=publish_options(ros.published),
-                ground=ground_map(None, folder),
-            )
+            check_scale(ros.scale, ground)
+        options = publish_options(ros.published)
+        publishers = [SinkPublisher(team.name, drones, sink, ros.frame, options) for sink in sinks]
+        loop = ClosedLoop(team, publishers, feedback, scale=ros.scale, battery=battery, ground=ground)
         yield loop
 
 
 def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
     """Return the feedback of the source in `--situation`."""
     if ros.situation == FLIGHT:
-        from robochoc.ros.simulated_feedback import SimulatedFeedback
+        from robochoc.robots.simulated_feedback import SimulatedFeedback
 
         settings = flight_settings(ros.flight, seed)
         with _flight_usage():
             settings.check(drones)
         return SimulatedFeedback(settings)
+    from robochoc.robots.connections import open_source
     from robochoc.ros.report_decoder import ReportDecoder
-    from robochoc.ros.sinks import open_source
     from robochoc.ros.source_feedback import PATIENCE_S, SourceFeedback
 
     source = stack.enter_context(open_source(ros.situation or ""))
@@ -202,7 +200,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
         return
     import time
 
-    from robochoc.ros.single_robot import drones_of_robot, leg_of_robot
+    from robochoc.robots.single_robot import drones_of_robot, leg_of_robot
     from robochoc.ros.sink_publisher import SinkPublisher
 
     refuse_same_places({}, more_outputs=sink_places(texts))
@@ -234,7 +232,7 @@ def source_places(situation: str | None) -> list[NamedPlace]:
 
 
 def _place_of(option: str, text: str) -> NamedPlace:
-    from robochoc.ros.sinks import place_of
+    from robochoc.robots.connections import place_of
 
     try:
         return place_of(text), f"{option} {text}"

@@ -12,7 +12,7 @@ from robochoc.cli.reports.failures import LOST
 if TYPE_CHECKING:
     from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
-    from robochoc.ros.closed_loop import ClosedLoop
+    from robochoc.robots.closed_loop import ClosedLoop
 
 
 def publication_lines(loop: ClosedLoop) -> list[str]:
@@ -52,7 +52,7 @@ def report_flight(loop: ClosedLoop, failures: Sequence[tuple[str, float]], *, qu
 
 def _simulated_flight(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
     """Return the mission and the log of the simulated flight; None if nothing was flown."""
-    from robochoc.ros.simulated_feedback import SimulatedFeedback
+    from robochoc.robots.simulated_feedback import SimulatedFeedback
 
     flown = loop.feedback.flown() if isinstance(loop.feedback, SimulatedFeedback) else None
     return (loop.mission, flown) if loop.mission and flown else None

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from robochoc.flight.mission import Mission
     from robochoc.model.outcome import EpochOutcome, Outcome
     from robochoc.model.problem import Team
-    from robochoc.ros.closed_loop import ClosedLoop
+    from robochoc.robots.closed_loop import ClosedLoop
 
 
 class ImprovementReporter:

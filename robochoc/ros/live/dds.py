@@ -9,14 +9,14 @@ import time
 from collections.abc import Collection, Mapping
 from typing import NoReturn
 
+from robochoc.robots.inbox import PER_TOPIC_MAX, RosInbox, weight_of
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
 from robochoc.ros.live.subscribers import await_subscribers
+from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
 from robochoc.ros.names import is_for_waypoints
-from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
-from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 WAIT_S = 2.0
 """The default wait for subscribers, in seconds."""

@@ -24,7 +24,7 @@ from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.dds_subscription import Subscription
 from robochoc.ros.live.dds_types import raw_service_type, raw_type, topic_name
 from robochoc.ros.live.ros_master import Failed
-from robochoc.ros.recordings.types import UnknownTypeError, types_of
+from robochoc.ros.message_types import UnknownTypeError, types_of
 
 CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
 MESSAGE_BYTES_MAX = 256 * 1024

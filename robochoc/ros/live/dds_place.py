@@ -48,7 +48,7 @@ class DdsPlace:
     def of(cls, place: str, usual: Quality, options: Collection[str], failed: Failed) -> DdsPlace:
         """Return what `place` names, with `options` that it may give; others are as `usual`. Raises `failed`.
 
-        >>> from robochoc.ros.sink import SinkError
+        >>> from robochoc.robots.sink import SinkError
         >>> usual = Quality(reliable=True, latched=True, depth=1)
         >>> DdsPlace.of("5?partition=hall&depth=3", usual, ("partition", "depth"), SinkError)
         DdsPlace(domain=5, quality=Quality(reliable=True, latched=True, depth=3, wait_s=0.0, partitions=('hall',)))

@@ -11,11 +11,11 @@ import struct
 import time
 from collections.abc import Mapping
 
+from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant, ServiceEnd
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.services import WAITING_MAX, AtOnce, Refuse, Request, Services, known_fields
-from robochoc.ros.recordings.types import FieldsError, types_of
-from robochoc.ros.sink import Fields, SinkError
+from robochoc.ros.message_types import FieldsError, types_of
 
 MATCH_S = 1.0
 """The longest wait for the client's reader of answers, in seconds: it may be found after its request has come."""

@@ -14,8 +14,8 @@ from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl import types as idl_types
 
 from robochoc.ros.live.ros2_names import dds_type_name
-from robochoc.ros.mappings import short_kind
-from robochoc.ros.recordings.types import FieldType, types_of
+from robochoc.ros.message_types import FieldType, types_of
+from robochoc.ros.waypoint_types import short_kind
 
 _idl: Any = idl_types
 """Its generic types are none to mypy."""

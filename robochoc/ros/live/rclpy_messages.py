@@ -9,8 +9,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.live.rospy_messages import message_class
-from robochoc.ros.sink import Fields, SinkError
 
 _NANO = 1_000_000_000
 _TIMES = ("builtin_interfaces/Time", "builtin_interfaces/Duration")

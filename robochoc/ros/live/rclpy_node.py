@@ -20,15 +20,15 @@ from pathlib import Path
 from typing import Any
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
+from robochoc.robots.inbox import PER_TOPIC_MAX, RosInbox, weight_of
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.ros2_names import domain_id
 from robochoc.ros.live.ros_master import Failed
 from robochoc.ros.live.rospy_messages import message_class
 from robochoc.ros.live.subscribers import await_subscribers
 from robochoc.ros.names import is_for_waypoints
-from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 WAIT_S = 2.0
 """The longest wait for the first subscriber of each waypoint's topic, in seconds."""

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from functools import partial
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.live.inbox import RosInbox, weight_of
+from robochoc.robots.inbox import RosInbox, weight_of
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, Topic
 from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosSession
-from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
-from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
 
 MESSAGE_BYTES_MAX = 256 * 1024
 """A longer message is ignored: reports are short."""

@@ -7,13 +7,13 @@ import time
 from collections.abc import Mapping
 from functools import partial
 
+from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX
 from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, Topic
 from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosQuery, RosSession
 from robochoc.ros.live.service_hashes import service_hash
 from robochoc.ros.live.services import AtOnce, Refuse, Request, Services, known_fields
-from robochoc.ros.recordings.types import FieldsError, types_of
-from robochoc.ros.sink import Fields, SinkError
+from robochoc.ros.message_types import FieldsError, types_of
 
 
 class RmwZenohServices(Services):

@@ -7,7 +7,7 @@ import re
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.ros_master import Failed
-from robochoc.ros.mappings import short_kind
+from robochoc.ros.waypoint_types import short_kind
 
 DOMAIN_MAX = 232
 """DDS has no ports for more domains."""

@@ -9,8 +9,8 @@ from typing import Any
 from xml.parsers.expat import ExpatError
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.sink import SinkError
-from robochoc.ros.source import SourceError
+from robochoc.robots.sink import SinkError
+from robochoc.robots.source import SourceError
 
 MASTER_S = 3.0
 """The longest wait for an answer of the master, in seconds."""

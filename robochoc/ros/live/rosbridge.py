@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from robochoc.ros.live.inbox import RosInbox
+from robochoc.robots.inbox import RosInbox
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.live.rosbridge_connection import Connection
 from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
-from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 _LOOK_EVERY = 100
 """Messages published between two looks at how many bytes are on their way."""

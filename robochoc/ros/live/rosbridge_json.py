@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robochoc.ros.sink import Fields
+from robochoc.robots.sink import Fields
 
 _DEPTH_MAX = 10
 """Fields are nested no deeper."""

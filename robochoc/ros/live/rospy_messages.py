@@ -9,8 +9,8 @@ from types import ModuleType
 from typing import Any
 
 from robochoc.formats.diagnostics import shortened
+from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.live.ros_master import Failed
-from robochoc.ros.sink import Fields, SinkError
 
 _NANO = 1_000_000_000
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/([A-Za-z][A-Za-z0-9_]*)")

@@ -18,12 +18,12 @@ from functools import partial
 from typing import Any
 
 from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.robots.inbox import RosInbox, weight_of
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.live.in_time import succeeds_in_time
-from robochoc.ros.live.inbox import RosInbox, weight_of
 from robochoc.ros.live.ros_master import Failed, RosMaster
 from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
-from robochoc.ros.sink import Fields, Sink, SinkError
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 NODE_S = 15.0
 """The longest wait for the registration of our node or its topics, in seconds."""

@@ -14,8 +14,8 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from robochoc.ros.mappings import short_kind
-from robochoc.ros.recordings.types import FieldType, types_of
+from robochoc.ros.message_types import FieldType, types_of
+from robochoc.ros.waypoint_types import short_kind
 
 _NUMBERS: Mapping[str, int] = MappingProxyType(
     {

@@ -10,8 +10,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple, Self
 
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import Fields
+from robochoc.robots.sink import Fields
+from robochoc.ros.message_types import types_of
 
 WAITING_MAX = 16
 """Requests that wait for their turn. Others are refused at once."""

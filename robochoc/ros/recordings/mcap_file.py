@@ -21,7 +21,8 @@ from mcap.records import Channel as ChannelRecord
 from mcap.records import Schema
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from robochoc.ros.mappings import short_kind
+from robochoc.robots.sink import Fields, SinkError
+from robochoc.ros.message_types import Version, types_of
 from robochoc.ros.recordings.recording import (
     BLOCK_BYTES_MAX,
     Block,
@@ -33,8 +34,7 @@ from robochoc.ros.recordings.recording import (
     inside,
 )
 from robochoc.ros.recordings.recording_sink import RecordingSink
-from robochoc.ros.recordings.types import Version, types_of
-from robochoc.ros.sink import Fields, SinkError
+from robochoc.ros.waypoint_types import short_kind
 
 NAMES = "robochoc:names"
 """The metadata record of the names that topics have in the team's files."""

@@ -19,9 +19,9 @@ from typing import BinaryIO, ClassVar, NamedTuple
 import lz4.frame  # type: ignore[import-untyped]
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.mappings import short_kind
-from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.message_types import FieldsError, UnknownTypeError, Version, types_of
+from robochoc.ros.waypoint_types import short_kind
 
 BLOCK_BYTES_MAX = 1 << 26
 """Bytes of a record, and of a decompressed chunk. Recorders make chunks of some megabytes."""

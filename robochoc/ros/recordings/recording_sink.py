@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import ClassVar
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
-from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.ros.message_types import FieldsError, UnknownTypeError, Version, types_of
 from robochoc.system.files import PendingFile
 
 _END_OF_TIME = (1 << 32) * 10**9

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import zstandard
 
-from robochoc.ros.mappings import short_kind
+from robochoc.ros.message_types import types_of
 from robochoc.ros.recordings.recording import (
     BLOCK_BYTES_MAX,
     Entry,
@@ -22,7 +22,7 @@ from robochoc.ros.recordings.recording import (
     RecordingDamagedError,
     inside,
 )
-from robochoc.ros.recordings.types import types_of
+from robochoc.ros.waypoint_types import short_kind
 
 _MAGIC = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"

@@ -17,7 +17,8 @@ from typing import BinaryIO, NamedTuple, cast
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer
 
-from robochoc.ros.mappings import short_kind
+from robochoc.robots.sink import Fields
+from robochoc.ros.message_types import types_of
 from robochoc.ros.recordings.recording import (
     Block,
     ChunkedRecording,
@@ -27,8 +28,7 @@ from robochoc.ros.recordings.recording import (
     from_lz4,
 )
 from robochoc.ros.recordings.recording_sink import RecordingSink
-from robochoc.ros.recordings.types import types_of
-from robochoc.ros.sink import Fields
+from robochoc.ros.waypoint_types import short_kind
 
 _CALLER = "/robochoc"
 _MAGIC = b"#ROSBAG V2.0\n"

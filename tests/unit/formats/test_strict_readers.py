@@ -32,7 +32,7 @@ from robochoc.formats.ground_map import read_ground_map
 from robochoc.formats.occupancy.grid import read_occupancy_grid
 from robochoc.formats.octomap.octree import read_octree
 from robochoc.formats.order_file import read_order
-from robochoc.ros.autopilots.fleet import FleetError, read_fleet
+from robochoc.vehicles.fleet import FleetError, read_fleet
 from tests.support.cases import looped
 from tests.support.foreign_files import CFN, FRODO, WCSP, XDISCSPS
 

@@ -14,7 +14,7 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
-from robochoc.ros.source import SourceError
+from robochoc.robots.source import SourceError
 from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.environments import SIMULATED, Says, openings

@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from robochoc.ros import sinks
+from robochoc.robots import connections
 from robochoc.system.installed import load_entry_point
 from robochoc.system.termination import Terminated
 
@@ -42,9 +42,9 @@ def test_who_has_updated_an_editable_install_is_told_to_install_again() -> None:
 
 
 def test_sigterm_ends_the_program_while_a_sink_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sinks, "entry_points_named", lambda *_: [Struck()])
+    monkeypatch.setattr(connections, "entry_points_named", lambda *_: [Struck()])
     with pytest.raises(Terminated):
-        sinks.open_sink("own:")
-    monkeypatch.setattr(sinks, "entry_points_named", lambda *_: [Leaving()])
-    with pytest.raises(sinks.UnknownSinkError, match="cannot be imported: SystemExit: 3"):
-        sinks.open_sink("own:")
+        connections.open_sink("own:")
+    monkeypatch.setattr(connections, "entry_points_named", lambda *_: [Leaving()])
+    with pytest.raises(connections.UnknownSinkError, match="cannot be imported: SystemExit: 3"):
+        connections.open_sink("own:")

@@ -1,0 +1,266 @@
+"""The closed loop: decisions reach robots, and the robots' situation changes the problem (the paper, Section 4.2).
+
+After each epoch the decision is published; then reports of the robots are awaited. The first report that changes the
+problem opens the next epoch, together with what comes within `TOGETHER_S` of it, and the team solves again.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from robochoc.flight.crafts import crafts_of
+from robochoc.flight.mission import (
+    VAST_M,
+    Drone,
+    Goal,
+    Leg,
+    Mission,
+    MissionBuilder,
+    all_robots,
+    check_scale,
+    mission_of,
+)
+from robochoc.flight.reports import Report
+from robochoc.formats.ground_map import GroundMap
+from robochoc.model.change import apply_possible_changes
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team
+from robochoc.robots.mission_publisher import MissionPublisher
+from robochoc.robots.situation import BATTERY, Situation
+
+TOGETHER_S = 0.5
+"""Reports within this number of seconds after one that changes the problem belong to the same event."""
+
+
+_FLOWN = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
+
+
+class News(NamedTuple):
+    """Changes that were reported while the team searched on. What comes until `until_s` belongs to the same event."""
+
+    changes: list[Change]
+    until_s: float
+
+
+class Feedback(ABC):
+    """A source of reports on the robots' situation: a simulated flight, or a source of messages."""
+
+    publishers: Sequence[MissionPublisher] = ()
+    """Reports are published there as they come."""
+    idle: Callable[[], None] = staticmethod(lambda: None)
+    """Called now and then while no report comes."""
+    simulated: bool = False
+    """True if the robots are simulated here, and so do not publish their reports themselves."""
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences about messages that could not be used."""
+        return []
+
+    @abstractmethod
+    def now_ns(self) -> int:
+        """Return the time, by the clock of the reports."""
+
+    @abstractmethod
+    def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
+        """Take note of a decision that has been published. Reports that follow count for `left_s` seconds."""
+
+    @abstractmethod
+    def next(self, until_s: float | None) -> Report | None:
+        """Return the next report, with `until_s` one that comes no later than that; None if no more comes."""
+
+    def poll(self) -> Report | None:
+        """Return a report that has come, without waiting; None where time stands still while the team decides."""
+        return None
+
+
+class ClosedLoop:
+    """An environment of a run: publishes each decision, and opens an epoch when robots report a change.
+
+    What was received over a ROS is not published there again; it goes to recordings alone.
+
+    Args:
+        team: The team as its files have it.
+        publishers: They publish decisions and reports. The caller opens and closes their sinks.
+        feedback: Where reports come from; None: nothing changes the problem. Its clock gives the times.
+        scale: Metres a unit of the problem; None: as `mission.py` chooses.
+        battery: A drone with less charge is out of order.
+        ground: A map of the ground, if there is one.
+
+    Raises:
+        ValueError: The map has walls, and another `scale` is asked for.
+        SinkError: Raised by methods: publishing failed.
+        SourceError: Raised by methods: the source failed.
+    """
+
+    events: list[ScenarioEvent]
+    """The events that the robots' situation has caused."""
+    publishers: Sequence[MissionPublisher]
+    """Publishers of decisions and reports."""
+
+    def __init__(
+        self,
+        team: Team,
+        publishers: Sequence[MissionPublisher] = (),
+        feedback: Feedback | None = None,
+        *,
+        scale: float | None = None,
+        battery: float = BATTERY,
+        ground: GroundMap | None = None,
+    ) -> None:
+        check_scale(scale, ground)
+        self._team = team
+        self._ground = ground
+        self._robots = all_robots(team)
+        self.feedback = feedback
+        self._scale = scale
+        self._battery = battery
+        self._builder: MissionBuilder | None = None
+        self._situation: Situation | None = None
+        self._legs: list[Leg] = []
+        self._goals: dict[int, Goal] = {}
+        self._improved: Leg | None = None
+        """The answer that was published last of the epoch that goes on."""
+        self._news: News | None = None
+        self._happened = 0
+        self._lost = True
+        self.events = []
+        self.publishers = publishers
+        if feedback:
+            feedback.publishers = [one for one in publishers if feedback.simulated or not one.live]
+
+    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
+        """Publish what `epoch` has decided for `team`; return the event that follows within `left_s` seconds."""
+        self._happened += not self._lost
+        self._lost = bool(epoch.lost)
+        builder = self._builder = self._builder or self._new_builder(epoch.assignment)
+        leg, self._improved = self._improved, None
+        if leg is None or epoch.verdict not in _FLOWN:
+            leg = builder.leg(epoch)
+            self._legs.append(leg)
+            self._decide(leg)
+        elif self.feedback is not None:
+            self._legs.append(leg)
+        if self.feedback is None:
+            return None
+        self.feedback.on_decision(builder, leg, left_s)
+        if epoch.lost or left_s == 0:
+            return None
+        event = self._sensed(self.feedback, self._coming(team, self._happened), builder)
+        if event:
+            self.events.append(event)
+        return event
+
+    def publish(self, outcome: Outcome) -> None:
+        """Publish the decisions of a run that was not connected to this loop."""
+        mission = mission_of(outcome, self._team, self._scale, self._ground)
+        self._legs = [*mission.legs]
+        for leg in mission.legs:
+            self._decide(leg)
+
+    def improve(self, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
+        """Publish what is decided while the team searches on: waypoints of drones alone that are to go elsewhere now.
+
+        What is flown in a simulation is the last decision of an epoch: time does not go by while the team decides.
+        """
+        builder = self._builder = self._builder or self._new_builder(epoch.assignment)
+        leg = builder.leg(epoch, withdrawn)
+        goals = {number: goal for number, goal in leg.goals.items() if goal != self._goals.get(number)}
+        self._improved = leg
+        if self.feedback is None:
+            self._legs.append(leg)
+        self._decide(replace(leg, goals=goals))
+
+    def has_news(self, team: Team) -> bool:
+        """Return whether a report that has come changes the problem of `team`: it opens the next epoch."""
+        feedback, builder = self.feedback, self._builder
+        if feedback is None or builder is None or self._improved is None:
+            return False
+        team = self._coming(team, self._happened + (not self._lost))
+        while self._news is None and (report := feedback.poll()) is not None:
+            changes = self._situation_of(builder).changes(team, report)
+            if changes:
+                self._news = News([*changes], report.at_s + TOGETHER_S)
+        return self._news is not None
+
+    @property
+    def team(self) -> Team:
+        """Return the team with a scenario of all planned events, and all events from robots' reports."""
+        return replace(self._team, scenario=(*self._team.scenario, *self.events))
+
+    @property
+    def mission(self) -> Mission | None:
+        """Return the mission so far. None before the first epoch is over."""
+        return self._builder.mission(self._team.name, self._legs) if self._builder else None
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences about reports that could not be used."""
+        received = self.feedback.notes if self.feedback else []
+        return [*received, *(self._situation.notes if self._situation else [])]
+
+    # Decisions
+
+    def _new_builder(self, assignment: Assignment) -> MissionBuilder:
+        """Return a builder for all drones. They stand below where they go first, or where they could go."""
+        first = {**_values(self._robots, 0), **assignment}
+        near = {**_values(self._robots, 0, VAST_M), **assignment}
+        far = {**near, **_values(self._robots, -1, VAST_M)}
+        others = [craft for values in (near, far) for robot in self._robots for craft in crafts_of(robot, values)]
+        return MissionBuilder(self._robots, first, others=others, scale=self._scale, ground=self._ground)
+
+    def _decide(self, leg: Leg) -> None:
+        at_ns = self.feedback.now_ns() if self.feedback else time.time_ns()
+        self._goals |= leg.goals
+        for publisher in self.publishers:
+            publisher.decide(leg, at_ns)
+
+    # The situation
+
+    def _coming(self, team: Team, happened: int) -> Team:
+        """Return `team` after all events that are already known, of which so many have `happened`."""
+        for event in self.team.scenario[happened:]:
+            team, _ = apply_possible_changes(team, event.changes)
+        return team
+
+    def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
+        """Return the event of the first reports that change `team`; None if there is no such report."""
+        situation = self._situation_of(builder)
+        changes: list[Change] = []
+        until_s = None
+        news, self._news = self._news, None
+        if news is not None:
+            changes, until_s = news
+            team, _ = apply_possible_changes(team, changes)
+        while (report := feedback.next(until_s)) is not None:
+            found = situation.changes(team, report)
+            if found:
+                changes += found
+                team, _ = apply_possible_changes(team, found)
+                until_s = report.at_s + TOGETHER_S if until_s is None else until_s
+        return ScenarioEvent(tuple(changes)) if changes else None
+
+    def _situation_of(self, builder: MissionBuilder) -> Situation:
+        if self._situation is None:
+            self._situation = Situation(builder.drones, builder.scale, self._battery)
+        return self._situation
+
+
+def drones_of(team: Team) -> tuple[Drone, ...]:
+    """Return all drones that ever take part. Where they stand is not known before the first decision."""
+    robots = all_robots(team)
+    return MissionBuilder(robots, _values(robots, 0)).drones
+
+
+def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> dict[str, int]:
+    """Return each variable's least value (`place` 0) or greatest (-1); only of those that span no more than `span`."""
+    found = {}
+    for variable in (variable for robot in robots for variable in robot.variables):
+        ranges = variable.domain.ranges
+        if ranges and (span is None or ranges[-1][-1] - ranges[0][0] <= span):
+            found[variable.name] = ranges[place][place]
+    return found

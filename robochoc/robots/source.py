@@ -1,0 +1,83 @@
+"""Sources: where messages about the robots' situation come from. Packages offer them under `robochoc.sources`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType, TracebackType
+from typing import NamedTuple, Self
+
+from robochoc.robots.sink import Fields
+
+REPORTS: Mapping[str, str] = MappingProxyType(
+    {
+        "battery": "sensor_msgs/BatteryState",
+        "pose": "geometry_msgs/PoseStamped",
+        "blocked": "geometry_msgs/PointStamped",
+        "cleared": "geometry_msgs/PointStamped",
+        "out_of_order": "std_msgs/String",
+    }
+)
+"""The topics in a drone's namespace, besides its waypoints: the last token, and the ROS type."""
+
+
+class SourceError(Exception):
+    """The source cannot be opened or read. The message says why, and what might help."""
+
+
+class ReceivedMessage(NamedTuple):
+    """A message: its topic, its ROS type, its fields (as a sink takes them), and when it was received."""
+
+    topic: str
+    kind: str
+    fields: Fields
+    at_ns: int
+
+
+class Source(ABC):
+    """Gives messages. It is a context manager: the caller that opens it closes it.
+
+    `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
+    """
+
+    live: bool = True
+    """True if messages arrive in real time. A recording has them all, so there is no waiting."""
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+        self.others: dict[str, str] = {}
+        """Topics of a recording that are not wanted, with their types; the first of them."""
+
+    @property
+    def is_busy(self) -> bool:
+        """Return whether robots are still on their way: the wait for their reports begins when they are there."""
+        return False
+
+    def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only who knows robots by name wants them
+        """Take the namespaces in which drones report, by the drones' names. Raises `SourceError`."""
+
+    @abstractmethod
+    def listen(self, topics: Mapping[str, str]) -> None:
+        """Subscribe to these topics with these types, both by their ROS names. Raises `SourceError`.
+
+        Messages of another type on such a topic are ignored.
+        """
+
+    @abstractmethod
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        """Return the next message; None if a recording is over, or nothing came within `wait_s`.
+
+        Raises `SourceError`.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the source."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

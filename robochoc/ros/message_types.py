@@ -1,0 +1,343 @@
+"""ROS types: from a message's fields to its bytes in ROS 1 and ROS 2, and back.
+
+Only this module knows `rosbags.typesys`. The definitions are those of ROS 1 Noetic and of ROS 2 Humble, whose types
+later ones have too, and those that installed packages bring (`mappings.py`). A definition in a recording is compared
+with ours and nothing else: rosbags makes program text of definitions and runs it.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from numbers import Real
+from typing import Any, Literal, NamedTuple, cast
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
+from robochoc.robots.sink import Fields
+from robochoc.ros.message_definitions import same_fields
+from robochoc.ros.waypoint_types import definition_of, short_kind
+from robochoc.system.errors import TransferableError
+
+Version = Literal[1, 2]
+"""ROS 1 or ROS 2."""
+
+_SECOND = 10**9
+_LARGEST_SINGLE = 3.4028235677973366e38
+_TIMES = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
+_HEADER = "std_msgs/msg/Header"
+_INTEGERS = {
+    **{f"int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, (1 << bits) - 1) for bits in (8, 16, 32, 64)},
+    "char": (0, 255),
+    "byte": (-128, 127),
+}
+_DAMAGE = (SerdeError, struct.error, ValueError, IndexError, OverflowError)
+
+Make = Callable[[Any], Any]
+
+
+class UnknownTypeError(LookupError):
+    """There is no definition of that ROS type, or the one that a package brings cannot be used."""
+
+
+class FieldsError(ValueError):
+    """Fields that are not those of the type, or bytes that are no message of it. The message says why."""
+
+
+class Definition(NamedTuple):
+    """A type's definition, with those of its fields' types, and its MD5 sum as ROS 1 computes it."""
+
+    text: str
+    md5: str
+
+
+class FieldType(NamedTuple):
+    """The type of a field: `float64`, `string` or `geometry_msgs/Point`, one or several of it."""
+
+    name: str
+    limit: int = 0
+    """The most characters of a string; 0: any number."""
+    shape: Literal["one", "array", "sequence"] = "one"
+    size: int = 0
+    """The number of values in an array; the most in a sequence, 0: any number."""
+
+
+class _Kind(NamedTuple):
+    """Conversions of one type, from fields to the library's object and back; and the object without fields."""
+
+    make: Make
+    fields: Make
+    empty: Any
+
+
+class _FieldError(TransferableError):
+    """The value of a field is wrong. `path` leads to the field, the last name first."""
+
+    def __init__(self, why: str, *path: str) -> None:
+        super().__init__(why)
+        self.path = [*path]
+
+
+class Types:
+    """The types of one version of ROS. Kinds are named `geometry_msgs/PoseStamped`, or as ROS 2 does."""
+
+    def __init__(self, version: Version) -> None:
+        self.version = version
+        self._store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+        self._kinds: dict[str, _Kind] = {}
+        self._known: dict[str, _Kind] = {}
+        self._definitions: dict[str, Definition] = {}
+
+    def definition(self, kind: str) -> Definition:
+        """Return the definition of `kind` as recordings hold it. Raises `UnknownTypeError`."""
+        name = self._name(kind)
+        if name not in self._definitions:
+            text, md5 = self._store.generate_msgdef(name, ros_version=self.version)
+            self._definitions[name] = Definition(text, md5)
+        return self._definitions[name]
+
+    def type_hash(self, kind: str) -> str:
+        """Return the hash of `kind` by which ROS 2 compares definitions (REP 2016). Raises `UnknownTypeError`."""
+        name = self._name(kind)
+        self._made(kind, name)
+        return self._store.hash_rihs01(name)
+
+    def is_the_same(self, kind: str, text: str) -> bool:
+        """Return whether `text` defines the fields that `kind` has. Raises `UnknownTypeError`."""
+        return same_fields(short_kind(kind), text, self.definition(kind).text)
+
+    def layout(self, kind: str) -> tuple[tuple[str, FieldType], ...]:
+        """Return the fields of `kind` and their types, in order. Raises `UnknownTypeError`."""
+        name = self._name(kind)
+        self._made(kind, name)  # types of fields that are not defined are found out here
+        return tuple((field, _field_type(desc)) for field, desc in self._store.fielddefs[name][1])
+
+    def encode(self, kind: str, fields: Fields) -> bytes:
+        """Return a message's bytes: CDR in ROS 2, and ROS 1's own format.
+
+        Raises:
+            UnknownTypeError: `kind` is unknown.
+            FieldsError: `fields` are not those of `kind`.
+        """
+        name = self._name(kind)
+        try:
+            message = self._made(kind, name).make(fields)
+        except _FieldError as wrong:
+            where = ".".join(reversed(wrong.path)) or "it"
+            raise FieldsError(f"{short_kind(kind)}: {where} {wrong}") from None
+        store = self._store
+        return bytes(store.serialize_ros1(message, name) if self.version == 1 else store.serialize_cdr(message, name))
+
+    def decode(self, kind: str, content: bytes) -> dict[str, Any]:
+        """Return the fields of a message, whose bytes may be anything.
+
+        Raises:
+            UnknownTypeError: `kind` is unknown.
+            FieldsError: `content` is no `kind`.
+        """
+        name = self._name(kind)
+        made = self._made(kind, name)
+        read = self._store.deserialize_ros1 if self.version == 1 else self._store.deserialize_cdr
+        try:
+            return cast("dict[str, Any]", made.fields(read(content, name)))
+        except _DAMAGE as error:
+            raise FieldsError(f"{len(content)} bytes are no {short_kind(kind)}: {error}") from error
+
+    def _name(self, kind: str) -> str:
+        """Return the library's name, `geometry_msgs/msg/PoseStamped`. A package's definition is registered first."""
+        short = short_kind(kind)
+        name = short.replace("/", "/msg/", 1)
+        if name not in self._store.fielddefs:
+            text = definition_of(kind)
+            if not text:
+                problem = f"ROS {self.version} has no type {kind!r} that is known here"
+                raise UnknownTypeError(f"{problem}; its mapping can bring the definition (docs/guides/ros.md)")
+            try:
+                new = get_types_from_msg(text, name)
+                self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})
+            except TypesysError as error:
+                raise UnknownTypeError(f"the definition of {kind!r} that a package brings is wrong: {error}") from error
+        return name
+
+    def _made(self, kind: str, name: str) -> _Kind:
+        if kind not in self._known:
+            try:
+                self._known[kind] = self._kind(name)
+            except (KeyError, RecursionError) as error:
+                raise UnknownTypeError(
+                    f"the definition of {kind!r} needs types that are not defined: {error}"
+                ) from error
+        return self._known[kind]
+
+    def _kind(self, name: str) -> _Kind:
+        if name not in self._kinds:
+            self._kinds[name] = self._time(name) if name in _TIMES else self._struct(name)
+        return self._kinds[name]
+
+    def _time(self, name: str) -> _Kind:
+        made = self._store.types[name]
+        unsigned = self.version == 1 and name.endswith("Time")
+        low = 0 if unsigned else -(1 << 31)
+
+        def make(value: object) -> object:
+            whole = _whole(value)
+            if not low <= whole // _SECOND < 1 << 31:
+                raise _FieldError(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
+            return made(whole // _SECOND, whole % _SECOND)
+
+        def given(time: Any) -> int:  # noqa: ANN401 - rosbags' own type, which reads seconds as ROS 2 has them
+            sec = time.sec % (1 << 32) if unsigned else time.sec
+            return int(sec) * _SECOND + int(time.nanosec)
+
+        return _Kind(make, given, made(0, 0))
+
+    def _struct(self, name: str) -> _Kind:
+        made = self._store.types[name]
+        parts = [(field, self._part(desc)) for field, desc in self._store.fielddefs[name][1]]
+        attributes = [*getattr(made, "__dataclass_fields__", ())]  # `from` is `from_` there
+        hidden = {"seq"} if name == _HEADER else {"structure_needs_at_least_one_member"}
+        both = zip(attributes, parts, strict=False)
+        shown = [(field, own, part) for own, (field, part) in both if field not in hidden]
+
+        def make(value: object) -> object:
+            return made(*_values_of(value, short_kind(name), parts))
+
+        def fields(message: object) -> dict[str, Any]:
+            return {field: part.fields(getattr(message, own)) for field, own, part in shown}
+
+        return _Kind(make, fields, made(*[part.empty for _, part in parts]))
+
+    def _part(self, desc: Any) -> _Kind:  # noqa: ANN401 - the library's tuples
+        what, more = desc
+        if what == Nodetype.BASE:
+            return _scalar(more[0], more[1])
+        if what == Nodetype.NAME:
+            return self._kind(more)
+        item, number = self._part(more[0]), more[1]
+        kind = more[0][1][0] if more[0][0] == Nodetype.BASE and more[0][1][0] != "string" else ""
+        fixed = number if what == Nodetype.ARRAY else None
+
+        def make(values: object) -> object:
+            if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+                raise _FieldError(f"must be a list, is {values!r}")
+            found = [*values]
+            if len(found) != fixed if fixed is not None else number and len(found) > number:
+                raise _FieldError(
+                    f"must have {'' if fixed is not None else 'at most '}{number} values, has {len(found)}"
+                )
+            return listed([item.make(value) for value in found])
+
+        def listed(values: list[Any]) -> object:
+            return np.array(values, _dtype(kind)) if kind else values
+
+        def fields(values: Any) -> list[Any]:  # noqa: ANN401 - an array or a list
+            return cast("list[Any]", values.tolist()) if kind else [item.fields(value) for value in values]
+
+        return _Kind(make, fields, listed([item.empty] * (fixed or 0)))
+
+
+@cache
+def types_of(version: Version) -> Types:
+    """Return the types of that version, made once."""
+    return Types(version)
+
+
+def _field_type(desc: Any) -> FieldType:  # noqa: ANN401 - the library's tuples
+    what, more = desc
+    if what == Nodetype.BASE:
+        return FieldType(more[0], more[1])
+    if what == Nodetype.NAME:
+        return FieldType(short_kind(more))
+    one = _field_type(more[0])
+    return one._replace(shape="array" if what == Nodetype.ARRAY else "sequence", size=more[1])
+
+
+def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Kind]]) -> list[Any]:
+    """Return the values of all fields of a `kind`. Raises `_FieldError`."""
+    if not isinstance(value, Mapping):
+        raise _FieldError(f"must be fields by their names, is {value!r}")
+    names = {field for field, _ in parts}
+    if not value.keys() <= names:
+        unknown = next(iter(value.keys() - names))
+        raise _FieldError(f"is no field of {kind}, which has {', '.join(sorted(names))}", str(unknown))
+    values = []
+    for field, part in parts:
+        try:
+            values.append(part.make(value[field]) if field in value else part.empty)
+        except _FieldError as wrong:
+            wrong.path.append(field)
+            raise
+    return values
+
+
+def _dtype(kind: str) -> str:
+    return {"bool": "bool_", "char": "uint8", "byte": "int8"}.get(kind, kind)
+
+
+def _scalar(kind: str, limit: int) -> _Kind:
+    def as_it_is(value: object) -> object:
+        return value
+
+    if kind == "string":
+        return _Kind(lambda value: _text(value, limit), as_it_is, "")
+    if kind == "bool":
+        return _Kind(_truth, as_it_is, False)
+    if kind.startswith("float"):
+        return _Kind(_single if kind == "float32" else _number, as_it_is, 0.0)
+    low, high = _INTEGERS[kind]
+
+    def make(value: object) -> int:
+        whole = _whole(value)
+        if not low <= whole <= high:
+            raise _FieldError(f"must be a whole number from {low} to {high}, is {value!r}")
+        return whole
+
+    return _Kind(make, as_it_is, 0)
+
+
+def _text(value: object, limit: int) -> str:
+    if not isinstance(value, str) or "\0" in value or (limit and len(value) > limit):
+        most = f" of at most {limit} characters" if limit else ""
+        raise _FieldError(f"must be text{most} without a NUL, is {value!r}")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise _FieldError(f"must be text that UTF-8 can hold, is {value!r}") from None
+    return value
+
+
+def _truth(value: object) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise _FieldError(f"must be true or false, is {value!r}")
+    return bool(value)
+
+
+def _number(value: object) -> float:
+    if type(value) is float:
+        return value
+    if not isinstance(value, bool) and isinstance(value, Real):
+        with suppress(OverflowError):
+            return float(value)
+    raise _FieldError(f"must be a number, is {value!r}")
+
+
+def _single(value: object) -> float:
+    number = _number(value)
+    if _LARGEST_SINGLE <= abs(number) < math.inf:
+        raise _FieldError(f"must be a number of single precision, is {value!r}")
+    return number
+
+
+def _whole(value: object) -> int:
+    if not isinstance(value, bool):
+        with suppress(TypeError):
+            return operator.index(value)  # type: ignore[arg-type]  # that is the question
+    raise _FieldError(f"must be a whole number, is {value!r}")

@@ -1,0 +1,212 @@
+"""Mappings from waypoints to messages of the ROS type that a topic has.
+
+Some types are built in. Packages offer others under the entry point group `robochoc.waypoints`; the entry's name is the
+ROS type, such as `mavros_msgs/PositionTarget`. It names a function that makes a message's fields of a `Waypoint`, or a
+`WaypointMapping`, which also brings the definition of a type that no distribution of ROS has.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import cast
+
+from robochoc.flight.layout import Point
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.robots.sink import Fields
+from robochoc.robots.waypoint import Waypoint
+from robochoc.ros.service_types import SERVICE_TYPES
+from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
+
+GROUP = "robochoc.waypoints"
+
+_SPELLING = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+UPRIGHT: Fields = {"w": 1.0}
+"""The orientation of what stands upright and looks along x."""
+
+
+class NoMappingError(Exception):
+    """A topic has a type that no waypoint can become. The message names the types that exist."""
+
+
+@dataclass(frozen=True)
+class WaypointMapping:
+    """Makes of a waypoint the fields of a message of one ROS type.
+
+    `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. Types of its fields
+    that none has follow it, each after a line of 80 `=` and a line `MSG: package/Type`, as in a recording.
+    """
+
+    fields: Callable[[Waypoint], Fields]
+    definition: str = ""
+
+
+def short_kind(kind: str) -> str:
+    """Return `geometry_msgs/PoseStamped`, also for `geometry_msgs/msg/PoseStamped`. Other kinds stay as they are."""
+    found = _SPELLING.fullmatch(kind.strip())
+    return f"{found[1]}/{found[2]}" if found else kind
+
+
+def kinds() -> tuple[str, ...]:
+    """Return all types that a waypoint can become, built in and installed, sorted."""
+    return tuple(sorted({*_BUILT_IN, *map(short_kind, entry_point_names(GROUP))}))
+
+
+@cache
+def mapping_for(kind: str) -> WaypointMapping | None:
+    """Return the mapping to `kind`, in either spelling; None if there is none.
+
+    Raises:
+        NoMappingError: The mapping that a package offers is broken.
+    """
+    short = short_kind(kind)
+    if short in _BUILT_IN:
+        return WaypointMapping(_BUILT_IN[short], _DEFINITIONS.get(short, ""))
+    namesakes = [
+        entry
+        for name in entry_point_names(GROUP)
+        if short_kind(name) == short
+        for entry in entry_points_named(GROUP, name)
+    ]
+    if not namesakes:
+        return None
+    found = load_entry_point(namesakes[0], namesakes, _fault)
+    if found.broken:
+        raise NoMappingError(on_one_line(f"{namesakes[0].value}, installed for waypoints as {kind}, {found.broken}"))
+    if isinstance(found.what, WaypointMapping):
+        return found.what
+    return WaypointMapping(cast("Callable[[Waypoint], Fields]", found.what))
+
+
+def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
+    """Return the mapping for `topic` of `robot`. Raises `NoMappingError`."""
+    found = mapping_for(kind)
+    if found is None:
+        who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
+        problem = f"{who} has the type {kind!r}, and there is no mapping from waypoints to it"
+        known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP}){_meant(kind)}"
+        raise NoMappingError(on_one_line(f"{problem}: {known}"))
+    return found
+
+
+def _meant(kind: str) -> str:
+    """Return the type that may have been meant, as the end of a message; empty if none is like it."""
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
+    near = difflib.get_close_matches(kind, kinds(), 1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def definition_of(kind: str) -> str:
+    """Return the definition of `kind` that an installed package brings, or of a service; empty if there is none."""
+    if kind in SERVICE_TYPES:
+        return SERVICE_TYPES[kind]
+    try:
+        found = mapping_for(kind)
+    except NoMappingError:
+        return ""
+    return found.definition if found else ""
+
+
+def _fault(found: object) -> str:
+    return "" if isinstance(found, WaypointMapping) or callable(found) else "is no function and no WaypointMapping"
+
+
+def point(at: Point) -> Fields:
+    """Return the fields of a `geometry_msgs/Point`, or a `Vector3`."""
+    return {"x": at[0], "y": at[1], "z": at[2]}
+
+
+def header(waypoint: Waypoint) -> Fields:
+    """Return the fields of a `std_msgs/Header`."""
+    return {"stamp": waypoint.stamp, "frame_id": waypoint.frame}
+
+
+def _pose(waypoint: Waypoint) -> Fields:
+    return {"position": point(waypoint.at), "orientation": UPRIGHT}
+
+
+def _transform(waypoint: Waypoint) -> Fields:
+    return {"translation": point(waypoint.at), "rotation": UPRIGHT}
+
+
+def _with_header(part: str, make: Callable[[Waypoint], object]) -> Callable[[Waypoint], Fields]:
+    return lambda waypoint: {"header": header(waypoint), part: make(waypoint)}
+
+
+def _place(waypoint: Waypoint) -> Fields:
+    return point(waypoint.at)
+
+
+def _transform_stamped(waypoint: Waypoint) -> Fields:
+    child = waypoint.topic.removeprefix("/")
+    return {"header": header(waypoint), "child_frame_id": child, "transform": _transform(waypoint)}
+
+
+def _transforms(waypoint: Waypoint) -> Fields:
+    return {"transforms": [_transform_stamped(waypoint)]}
+
+
+def _path(waypoint: Waypoint) -> Fields:
+    """The straight way from the goal before, if there was one."""
+    places = [waypoint.at] if waypoint.before is None else [waypoint.before, waypoint.at]
+    stops = [{"header": header(waypoint), "pose": {"position": point(at), "orientation": UPRIGHT}} for at in places]
+    return {"header": header(waypoint), "poses": stops}
+
+
+def _odometry(waypoint: Waypoint) -> Fields:
+    return {
+        "header": header(waypoint),
+        "child_frame_id": waypoint.topic.removeprefix("/"),
+        "pose": {"pose": _pose(waypoint)},
+    }
+
+
+def _trajectory(waypoint: Waypoint) -> Fields:
+    name = waypoint.topic.removeprefix("/")
+    return {
+        "header": header(waypoint),
+        "joint_names": [name],
+        "points": [{"transforms": [_transform(waypoint)], "velocities": [{}], "accelerations": [{}]}],
+    }
+
+
+def _text(waypoint: Waypoint) -> Fields:
+    """JSON on one line, for programs without messages of ROS."""
+    place = dict(zip("xyz", waypoint.at, strict=True))
+    told = {"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands}
+    return {"data": json.dumps(told)}
+
+
+_BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
+    {
+        "geometry_msgs/PoseStamped": _with_header("pose", _pose),
+        "geometry_msgs/Pose": _pose,
+        "geometry_msgs/PoseWithCovarianceStamped": _with_header("pose", lambda waypoint: {"pose": _pose(waypoint)}),
+        "geometry_msgs/PointStamped": _with_header("point", _place),
+        "geometry_msgs/Point": _place,
+        "geometry_msgs/Vector3Stamped": _with_header("vector", _place),
+        "geometry_msgs/Vector3": _place,
+        "geometry_msgs/TransformStamped": _transform_stamped,
+        "geometry_msgs/Transform": _transform,
+        "geometry_msgs/Point32": _place,
+        "geometry_msgs/Pose2D": lambda waypoint: {"x": waypoint.at[0], "y": waypoint.at[1]},
+        "geometry_msgs/PoseArray": _with_header("poses", lambda waypoint: [_pose(waypoint)]),
+        "nav_msgs/Odometry": _odometry,
+        "nav_msgs/Path": _path,
+        "std_msgs/Float32": lambda waypoint: {"data": waypoint.at[2]},
+        "std_msgs/Float64": lambda waypoint: {"data": waypoint.at[2]},
+        "std_msgs/Float64MultiArray": lambda waypoint: {"data": [*waypoint.at]},
+        "std_msgs/String": _text,
+        "tf2_msgs/TFMessage": _transforms,
+        "trajectory_msgs/MultiDOFJointTrajectory": _trajectory,
+    }
+)
+_DEFINITIONS: Mapping[str, str] = MappingProxyType(
+    {"tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
+)
+"""Types that rosbags does not know for ROS 1."""

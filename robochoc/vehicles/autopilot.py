@@ -1,0 +1,114 @@
+"""An autopilot as a pilot sees it: what it tells, and the few commands it takes. Places are in the team's frame."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from robochoc.flight.layout import Point
+from robochoc.vehicles.limits import SILENCE_S
+
+OFFBOARD = "OFFBOARD"
+"""The mode in which an autopilot follows our set points."""
+MANUAL = frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"})
+"""Modes in which a person flies, by remote control."""
+AWAY = frozenset({"RETURN_TO_LAUNCH", "MISSION", "FOLLOW_ME"})
+"""Modes in which an autopilot flies on its own, and which we never ask for: a person did, or its failsafe."""
+
+
+class RefusedError(Exception):
+    """The autopilot has denied a command, or did not answer. The message says which."""
+
+
+@dataclass(frozen=True)
+class Telemetry:
+    """The state of a vehicle, as far as it has told it."""
+
+    place: Point | None = None
+    battery: float | None = None
+    mode: str = ""
+    armed: bool = False
+    in_air: bool = False
+    healthy: bool = False
+    problem: str = ""
+    """Why the autopilot is not healthy, if it tells that."""
+    alarm: str = ""
+    """Why it has to land at once, where its autopilot does not do that by itself."""
+    connecting: bool = False
+    """True from its first message until it has told everything that is needed before it can fly."""
+    silent_s: float = 0.0
+    """The time since the last heartbeat, in seconds."""
+    place_age_s: float = 0.0
+    """The time since it last told its place, in seconds: a vehicle that is heard may no longer know where it is."""
+
+    @property
+    def is_heard(self) -> bool:
+        """Return whether the vehicle is heard. MAVSDK says of one that is not that its motors have stopped."""
+        return self.silent_s <= SILENCE_S
+
+    @property
+    def not_ready(self) -> str:
+        """Return why its autopilot would not arm; empty if it would."""
+        return "" if self.healthy else self.problem or "its autopilot is not ready to arm"
+
+    @property
+    def is_flown_by_others(self) -> bool:
+        """Return whether a person flies the vehicle, or its autopilot on its own."""
+        return self.armed and self.mode in MANUAL | AWAY
+
+    @property
+    def mode_and_who(self) -> str:
+        """Return the mode of a vehicle that others fly, and who that may be, in words."""
+        who = "a person flies it" if self.mode in MANUAL else "a person flies it, or its own failsafe"
+        return f"{self.mode_in_words} ({who})"
+
+    @property
+    def mode_in_words(self) -> str:
+        """Return the mode in small letters."""
+        return self.mode.lower().replace("_", " ")
+
+
+class Autopilot(ABC):
+    """A vehicle's autopilot. Commands wait for the answer, a few seconds at most, and raise `RefusedError`."""
+
+    url: str
+    """The link, for messages."""
+
+    @abstractmethod
+    def connect(self) -> bool:
+        """Return whether the vehicle has been heard; the first call opens the link. Raises `RefusedError`."""
+
+    @abstractmethod
+    def look(self) -> Telemetry:
+        """Return the newest telemetry. Does not wait."""
+
+    @abstractmethod
+    def arm(self) -> None:
+        """Arm the motors."""
+
+    @abstractmethod
+    def disarm(self) -> None:
+        """Disarm the motors: refused in the air."""
+
+    @abstractmethod
+    def take_off(self, height_m: float) -> None:
+        """Rise to a height above where it stands, and hold there."""
+
+    @abstractmethod
+    def go_to(self, place: Point) -> None:
+        """Fly straight to `place`, by set points that are repeated until another command comes.
+
+        Waits after another command only: it is called again and again on the way.
+        """
+
+    @abstractmethod
+    def hold(self) -> None:
+        """Stay where it is, without us."""
+
+    @abstractmethod
+    def land(self) -> None:
+        """Land where it is, without us."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the link. No command is sent by that."""

@@ -1,0 +1,270 @@
+"""The fleet file: which vehicle each drone is, by which link it is reached, and how it may fly.
+
+The place of `mavlink:FILE`, and of `crazyflie:FILE`, is such a file, in YAML (docs/guides/autopilots.md). All of it is
+checked when it is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from fractions import Fraction
+from pathlib import Path
+
+import msgspec
+
+from robochoc.flight.layout import Point
+from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
+from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
+from robochoc.vehicles.frames import FAR_M, LATITUDE_MAX, GpsPlace
+from robochoc.vehicles.kinds import Kind, address_of, shared_port
+
+BYTES_MAX = 64 * 1024
+VEHICLES_MAX = 64
+_PORTS = range(1, 65_536)
+_EXPECTED = "see docs/guides/autopilots.md for what a fleet file has"
+_CORNERS, _AXES = 2, 3
+_LARGE = 10**9
+
+
+class FleetError(Exception):
+    """A fleet file that is not as it should be. The message has the file, the line, and what was expected."""
+
+
+class AtEnd(StrEnum):
+    """What vehicles do when a run is over, however it ends."""
+
+    LAND = "land"
+    HOLD = "hold"
+
+
+class Fence(msgspec.Struct, frozen=True):
+    """A box that no vehicle may leave, in metres: its lowest and its highest corner."""
+
+    low: Point
+    high: Point
+
+    def holds(self, place: Point, margin_m: float = 0.0) -> bool:
+        """Return whether `place` is in the box, or no more than `margin_m` out of it along each axis."""
+        sides = zip(self.low, place, self.high, strict=True)
+        return all(low - margin_m <= at <= high + margin_m for low, at, high in sides)
+
+    def holds_above(self, place: Point, margin_m: float = 0.0) -> bool:
+        """Return whether `place` is in the box or right below it, as a place on the ground may be."""
+        x, y, z = place
+        return self.holds((x, y, max(z, self.low[2])), margin_m)
+
+    def __str__(self) -> str:
+        return f"{point_text(self.low)} to {point_text(self.high)}"
+
+
+class Link(msgspec.Struct, frozen=True):
+    """The link to a vehicle, as its library names it, and where the vehicle's own origin lies in the team's frame."""
+
+    url: str
+    at: Point = (0.0, 0.0, 0.0)
+
+
+class Fleet(msgspec.Struct, frozen=True):
+    """The content of a fleet file."""
+
+    vehicles: Mapping[str, Link]
+    """By the drones' names."""
+    fence: Fence
+    origin: GpsPlace | None = None
+    """Where the team's origin lies on the earth. None: places are those of the vehicles' own frames."""
+    takeoff_m: float = 2.5
+    """The height of a take-off, above where the vehicle stands."""
+    near_m: float = 0.5
+    """A place is reached within this distance."""
+    end: AtEnd = AtEnd.LAND
+    patience_s: float = 10.0
+    """A vehicle whose link is silent for so long is lost."""
+    time_s: float = 120.0
+    """The longest time that a decision may take to be flown."""
+    kind: Kind = Kind.MAVLINK
+    speed_ms: float = 1.0
+    """The highest speed on the way, of a kind that has to be told, in metres a second."""
+
+    @property
+    def connect_s(self) -> float:
+        """Return how long a vehicle that is heard may take until it has told all, in seconds."""
+        return max(self.patience_s, self.kind.rules.connect_s)
+
+    distance_m: float = 1.0
+    """The distance that vehicles keep from each other, between their centres."""
+    downwash: float = 1.0
+    """So many distances are kept right above each other."""
+
+    @property
+    def tolerance_m(self) -> float:
+        """Return how far beside its way a vehicle still counts as on it."""
+        return min(self.near_m, self.distance_m / 4)
+
+
+def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
+    """Return the fleet in the file at `path`. Raises `FleetError`."""
+    hint = f"name a fleet file, as in {kind}:fleet.yaml"
+    if path == Path():  # --ros mavlink, without a place
+        raise FleetError(f"{kind}: which vehicles is not said; {hint}")
+    try:
+        if path.is_fifo():  # to open it would be to wait for a writer
+            content = None
+        else:
+            with path.open("rb") as file:
+                content = file.read(BYTES_MAX + 1)
+    except OSError as error:
+        raise FleetError(on_one_line(f"{path}: {error.strerror}; {hint}")) from None
+    if content is None:
+        raise FleetError(on_one_line(f"{path}: is no file; {hint}"))
+    if len(content) > BYTES_MAX:
+        raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
+    try:
+        return read_yaml(content.decode(), lambda root: _fleet(root, kind), _EXPECTED)
+    except UnicodeDecodeError:
+        raise FleetError(on_one_line(f"{path}: is no text in UTF-8")) from None
+    except MistakeError as mistake:
+        where = f"{path}:{mistake.line}" if mistake.line else f"{path}"
+        raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
+
+
+def _fleet(root: Node, kind: Kind) -> Fleet:
+    rules = kind.rules
+    _check_mapping(root, "a fleet file")
+    vehicles, box = (root.needed(key, f"a fleet file of {kind}", _EXPECTED) for key in ("vehicles", "fence"))
+    end, place = root.get("end"), root.get("origin") if "origin" in rules.entries else None
+    origin = _origin(place) if place else None
+    fleet = Fleet(
+        _vehicles(vehicles, kind, origin),
+        _fence(box),
+        origin,
+        takeoff_m=_number(root, "takeoff", rules.takeoff_m, rules.least_takeoff_m, 100),
+        near_m=_number(root, "near", rules.near_m, 0.05, 10),
+        end=_end(end) if end else AtEnd.LAND,
+        patience_s=_number(root, "patience", 10, 1, 600),
+        time_s=_number(root, "time", 120, 1, 3_600),
+        kind=kind,
+        speed_ms=_number(root, "speed", 1.0, 0.1, 5) if "speed" in rules.entries else 1.0,
+        distance_m=_number(root, "distance", rules.distance_m, 0.1, 100),
+        downwash=_number(root, "downwash", 1, 1, 10),
+    )
+    low, high = fleet.fence.low[2], fleet.fence.high[2]
+    if fleet.takeoff_m > high - low:
+        line = (root.get("takeoff") or box).line
+        raise MistakeError(
+            f"a take-off to {fleet.takeoff_m:g} m leaves a fence that is {high - low:g} m high",
+            "raise the fence, or lower 'takeoff'",
+            line,
+        )
+    return fleet
+
+
+def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link]:
+    found: dict[str, Link] = {}
+    names: dict[str, str] = {}
+    _check_mapping(node, "'vehicles'")
+    for key, entry in node.named():
+        name = shown(key)
+        link = _link(entry, name, kind, origin)
+        address = address_of(link.url)
+        if address in names:
+            problem = f"{shortened(name)} and {shortened(names[address])} have the same link"
+            raise MistakeError(problem, "a vehicle has a link of its own", entry.line)
+        for other, its in found.items():
+            if port := shared_port(link.url, its.url):
+                problem = f"{shortened(name)} and {shortened(other)} both receive at port {port} of this machine"
+                raise MistakeError(problem, "only one of them would be heard: give each a port of its own", entry.line)
+        names[address] = name
+        found[name] = link
+    if not 0 < len(found) <= VEHICLES_MAX:
+        raise MistakeError(f"{len(found)} vehicles", f"a fleet has 1 to {VEHICLES_MAX}", node.line)
+    return found
+
+
+def _link(node: Node, name: str, kind: Kind, origin: GpsPlace | None) -> Link:
+    if not node.is_mapping:
+        return Link(_url(node, name, kind))
+    link = node.needed("link", f"vehicle {shortened(name)}", f"as in link: {kind.rules.example}")
+    at = node.get("at")
+    if at is None:
+        return Link(_url(link, name, kind))
+    if origin:
+        raise MistakeError("'at' is for vehicles without GPS", "delete it, or 'origin'", at.line)
+    return Link(_url(link, name, kind), _point(at, "'at'"))
+
+
+def _url(node: Node, name: str, kind: Kind) -> str:
+    text = node.scalar
+    found = kind.rules.link.fullmatch(text) if isinstance(text, str) else None
+    if isinstance(text, str) and found and (found["port"] is None or int(found["port"]) in _PORTS):
+        return text
+    raise MistakeError(
+        f"the link of {shortened(name)}, {shortened(shown(text))!r}, is none",
+        f"expected {kind.rules.links}",
+        node.line,
+    )
+
+
+def _fence(node: Node) -> Fence:
+    corners = [_point(one, "a corner of the fence") for one in node.items or ()]
+    if len(corners) != _CORNERS:
+        raise MistakeError("'fence' is no box", "expected two corners, as in [[0, 0, 0], [6, 6, 6]]", node.line)
+    low_x, low_y, low_z = (min(pair) for pair in zip(*corners, strict=True))
+    high_x, high_y, high_z = (max(pair) for pair in zip(*corners, strict=True))
+    return Fence((low_x, low_y, low_z), (high_x, high_y, high_z))
+
+
+def _origin(node: Node) -> GpsPlace:
+    values = [_decimal(one) for one in node.items or ()]
+    latitude, longitude, altitude = values if len(values) == _AXES else (None, None, None)
+    if latitude is None or longitude is None or altitude is None:
+        raise MistakeError(
+            "'origin' is no place", "expected [latitude, longitude, metres above sea level], in degrees", node.line
+        )
+    if abs(latitude) > LATITUDE_MAX or abs(longitude) > 180 or not -500 <= altitude <= 9_000:  # noqa: PLR2004
+        limits = f"latitudes within {LATITUDE_MAX:g}, longitudes within 180 degrees, -500 to 9,000 m"
+        raise MistakeError("'origin' is too far off", f"expected {limits}", node.line)
+    return GpsPlace(latitude, longitude, altitude)
+
+
+def _end(node: Node) -> AtEnd:
+    for how in AtEnd:
+        if node.scalar == how.value:
+            return how
+    raise MistakeError(f"'end' is {shortened(shown(node.scalar))!r}", f"expected {' or '.join(AtEnd)}", node.line)
+
+
+def _point(node: Node, what: str) -> Point:
+    values = [_decimal(one) for one in node.items or ()]
+    x, y, z = values if len(values) == _AXES else (None, None, None)
+    if x is None or y is None or z is None or max(abs(x), abs(y), abs(z)) > FAR_M:
+        raise MistakeError(f"{what} is no place", f"expected [x, y, z] in metres, within {FAR_M:,g}", node.line)
+    return x, y, z
+
+
+def _number(root: Node, name: str, usual: float, least: float, most: float) -> float:
+    node = root.get(name)
+    if node is None:
+        return usual
+    found = _decimal(node)
+    if found is None or not least <= found <= most:
+        given = shortened(shown(node.scalar))
+        raise MistakeError(f"'{name}' is {given!r}", f"expected {least:g} to {most:,g}", node.line)
+    return found
+
+
+def _decimal(node: Node) -> float | None:
+    value = node.scalar
+    if isinstance(value, bool) or not isinstance(value, int | Fraction):
+        return None
+    return float(value) if -_LARGE <= value <= _LARGE else None
+
+
+def _check_mapping(node: Node, what: str) -> None:
+    if not node.is_mapping:
+        raise MistakeError(f"{what} is not a mapping", "expected lines of NAME: VALUE", node.line)
+
+
+def point_text(place: Point) -> str:
+    """Return a place in words, in metres: `3, 1, 2.5`."""
+    return ", ".join(f"{round(at, 2):g}" for at in place)

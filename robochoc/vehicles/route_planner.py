@@ -1,0 +1,232 @@
+"""Ways of vehicles from where they are to where they should be, none nearer to another's than the fleet's distance.
+
+The planner is that of the simulated flight (`robochoc.flight.routes`): it gives moves that are safe one after the
+other, and here that order is all that is taken from it. When each may begin is decided on the way, by what the
+vehicles tell (`traffic.py`): no clock is in it, so a vehicle may be as late as it likes.
+
+Vehicles on the ground first rise straight up, as their autopilots do. Where the place above one is not free, those in
+the air go to their places before that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robochoc.flight.layout import Point
+from robochoc.flight.routes.move_order import NoRouteError
+from robochoc.flight.routes.moves import moves_between
+from robochoc.flight.routes.paths import Space
+from robochoc.flight.routes.spacing import SLACK_M, Array, TooCloseError, check_spacing, norms, squashed
+from robochoc.vehicles.fleet import Fleet, point_text
+
+_ORDERS = 6
+"""So many orders of the vehicles are tried until all ways are within the fence."""
+_ROUNDING_M = 1e-6
+_SPOTS = 2_000
+_RING = 8
+
+
+class NoWayError(Exception):
+    """There are no ways that keep vehicles apart. The message says between whom, or what is in the way."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A vehicle's way (K + 1, 3), in metres: from rest to rest."""
+
+    name: str
+    path: Array
+
+
+class Ways:
+    """Plans ways within the fence of `fleet`, `distance_m` from each other; more or less than the fleet file says.
+
+    `standing` are the places of vehicles that stay, by name.
+    """
+
+    def __init__(self, fleet: Fleet, standing: Mapping[str, Point], distance_m: float) -> None:
+        self._fleet = fleet
+        self._fence = fleet.fence
+        self._takeoff_m = fleet.takeoff_m
+        self._downwash = fleet.downwash
+        self._distance_m = distance_m
+        self._standing = {name: at for name, at in standing.items() if all(map(math.isfinite, at))}
+
+    def legs(self, starts: Mapping[str, Point], goals: Mapping[str, Point], climbing: Mapping[str, float]) -> list[Leg]:
+        """Return the legs that bring all from `starts` to `goals`, in an order in which each is safe.
+
+        `climbing` has the heights to which vehicles rise before all, by name. Raises `NoWayError`.
+        """
+        problem = ""
+        for first in range(min(_ORDERS, max(len(starts), 1))):
+            names = [*starts][first:] + [*starts][:first]
+            for lifts_first in (True, False) if climbing else (True,):
+                try:
+                    found = self._legs(names, starts, goals, climbing, lifts_first=lifts_first)
+                except NoWayError as error:
+                    problem = problem or str(error)
+                    continue
+                outside = next(self._outside(found), "")
+                if not outside:
+                    return found
+                problem = problem if problem and not problem.startswith(_BY) else outside
+        raise NoWayError(problem)
+
+    def check(self, goals: Mapping[str, Point]) -> None:
+        """Raise `NoWayError` if two goals, or a goal and who stands, are nearer than the distance."""
+        called = [*goals, *self._standing]
+        try:
+            ends, still = self._flat([*goals.values()]), self._flat([*self._standing.values()])
+            check_spacing(ends, still, self._distance_m, "goal")
+        except TooCloseError as error:
+            raise NoWayError(self._too_close(error, called)) from None
+
+    def descents(self, rests: Mapping[str, Point], grounds: Mapping[str, float]) -> list[Leg]:
+        """Return the legs by which all land from where they rest, the lowest first. Raises `NoWayError`.
+
+        They land where they are. One that would land on another one's place lands beside it. `grounds` are heights.
+        """
+        taken, goals = [*self._standing.values()], dict[str, Point]()
+        rests = dict(sorted(rests.items(), key=lambda one: one[1][2]))
+        for name, at in rests.items():
+            spot = self.spot(at, taken)
+            if spot is None:
+                raise NoWayError(f"there is no place for {name} to land")
+            goals[name] = (*spot[:2], grounds[name])
+            taken.append(spot)
+        legs: list[Leg] = []
+        now = {**rests}
+        for name, at in rests.items():
+            path = np.array([at, goals[name]])
+            others = [other for one, other in now.items() if one != name]
+            if at[:2] == goals[name][:2] and self.clear(path, [*others, *self._standing.values()]):
+                legs.append(Leg(name, path))
+                now[name] = goals[name]
+        down = {name: at for name, at in now.items() if at == goals[name]}
+        late = {name: at for name, at in now.items() if name not in down}
+        if late:
+            rest = Ways(self._fleet, self._standing | down, self._distance_m)
+            legs += rest.legs(late, {name: goals[name] for name in late}, {})
+        return legs
+
+    def clear(self, path: Array, others: Sequence[Point]) -> bool:
+        """Return whether a path keeps the distance from `others`."""
+        return self._space([*map(tuple, path.tolist()), *others]).is_clear(self._flat(path), self._flat(others))
+
+    def spot(self, at: Point, taken: Sequence[Point]) -> Point | None:
+        """Return the point nearest to `at` whose column is the fleet's distance from those of `taken`, in the fence."""
+        low, high, distance_m = self._fence.low, self._fence.high, self._fleet.distance_m
+        for x, y in _rings(at[0], at[1], distance_m):
+            if (x, y) != at[:2] and not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
+                continue
+            if all(math.hypot(x - other[0], y - other[1]) >= distance_m - SLACK_M for other in taken):
+                return x, y, at[2]
+        return None
+
+    def _legs(
+        self,
+        names: Sequence[str],
+        starts: Mapping[str, Point],
+        goals: Mapping[str, Point],
+        climbing: Mapping[str, float],
+        *,
+        lifts_first: bool,
+    ) -> list[Leg]:
+        rests = {name: starts[name] for name in names}
+        if lifts_first:
+            legs = self._lifts(rests, climbing)
+            return legs + self._moves(rests, goals, [*names])
+        above = [name for name in names if name not in climbing]
+        legs = self._moves(rests, goals, above)
+        legs += self._lifts(rests, climbing)
+        return legs + self._moves(rests, goals, [*names])
+
+    def _lifts(self, rests: dict[str, Point], climbing: Mapping[str, float]) -> list[Leg]:
+        """Return how vehicles rise, and update where they rest."""
+        legs: list[Leg] = []
+        left = [*climbing]
+        while left:
+            for name in left:
+                path = np.array([rests[name], (*rests[name][:2], climbing[name])])
+                others = {other: at for other, at in (rests | self._standing).items() if other != name}
+                if self.clear(path, [*others.values()]):
+                    legs.append(Leg(name, path))
+                    rests[name] = (*rests[name][:2], climbing[name])
+                    left.remove(name)
+                    break
+            else:
+                nearest = min(others, key=lambda other: float(norms(path - np.array(others[other])).min()))
+                raise NoWayError(f"{left[-1]} cannot rise to {climbing[left[-1]]:g} m: {nearest} is too near")
+        return legs
+
+    def _moves(self, rests: dict[str, Point], goals: Mapping[str, Point], names: Sequence[str]) -> list[Leg]:
+        """Return how `names` get to their goals, and update where they rest."""
+        if not names:
+            return []
+        standing = {other: at for other, at in (rests | self._standing).items() if other not in names}
+        called = [*names, *standing]
+        begins, ends = self._flat([rests[name] for name in names]), self._flat([goals[name] for name in names])
+        still = self._flat([*standing.values()])
+        space = self._space([*(rests[name] for name in names), *(goals[name] for name in names), *standing.values()])
+        try:
+            check_spacing(begins, still, self._distance_m, "start")
+            check_spacing(ends, still, self._distance_m, "goal")
+            moves = moves_between(begins, ends, still, space, np.zeros(len(names)))
+        except TooCloseError as error:
+            raise NoWayError(self._too_close(error, called)) from None
+        except NoRouteError as error:
+            stuck = ", ".join(called[number] for number in error.drones)
+            raise NoWayError(f"no way was found for {stuck}: other vehicles enclose it") from None
+        for name in names:
+            rests[name] = goals[name]
+        return [Leg(names[move.drone], squashed(move.path, 1 / self._downwash)) for move in moves]
+
+    def _too_close(self, error: TooCloseError, called: Sequence[str]) -> str:
+        where = "are" if error.where == "start" else "would be"
+        first, second = called[error.first], called[error.second]
+        unit = "" if self._downwash == 1 else f", heights divided by {self._downwash:g}"
+        apart = f"{first} and {second} {where} {error.distance_m:.2f} m apart{unit}"
+        return f"{apart}: less than 'distance', {self._distance_m:g} m"
+
+    def _outside(self, legs: Sequence[Leg]) -> Iterator[str]:
+        """Yield the ways that lead out of the fence, in words. They may begin outside, and rise there."""
+        for leg in legs:
+            for x, y, z in leg.path[1:].tolist():
+                rises = [x, y] == leg.path[0, :2].tolist() and z <= self._fence.high[2]
+                if not rises and not self._fence.holds_above((x, y, z), _ROUNDING_M):
+                    yield f"{_BY} {point_text((x, y, z))} for {leg.name}, outside of the fence ({self._fence})"
+
+    def _flat(self, points: Sequence[Point] | Array) -> Array:
+        """Return points (N, 3) with their heights divided by the downwash."""
+        rows = np.array(points, dtype=float).reshape(-1, 3)
+        return squashed(rows, self._downwash)
+
+    def _space(self, points: Sequence[Point]) -> Space:
+        ground = self._fence.low[2] / self._downwash
+        heights = [*self._flat(points)[:, 2].tolist(), ground]
+        return Space(self._distance_m, ground, max(heights) + 2 * self._distance_m, rises=True)
+
+
+_BY = "the only way found leads by"
+
+
+def _rings(x: float, y: float, distance_m: float) -> Iterator[tuple[float, float]]:
+    """Yield points of the plane around a point, farther and farther out, half a distance from ring to ring."""
+    yield x, y
+    for number in range(_RING, _SPOTS):
+        ring, step = divmod(number, _RING)
+        angle = 2 * math.pi * (step + ring % 2 / 2) / _RING
+        radius = ring * distance_m * 0.501
+        yield x + radius * math.cos(angle), y + radius * math.sin(angle)
+
+
+def spacing(points: Sequence[Point], downwash: float) -> float:
+    """Return the smallest distance between two of `points`, heights divided by `downwash`."""
+    rows = squashed(np.array(points, dtype=float).reshape(-1, 3), downwash)
+    apart = norms(rows[:, None] - rows[None])
+    apart[np.diag_indices(len(rows))] = np.inf
+    return float(apart.min(initial=math.inf))

@@ -1,0 +1,145 @@
+"""Ways, cut into steps, and which steps of others each step has to wait for.
+
+The legs of `ways.py` are safe one after the other. So a step may begin as soon as each step of an earlier leg that
+comes nearer to it than the distance has been flown: by then its vehicle is somewhere else. Steps wait for earlier legs
+only, so nobody waits in a circle, and however late somebody is, the distance is kept. This is the dependency graph of
+plans that are executed with delays (W. Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in
+Warehouses", IEEE Robotics and Automation Letters 4(2), 2019, section IV), with legs for its order of events.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, auto
+
+import numpy as np
+
+from robochoc.flight.layout import Point
+from robochoc.flight.routes.spacing import SLACK_M, Array, line_distances, squashed
+from robochoc.vehicles.route_planner import Leg
+
+_PARTS = 32
+"""A straight piece has at most so many steps."""
+
+
+class Does(Enum):
+    """The kind of a step: the first and the last are done by the vehicle's autopilot alone."""
+
+    CLIMB = auto()
+    FLY = auto()
+    LAND = auto()
+
+
+@dataclass
+class Step:
+    """A straight step of a vehicle's way, in metres."""
+
+    does: Does
+    begin: Point
+    end: Point
+    is_corner: bool
+    """Whether its straight piece ends with it."""
+    needs: dict[str, int] = field(default_factory=dict)
+    """It waits until of these vehicles so many steps are done."""
+
+
+@dataclass(frozen=True)
+class _Piece:
+    name: str
+    leg: int
+    first: int
+    begins: Array
+    ends: Array
+
+    @property
+    def line(self) -> tuple[Array, Array]:
+        return self.begins[0], self.ends[-1]
+
+
+def steps_of(
+    legs: Sequence[Leg], climbing: Collection[str], landing: Collection[str], distance_m: float, downwash: float
+) -> dict[str, list[Step]]:
+    """Return the steps of each vehicle that has legs.
+
+    Args:
+        legs: In an order in which each is safe.
+        climbing: Vehicles whose first leg is flown by the autopilot.
+        landing: Vehicles that land at the end of their last leg.
+        distance_m: No two vehicles come nearer.
+        downwash: Heights are divided by it before.
+    """
+    steps: dict[str, list[Step]] = {}
+    pieces: list[_Piece] = []
+    last = {leg.name: number for number, leg in enumerate(legs)}
+    for number, leg in enumerate(legs):
+        mine = steps.setdefault(leg.name, [])
+        lands = leg.name in landing and last[leg.name] == number
+        path = _closed(leg.path) if lands else leg.path
+        for begin, end, left in zip(path[:-1], path[1:], range(len(path) - 2, -1, -1), strict=True):
+            does = Does.CLIMB if leg.name in climbing and not mine else Does.FLY
+            does = Does.LAND if lands and not left else does
+            pieces.append(_piece(leg.name, number, mine, (does, begin, end), distance_m))
+    for later, piece in enumerate(pieces):
+        for earlier in pieces[:later]:
+            if earlier.name != piece.name and earlier.leg != piece.leg:
+                _wait(steps[piece.name], piece, earlier, distance_m, downwash)
+    return steps
+
+
+def _closed(path: Array) -> Array:
+    """Return a path whose last piece leads straight down, if only by nothing: it is flown by the autopilot."""
+    down = (path[-1, :2] == path[-2, :2]).all() and path[-1, 2] <= path[-2, 2]
+    return path if down else np.vstack((path, path[-1]))
+
+
+def _piece(name: str, leg: int, steps: list[Step], what: tuple[Does, Array, Array], distance_m: float) -> _Piece:
+    does, begin, end = what
+    length = math.dist(begin, end)
+    parts = max(1, min(_PARTS, math.ceil(2 * length / distance_m))) if does is Does.FLY else 1
+    points = begin + (end - begin) * (np.arange(parts + 1) / parts)[:, None]
+    first = len(steps)
+    steps += [
+        Step(does, _point(points[number]), _point(points[number + 1]), number == parts - 1) for number in range(parts)
+    ]
+    return _Piece(name, leg, first, points[:-1], points[1:])
+
+
+def _wait(steps: list[Step], piece: _Piece, earlier: _Piece, distance_m: float, downwash: float) -> None:
+    """Note in `steps` which of a piece's steps wait for which of an earlier one's."""
+    least = distance_m - SLACK_M
+    mine, theirs = _flat(piece.line, downwash), _flat(earlier.line, downwash)
+    if line_distances(mine, theirs) >= least:
+        return
+    mine = _flat((piece.begins[:, None], piece.ends[:, None]), downwash)
+    theirs = _flat((earlier.begins[None], earlier.ends[None]), downwash)
+    near = line_distances(mine, theirs) < least
+    for number in np.flatnonzero(near.any(axis=1)).tolist():
+        needs = steps[piece.first + number].needs
+        done = earlier.first + int(np.flatnonzero(near[number])[-1]) + 1
+        needs[earlier.name] = max(needs.get(earlier.name, 0), done)
+
+
+def _flat(line: tuple[Array, Array], downwash: float) -> tuple[Array, Array]:
+    return squashed(line[0], downwash), squashed(line[1], downwash)
+
+
+def _point(row: Array) -> Point:
+    x, y, z = row.tolist()
+    return x, y, z
+
+
+def length_along(begin: Point, end: Point, place: Point) -> float:
+    """Return how far along a line a place is, in metres from where it begins."""
+    length = math.dist(begin, end)
+    if not length:
+        return 0.0
+    return sum((e - b) * (p - b) for b, e, p in zip(begin, end, place, strict=True)) / length
+
+
+def on_line(begin: Point, end: Point, length: float) -> Point:
+    """Return the point of a line that is so many metres from where it begins."""
+    share = length / (math.dist(begin, end) or 1.0)
+    x, y, z = (b + share * (e - b) for b, e in zip(begin, end, strict=True))
+    return x, y, z
