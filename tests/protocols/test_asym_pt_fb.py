@@ -91,7 +91,7 @@ def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
         ("RA", CPA(INFINITE, {}), "is asking for sides already"),
         ("RA", Row([1]), "has not asked for"),
         ("RA", RowRequest([(1,)]), "is not known to be below"),
-        ("RC", RowRequest([(1,)]), "was asked nothing"),
+        ("RC", RowRequest([(1,)]), "which has no open request"),
     ):
         with pytest.raises(ValueError, match=why):
             replies(robot, (sender, message))

@@ -102,13 +102,13 @@ def test_the_cheapest_value_with_its_assignment_is_returned_when_all_subtrees_ar
 
 def test_what_cannot_be_or_nobody_asked_for_is_refused() -> None:
     links: list[dict[str, list[str]]] = [{}, {"RB": ["RE"]}, {"RB": ["RC", "RF"]}]
-    assert_refused(placed_fork, [("RC", Members(one)) for one in links], "links that cannot be")
-    assert_refused(fork, [("RC", Result(3, {"RC": (1,), "RE": (1,)}))], "was asked nothing")
-    assert_refused(searching, [("RA", Result(3, {}))], "was asked nothing")
-    assert_refused(searching, [("RF", Report(3))], "not asked for a bound")
+    assert_refused(placed_fork, [("RC", Members(one)) for one in links], "impossible links")
+    assert_refused(fork, [("RC", Result(3, {"RC": (1,), "RE": (1,)}))], "which has no open request")
+    assert_refused(searching, [("RA", Result(3, {}))], "which has no open request")
+    assert_refused(searching, [("RF", Report(3))], "unexpected bound from")
     assert_refused(searching, [("RC", Result(3, {"RD": (1,)}))], "values of other robots")
     final = [("RA", Terminate({f"R{name}": (2,) for name in names})) for names in ("CDEF", "BCDE")]
-    assert_refused(fork, final, "do not get their final values")
+    assert_refused(fork, final, "below it are incomplete")
     assert_refused(leaf, [("RZ", Request((1,)))], "is not above")
 
 

@@ -23,8 +23,8 @@ from robochoc.protocols.optimization.hs_cai import (
     HSCAISettings,
     InferCtxt,
     PreUtil,
-    kept_axes,
     least_over,
+    limited_axes,
     table_of,
 )
 from robochoc.run import Options, Runtime, solve
@@ -77,9 +77,9 @@ def test_the_table_before_the_search_has_the_least_costs_of_the_subtree() -> Non
 
 def test_the_highest_robots_are_left_out() -> None:
     axes = [("RX", 4, 3), ("RY", 1, 3), ("RZ", 7, 3)]
-    assert kept_axes(axes, 2) == [("RX", 4, 3), ("RZ", 7, 3)]
-    assert kept_axes(axes, 3) == [("RY", 1, 3), ("RX", 4, 3), ("RZ", 7, 3)]
-    assert kept_axes([("RX", 1, MOST_CELLS), ("RY", 2, 2)], 3) == [("RY", 2, 2)]
+    assert limited_axes(axes, 2) == [("RX", 4, 3), ("RZ", 7, 3)]
+    assert limited_axes(axes, 3) == [("RY", 1, 3), ("RX", 4, 3), ("RZ", 7, 3)]
+    assert limited_axes([("RX", 1, MOST_CELLS), ("RY", 2, 2)], 3) == [("RY", 2, 2)]
 
 
 def test_a_table_is_a_lower_bound_whatever_is_left_out() -> None:
@@ -94,7 +94,7 @@ def test_a_table_is_a_lower_bound_whatever_is_left_out() -> None:
             cells = math.prod(sizes[name] for name in some)
             tables.append(table_of(axes, [chance.choice((0, 3, 7, INFINITE)) for _ in range(cells)]))
         charges = [chance.randint(0, 5) for _ in range(3)]
-        kept = kept_axes(names, chance.randint(1, 3))
+        kept = limited_axes(names, chance.randint(1, 3))
         told = table_of(kept, least_over(kept, "RO", charges, tables))
         for places in itertools.product(*(range(size) for _, _, size in names)):
             at = {name: place for (name, _, _), place in zip(names, places, strict=True)}
@@ -163,7 +163,7 @@ def test_a_request_for_the_parent_s_parent_waits_for_the_one_for_the_parent() ->
     robot = informed()
     replies(robot, ("RA", InferCtxt({"RA": 0})))
     assert replies(robot, ("RA", InferCtxt({"RA": 1}))) == []
-    with pytest.raises(ValueError, match="asked too often"):
+    with pytest.raises(ValueError, match="too many open requests"):
         replies(robot, ("RA", InferCtxt({"RA": 1})))
     said = replies(robot, ("RC", CtxtUtil([B], [9, 8])))
     assert said == [("RA", CtxtUtil([], [9])), ("RC", InferCtxt({"RA": 1}))]
@@ -181,13 +181,13 @@ def test_answers_come_in_the_order_of_the_requests() -> None:
 
 
 @looped(("sender", "message", "fault"), [
-    ("RC", Domain([(1,)], 0), "no domain to tell"), ("RA", Domain([], 0), "no domain to tell"),
-    ("RA", PreUtil([], [], 0, [3]), "no table to tell"),
-    ("RC", PreUtil([B], [], 0, [3]), "are no table"),
-    ("RC", PreUtil([("RB", 1, 3)], [], 0, [3, 3, 3]), "elsewhere, or with other values"),
-    ("RC", PreUtil([("RA", 1, 2)], [], 0, [3, 3]), "elsewhere, or with other values"),
-    ("RA", CPA(3, {"RA": 0}), "no values of the robots above"),
-    ("RA", InferCtxt({"RA": 0}), "cannot infer"), ("RC", CtxtUtil([], [3]), "asked for no table"),
+    ("RC", Domain([(1,)], 0), "invalid domain from"), ("RA", Domain([], 0), "invalid domain from"),
+    ("RA", PreUtil([], [], 0, [3]), "repeated table from"),
+    ("RC", PreUtil([B], [], 0, [3]), "do not form a table"),
+    ("RC", PreUtil([("RB", 1, 3)], [], 0, [3, 3, 3]), "another depth or number of values"),
+    ("RC", PreUtil([("RA", 1, 2)], [], 0, [3, 3]), "another depth or number of values"),
+    ("RA", CPA(3, {"RA": 0}), "lacks values of robots above"),
+    ("RA", InferCtxt({"RA": 0}), "cannot infer a table"), ("RC", CtxtUtil([], [3]), "unexpected table from"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(sender: str, message: Message, fault: str) -> None:
     robot = middle()
@@ -203,7 +203,7 @@ def test_places_beyond_a_domain_and_tables_of_other_robots_are_refused() -> None
             replies(informed(), ("RA", message))
     robot = informed()
     replies(robot, ("RA", InferCtxt({"RA": 0})))
-    with pytest.raises(ValueError, match="has another one"):
+    with pytest.raises(ValueError, match="one over other robots"):
         replies(robot, ("RC", CtxtUtil([("RX", 0, 2)], [1, 1])))
 
 

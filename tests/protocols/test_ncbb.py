@@ -100,10 +100,10 @@ def test_a_search_that_finds_nothing_at_all_is_no_solution() -> None:
 def test_who_is_not_asked_does_not_search() -> None:
     with pytest.raises(ValueError, match="does not know the value of its parent"):
         replies(middle(), ("RA", Search(3)))
-    with pytest.raises(ValueError, match="is searching"):
+    with pytest.raises(ValueError, match="is already searching"):
         replies(searching(), ("RA", Search(3)))
     robot = middle()
-    with pytest.raises(ValueError, match="no cost to tell"):
+    with pytest.raises(ValueError, match="repeated cost from"):
         replies(robot, ("RA", Result(3, {})))
 
 

@@ -100,7 +100,7 @@ def test_a_bound_for_a_search_that_has_ended_is_ignored() -> None:
 def test_who_is_searching_or_was_not_asked_does_not_begin() -> None:
     new = placed(PTFB, TEAM, "RB", "RA", children=["RC", "RD"], pseudo_children=["RE"])
     for robot in (exploring(), new):
-        with pytest.raises(ValueError, match="or is searching"):
+        with pytest.raises(ValueError, match="or is already searching"):
             replies(robot, ("RA", CPA(3, {})))
 
 

@@ -192,7 +192,7 @@ class SyncABB(SyncBB):
             return
         match cast("CPA | CPABack | FullBack | Priced | TooCostly | Backtrack | Terminate", message):
             case CPA() as cpa:
-                self._take_up(cpa)
+                self._start_cpa(cpa)
             case CPABack() as back:
                 self._add_side(back)
             case FullBack() as back:
@@ -209,7 +209,7 @@ class SyncABB(SyncBB):
 
     # The holder
 
-    def _take_up(self, cpa: CPA) -> None:
+    def _start_cpa(self, cpa: CPA) -> None:
         """Take the first value with a CPA of all robots before, if these can have its values."""
         if len(cpa.values) != self.rank:
             raise ValueError(f"a CPA for {self.problem.agent} has {self.rank} values, not {len(cpa.values)}")

@@ -1,9 +1,9 @@
 """Asynchronous Distributed Optimization (ADOPT).
 
 Complete search for minimum cost on a pseudo-tree, best-first. Each robot takes the value with the least lower bound, by
-the costs that its children report, and changes it as soon as its lower bound is above the threshold. So it leaves
-values that it may return to; the threshold, split among the children, lets them rebuild earlier solutions quickly. The
-root ends with LB = UB.
+the costs that its children report, and changes it as soon as its lower bound is above the threshold. So it may leave a
+value and return to it; the threshold, split among the children, lets them rebuild earlier solutions quickly. The search
+ends when the root has LB = UB.
 
 - **When to use**: to compare with BnB-ADOPT+, which needs fewer messages.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The number of
@@ -88,14 +88,13 @@ class ADOPT(BoundingProtocol):
         self.t: dict[str, list[Number]] = {}
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.terminated:
             return
         match cast("Value | Cost | Threshold | Terminate", message):
             case Value(value, counter):
                 self.merge({sender: (value, counter)})
             case Cost(context, lb, ub):
-                self._hear_cost(sender, context, lb, ub)
+                self._store_cost(sender, context, lb, ub)
             case Threshold() as threshold:
                 self.parent_threshold = threshold
             case Terminate(context):
@@ -110,20 +109,20 @@ class ADOPT(BoundingProtocol):
         self._choose()
         value = Value(*self.own)
         for name in self.descendants:
-            self.tell(name, value)
+            self.send_if_new(name, value)
         self._maintain_allocation_invariant()
         if self.threshold == self.ub and self.may_end:
             self.terminate()
         elif self.parent is not None and not self.last_values:
-            self.tell(self.parent, Cost(dict(self.context), self.lb, self.ub))
+            self.send_if_new(self.parent, Cost(dict(self.context), self.lb, self.ub))
 
     def _choose(self) -> None:
         if self.threshold == self.ub:
-            self.take(self.cheapest(self.upper))
+            self.assign(self.cheapest(self.upper))
         elif self.lower[self.index] > self.threshold:
-            self.take(self.cheapest(self.lower))
+            self.assign(self.cheapest(self.lower))
 
-    def _hear_cost(self, child: str, context: Mapping[str, Entry], lb: Number, ub: Number) -> None:
+    def _store_cost(self, child: str, context: Mapping[str, Entry], lb: Number, ub: Number) -> None:
         self.merge(context)
         index = self.bound(child, context, lb, ub)
         if index is not None:
@@ -147,12 +146,12 @@ class ADOPT(BoundingProtocol):
         clamp_share(self.t[child], self.bounds[child], index)
 
     def _maintain_allocation_invariant(self) -> None:
-        """Split the threshold into the own cost and the children's shares; send the shares."""
+        """Split the threshold into this robot's cost and the children's shares; send the shares."""
         index = self.index
-        if self.threshold == INFINITE:  # no value is worth a try in this context, and the parent will know
+        if self.threshold == INFINITE:  # no value is possible in this context, as the parent will learn
             return
         split_threshold(self.threshold - self.delta[index], self.t, self.bounds, index)
         for child, t in self.t.items():
             scope = self.bounds[child].scope
             context = {name: value for name, (value, _) in self.context.items() if name in scope}
-            self.tell(child, Threshold(t[index], context))
+            self.send_if_new(child, Threshold(t[index], context))

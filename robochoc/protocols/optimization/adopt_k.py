@@ -8,9 +8,9 @@ infinite k as BnB-ADOPT.
 - **When to use**: costs, a sparse graph, little memory.
 - **Guarantees**: complete for every k; it terminates with an optimum, or with a proof that there is no solution. The
   number of messages is exponential, memory is linear in values and children.
-- **Parameters (`--set`)**: `k`, how far above ADOPT's threshold the lower bound of a value may rise (default 1000);
-  a whole number from 1, or `inf`. It is in units of the costs' last decimal place. Best is two or three times what
-  one constraint costs at most, or anything above. `heuristic`: as in `bnb_adopt`.
+- **Parameters (`--set`)**: `k`, the maximum rise of a value's lower bound above ADOPT's threshold (default 1000);
+  a whole number from 1, or `inf`. It is in units of the costs' last decimal place. Two or three times the largest cost
+  of a constraint, or more, works best. `heuristic`: as in `bnb_adopt`.
 - **Reference**: Gutierrez, Meseguer, Yeoh: "Generalizing ADOPT and BnB-ADOPT", IJCAI 2011.
 
 The procedures are BnB-ADOPT's (`bnb_adopt`), and ADOPT's of the threshold:
@@ -19,23 +19,23 @@ The procedures are BnB-ADOPT's (`bnb_adopt`), and ADOPT's of the threshold:
     MaintainThresholdInvariant         `act`
     MaintainCurrentThresholdInvariant  `_current_threshold`
     MaintainChildThresholdInvariant    `bound`
-    MaintainAllocationInvariant        `tell_values`
+    MaintainAllocationInvariant        `send_values`
 
 Choices that the paper leaves open, and differences:
 
 - All of BnB-ADOPT+'s hold here: redundant messages are saved, constraints may be n-ary and hard.
-- With the same value, a child is told a lower TH^A, but no higher one: it does not need that to go on. (ADOPT tells
-  both, in a message of its own.) Measured, this saves messages for every k.
-- A changed context sets TH^A to 0, as it is not known whether it holds there.
-- TH^A stays when the parent has ended. It is then the least cost of the subtree or less, so that a robot whose UB is no
-  more need not search on.
-- With an infinite k nobody is told a TH^A, and all messages are BnB-ADOPT+'s. A large finite k is not quite the same:
-  where TH^A = UB, a robot takes the value with the least UB, as in ADOPT.
+- With the same value, a child receives a lower TH^A, but not a higher one, which it does not need to continue. (ADOPT
+  sends both, in a separate message.) Measured, this saves messages for every k.
+- A changed context sets TH^A to 0, as it may not be valid there.
+- TH^A is kept when the parent has ended. It is then at most the least cost of the subtree, so that a robot whose UB is
+  not higher need not search further.
+- With an infinite k no TH^A is sent, and all messages are BnB-ADOPT+'s. A large finite k is not quite the same: where
+  TH^A = UB, a robot takes the value with the least UB, as in ADOPT.
 
 Termination: as in BnB-ADOPT, with one more condition. At quiescence there is a highest robot that has not terminated,
-with LB < UB, LB < TH^B, and TH^A < UB. For its value d, LB(d) < min(TH^B, UB), so each child has lb < TH^B of its own.
-What is split among the children is less than UB(d), so for some child t < ub, and thus TH^A < UB there: it was told
-every lower t. And so on, down to a leaf, where LB = UB: a contradiction.
+with LB < UB, LB < TH^B, and TH^A < UB. For its value d, LB(d) < min(TH^B, UB), so each child has lb < its TH^B. The
+allowance split among the children is less than UB(d), so for some child t < ub, and thus TH^A < UB there, as it has
+received every lower t. And so on, down to a leaf, where LB = UB: a contradiction.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -68,7 +68,7 @@ from robochoc.solver.compiled import LocalProblem
 class ADOPTkSettings(BnBADOPTSettings, frozen=True):
     """`k`: a value is left when its lower bound is k above the threshold; 1: as ADOPT does, `inf`: as BnB-ADOPT.
 
-    `heuristic`: where lower bounds begin: at 0 (`none`), or at what children say before the search (`dp`).
+    `heuristic`: the initial lower bounds: 0 (`none`), or bounds that children send before the search (`dp`).
     """
 
     may_be_infinite: ClassVar[frozenset[str]] = frozenset({"k"})
@@ -76,7 +76,6 @@ class ADOPTkSettings(BnBADOPTSettings, frozen=True):
     k: int | float = 1000
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` unless `k` is a whole number from 1, or infinite."""
         if self.k != INFINITE and (self.k < 1 or not isinstance(self.k, int)):
             raise ValueError(f"k is {self.k}; it must be a whole number, 1 or more, or inf")
 
@@ -121,7 +120,7 @@ class ADOPTk(BnBADOPT):
         self.t: dict[str, list[Number]] = {}
 
     def handle(self, sender: str, message: Message) -> None:
-        """Take the allowance of a Value of the parent, besides what BnB-ADOPT does."""
+        """Process the message as in BnB-ADOPT; also store the allowance of the parent's Value."""
         super().handle(sender, message)
         if isinstance(message, Value) and sender == self.parent:
             self.allowance = message.allowance
@@ -132,7 +131,7 @@ class ADOPTk(BnBADOPT):
         super().act()
 
     def drop_threshold(self) -> None:
-        """Forget both thresholds, which were for another context, and request them."""
+        """Forget both thresholds of the previous context, and request new ones."""
         super().drop_threshold()
         self.allowance = 0
 
@@ -143,7 +142,7 @@ class ADOPTk(BnBADOPT):
 
     @property
     def leaves(self) -> bool:
-        """Whether the own value is to be left: LB(d) is k above TH^A, or has reached UB or TH^B."""
+        """Whether to leave the value: LB(d) is k above TH^A, or has reached UB or TH^B."""
         return self.lower[self.index] >= self.allowance + self.settings.k or super().leaves
 
     # The children's shares of the allowance
@@ -153,9 +152,9 @@ class ADOPTk(BnBADOPT):
         super().forget(child)
         self.t[child] = [*self.bounds[child].lb]
 
-    def take_floor(self, child: str, costs: list[Number]) -> None:
-        """Raise the lower bounds of `child`, and its share, to what its subtree costs at least."""
-        super().take_floor(child, costs)
+    def raise_floor(self, child: str, costs: list[Number]) -> None:
+        """Raise the lower bounds of `child`, and its share, to the least cost of its subtree."""
+        super().raise_floor(child, costs)
         for index in range(len(costs)):
             clamp_share(self.t[child], self.bounds[child], index)
 
@@ -166,27 +165,27 @@ class ADOPTk(BnBADOPT):
             clamp_share(self.t[child], self.bounds[child], index)
         return index
 
-    def tell_values(self) -> None:
-        """Split the allowance among the children, and tell them what changed."""
+    def send_values(self) -> None:
+        """Split the allowance among the children, and send them the changes."""
         allowance = self._current_threshold
         if allowance != INFINITE:
             split_threshold(allowance - self.delta[self.index], self.t, self.bounds, self.index)
-        super().tell_values()
+        super().send_values()
 
     @property
     def _current_threshold(self) -> Number:
-        """TH^A, kept within the bounds of the own value: LB(d) may be above it."""
+        """TH^A, limited to the bounds of the value: LB(d) may be above it."""
         return min(max(self.allowance, self.lower[self.index]), self.upper[self.index])
 
     def value_for(self, name: str) -> Value:
-        """Return the own value, and both thresholds of `name` if it is a child."""
+        """Return this robot's value, and both thresholds of `name` if it is a child."""
         value = super().value_for(name)
         shared = name in self.t and not self._searches_depth_first
         return Value(value.value, value.counter, value.threshold, self.t[name][self.index] if shared else 0)
 
-    def is_news(self, value: bnb_adopt.Value, last: bnb_adopt.Value) -> bool:
-        """Return whether a child that was told `last` has to be told `value`."""
-        return super().is_news(value, last) or cast("Value", value).allowance < cast("Value", last).allowance
+    def must_send(self, value: bnb_adopt.Value, last: bnb_adopt.Value) -> bool:
+        """Return whether `value` must be sent to a child that was sent `last`."""
+        return super().must_send(value, last) or cast("Value", value).allowance < cast("Value", last).allowance
 
     @property
     def _searches_depth_first(self) -> bool:

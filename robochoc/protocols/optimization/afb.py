@@ -3,8 +3,8 @@
 Complete search for minimum cost with a current partial assignment (CPA), which goes from robot to robot in priority
 order. Copies of it go to all lower robots, which answer with an estimate: a lower bound on the cost of adding their own
 values. The sender does not wait. Once the CPA and the estimates cost as much as the best solution (B), it takes its
-next value, wherever the CPA is by then. So several CPAs may be under way. Each value carries its robot's counter of
-assignments (together the time-stamp). The first counter that differs tells which CPA is stronger; the others are
+next value, wherever the CPA is at that moment. So there may be several CPAs. Each value carries its robot's counter of
+assignments (together the time-stamp). The first counter that differs decides which CPA is stronger; the others are
 obsolete.
 
 - **When to use**: costs, a dense graph, little memory.
@@ -26,10 +26,10 @@ bound for the whole team. The CPA goes back to the last robot of the shortest pr
 solution with that prefix is better. (The paper's bound has no estimates of the robots in between. Wahbi, Ezzahir,
 Bessiere: "Asynchronous forward bounding revisited", CP 2013, also send one bound for each prefix.)
 
-An estimate is the minimum over the own values of the cost with the prefix plus h, a lower bound on constraints with
-lower robots only. So each constraint is in at most one term: in its highest robot's h until that robot has a value;
-later, once all others of the scope have values, in the estimate of the lowest robot, which pays it in the end. h is
-computed from the declared domains, without messages; for robots that may withdraw it is 0.
+An estimate is the minimum, over the robot's values, of the cost with the prefix plus h, a lower bound on constraints
+with lower robots only. So each constraint is in at most one term: in its highest robot's h until that robot has a
+value; later, once all others of the scope have values, in the estimate of the lowest robot, which pays it in the end.
+h is computed from the declared domains, without messages; for robots that may withdraw it is 0.
 
 Choices that the paper leaves open, and differences:
 
@@ -38,7 +38,7 @@ Choices that the paper leaves open, and differences:
 - Estimates are kept as long as their prefix is valid. Robots are asked only when their estimates may have changed, and
   answer only with new ones. The next robot's answer is about the CPA itself.
 - A robot also checks its bound when B has changed, and when the CPA arrives.
-- Every CPA carries B, so that no robot concludes that there is no solution while the message about one is under way.
+- Every CPA carries B, so that no robot concludes that there is no solution while the message about one is in transit.
 - A robot that finds that no prefix allows a better solution ends the search (`Terminate`).
 - A robot with an empty domain reports it at the start.
 
@@ -111,7 +111,7 @@ class CPA(Message, frozen=True):
         return f"no solution with {values} costs less than {cost_text(self.bound)}: take another value"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the cost of the CPA; sent back, what the last robot pays."""
+        # The cost of the CPA; if it was sent back, a lower bound on the last robot's cost.
         values = [value for value, _ in self.assignments]
         found = partial_assignment(hearing.order, values)
         view = dict(zip(hearing.order, values, strict=False))
@@ -158,7 +158,7 @@ class FBEstimate(Message, frozen=True):
         return f"{last}; to its beginnings, the empty one first, at least {costs_text(shorter)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver. The last robot's estimates have nothing of robots below."""
+        # The last robot's estimates contain no costs of robots below.
         asked = [
             hearing.last(CPA, hearing.receiver, hearing.sender),
             hearing.last(FBCPA, hearing.receiver, hearing.sender),
@@ -188,7 +188,7 @@ class NewSolution(Message, frozen=True):
         return f"the best solution so far costs {cost_text(self.cost)}: {words.partial(self.values)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: a robot takes these values unless it hears of better ones."""
+        # Robots take these values unless a better solution follows.
         view = dict(zip(hearing.order, self.values, strict=False))
         return [Total(view, self.cost), *(StandsAt(robot, value) for robot, value in view.items())]
 
@@ -202,7 +202,7 @@ class Terminate(Message, frozen=True):
         return "the search is over: no solution is better than the best one so far"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: to the last robot, that its last solution is taken."""
+        # The last robot learns that its last solution is final.
         best = hearing.last(NewSolution, hearing.receiver, hearing.sender)
         if best is None:
             return NOTHING
@@ -210,12 +210,12 @@ class Terminate(Message, frozen=True):
 
 
 class AFB(Protocol):
-    """One agent of AFB. State: the strongest known CPA (`assignments`), the own `counter`, and `bound` (B).
+    """One agent of AFB. State: the strongest known CPA (`assignments`), this robot's `counter`, and `bound` (B).
 
     These are set while this robot holds a CPA or has passed it on:
 
-    - `lower_bounds`: a lower bound for each prefix of the CPA, own estimate included.
-    - `paid`: the cost of the CPA. `cost`: the same with the own value.
+    - `lower_bounds`: a lower bound for each prefix of the CPA, including this robot's estimate.
+    - `paid`: the cost of the CPA. `cost`: the same with this robot's value.
     - `left`: the values not yet tried, the most costly first.
 
     `solution` is the best solution that this robot knows.
@@ -251,7 +251,7 @@ class AFB(Protocol):
         self._sent_estimates: dict[str, CPAEstimates] = {}
 
     def _cost_lookup(self) -> CostLookup:
-        """Return what finds the own costs; another one for those that know more of them."""
+        """Return the lookup of this robot's costs; subclasses that know more costs override it."""
         return CostLookup(self.problem, self.order)
 
     def start(self) -> None:
@@ -265,7 +265,6 @@ class AFB(Protocol):
             self.settle()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None or (self.over and not isinstance(message, NewSolution)):
             return
         match cast("CPA | FBCPA | FBEstimate | NewSolution | Terminate", message):
@@ -288,7 +287,7 @@ class AFB(Protocol):
             return
         came, self._came = self._came, None
         if came is not None:
-            self._take_up(came)
+            self._start_cpa(came)
         if self.lower_bounds is not None:
             self._assign_cpa(self.lower_bounds)
         self._send_fb_estimates()
@@ -305,10 +304,10 @@ class AFB(Protocol):
         """The best solution that this robot knows; for the first robot also a lower bound on all solutions."""
         return Findings(best=self.incumbent, bound=self._bound_of_all())
 
-    # What the messages do
+    # Messages
 
     def _receive_cpa(self, sender: str, cpa: CPA) -> None:
-        """Take up a CPA that is not obsolete; a CPA that returns with the current value rules that value out."""
+        """Continue a CPA that is not obsolete; a CPA that returns with the current value rules that value out."""
         self.bound = min(self.bound, cpa.bound)
         if len(cpa.assignments) > self.rank:
             if cpa.assignments[-1][1] == self.counter:
@@ -327,7 +326,7 @@ class AFB(Protocol):
         self.solution = solution
         self.bound = min(self.bound, solution.cost)
         if self.over:
-            self._take_best()
+            self._adopt_best()
 
     def _update(self, assignments: list[Assignment]) -> bool:
         """Return whether a CPA is not obsolete. Keep the strongest CPA; drop the work on a weaker one."""
@@ -340,9 +339,9 @@ class AFB(Protocol):
         self.lower_bounds = self._came = self.value = None
         return True
 
-    # The one who holds the CPA
+    # The holder of the CPA
 
-    def _take_up(self, lower_bounds: list[Cost]) -> None:
+    def _start_cpa(self, lower_bounds: list[Cost]) -> None:
         """Compute the costs of all values for the CPA, unless its bound already rules it out."""
         self.lower_bounds, self.paid, self.left = lower_bounds, lower_bounds[-1], []
         if self._backtrack_to(lower_bounds, self.estimates.totals(stamp_of(self.assignments))) is None:
@@ -362,7 +361,7 @@ class AFB(Protocol):
                 if self.cost + totals[-1] < self.bound:
                     return
                 self.value = None
-            if not self.left or self.paid + self.costs.at_least(self.left[-1]) + totals[self.rank] >= self.bound:
+            if not self.left or self.paid + self.costs.lower_bound(self.left[-1]) + totals[self.rank] >= self.bound:
                 self._backtrack(self.rank)
                 return
             self._assign(self.left.pop())
@@ -370,7 +369,7 @@ class AFB(Protocol):
                 return
 
     def _pass_on(self, lower_bounds: list[Cost]) -> bool:
-        """Send the CPA with the own value to the next robot. Return False if it is complete: it is a solution."""
+        """Send the CPA with this robot's value to the next robot. Return False if it is complete: it is a solution."""
         if not self.below:
             self._send_new_solution()
             return False
@@ -390,7 +389,7 @@ class AFB(Protocol):
         self._send_fb_cpas(cpa, self.below[1:])
 
     def _send_fb_cpas(self, cpa: list[Assignment], robots: Sequence[str]) -> None:
-        """Ask those of `robots` whose estimates may change."""
+        """Ask the `robots` whose estimates may change."""
         stamp = stamp_of(cpa)
         for robot in robots:
             if self.estimates.outdated(robot, stamp):
@@ -424,7 +423,7 @@ class AFB(Protocol):
                 if robot != self.problem.agent:
                     self.send(robot, Terminate())
 
-    # The others, and the end
+    # The other robots, and the end
 
     def _send_fb_estimates(self) -> None:
         """Send estimates to all robots that requested them and whose CPA is not obsolete."""
@@ -440,10 +439,10 @@ class AFB(Protocol):
 
     def _stop(self) -> None:
         self.over = True
-        self._take_best()
+        self._adopt_best()
 
-    def _take_best(self) -> None:
-        """Decide for the own value in the best solution. Its message may arrive after `Terminate`."""
+    def _adopt_best(self) -> None:
+        """Take this robot's value in the best solution. Its message may arrive after `Terminate`."""
         self.value = None if self.solution is None else self.problem.values.index(self.solution.values[self.rank])
 
     def _bound_of_all(self) -> Cost | None:
@@ -457,12 +456,12 @@ class AFB(Protocol):
         if self.value is not None:
             ways.append(self.cost + totals[-1])
         if self.left:
-            ways.append(self.costs.at_least(self.left[-1]) + totals[0])
+            ways.append(self.costs.lower_bound(self.left[-1]) + totals[0])
         return min(ways)
 
     @property
     def _cpa(self) -> list[Assignment]:
-        """The CPA, with the own value if there is one."""
+        """The CPA, with this robot's value if it has one."""
         if self.value is None:
             return self.assignments
         return [*self.assignments, (self.problem.values[self.value], self.counter)]

@@ -1,4 +1,4 @@
-"""Lower bounds of AFB: the own estimates for each beginning of a CPA, and those that robots below have told."""
+"""Lower bounds of AFB: a robot's estimates for each prefix of a CPA, and the estimates received from robots below."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ Cost = int | float
 """Costs are integers, and `inf` where a hard constraint is broken."""
 
 Assignment = tuple[Value, int]
-"""A robot's value, and the counter that says how many it has taken so far."""
+"""A robot's value, and the number of values that it has taken so far."""
 
 Stamp = Sequence[int]
 """The time-stamp of a CPA: its robots' counters. Counters are never reused, so it identifies the assignments."""
 
 
 class CostLookup:
-    """The costs of the own values for each prefix of a CPA. Each constraint is evaluated once per prefix.
+    """The costs of this robot's values for each prefix of a CPA. Each constraint is evaluated once per prefix.
 
     The prefix that a CPA shares with the last one is not evaluated again. `estimates` holds, for each prefix, the empty
-    one first, the minimum cost over the own values, including h.
+    one first, the minimum cost over this robot's values, including h.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -56,21 +56,21 @@ class CostLookup:
             self._add(self._names[length], assignments[length][0], length + 1)
 
     def shared(self, length: int) -> list[Cost]:
-        """Return the estimates for prefixes up to `length`, without those at the end that repeat the one before."""
+        """Return the estimates for prefixes up to `length`, without repetitions at the end."""
         return self.estimates[: self._depths[length] + 1]
 
     @property
     def last(self) -> list[Cost]:
-        """The cost of each own value with the last assignments."""
+        """The cost of each value of this robot with the last assignments."""
         return self._rows[-1]
 
-    def at_least(self, index: int) -> Cost:
+    def lower_bound(self, index: int) -> Cost:
         """Return a lower bound for the value at `index`: its cost with the last assignments, plus h."""
         return self._rows[-1][index] + self._ahead[index]
 
     def by_decreasing_cost(self) -> list[int]:
-        """Return all own values by decreasing `at_least`; among equals, the first value is last."""
-        return sorted(range(len(self._problem.values) - 1, -1, -1), key=self.at_least, reverse=True)
+        """Return all values of this robot by decreasing lower bound; among equals, the first value is last."""
+        return sorted(range(len(self._problem.values) - 1, -1, -1), key=self.lower_bound, reverse=True)
 
     def _add(self, robot: str, value: Value, length: int) -> None:
         self._view[robot] = value
@@ -85,7 +85,7 @@ class CostLookup:
         self.estimates.append(self._estimate(self._rows[-1]))
 
     def _added(self, robot: str) -> Sequence[Cost] | None:
-        """Return what each own value costs more with the value of `robot`, the lowest one known; None: nothing."""
+        """Return the additional cost of each value with the value of `robot`, the lowest one known; None: no cost."""
         return self._problem.added(robot, self._view)
 
     def _estimate(self, row: Sequence[Cost]) -> Cost:
@@ -93,7 +93,7 @@ class CostLookup:
 
     @cached_property
     def _ahead(self) -> list[Cost]:
-        """A lower bound on each own value's cost with lower-priority robots only (h)."""
+        """A lower bound on each value's cost with lower-priority robots only (h)."""
         return self._problem.lower_bounds(self._below)
 
 
@@ -132,9 +132,9 @@ class Estimates:
         self._received: dict[str, CPAEstimates] = {}
 
     def outdated(self, robot: str, stamp: Stamp) -> bool:
-        """Return whether `robot` may have another estimate than for the last CPA that it was asked about.
+        """Return whether the estimate of `robot` may differ from that for the last CPA sent to it.
 
-        The first estimates that a robot sends show on how many robots' values its estimates depend.
+        The first estimates that a robot sends show the number of robots on whose values they depend.
         """
         if robot not in self._received:
             return self._asked.get(robot) != stamp

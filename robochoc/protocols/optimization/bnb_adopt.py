@@ -2,13 +2,13 @@
 
 Complete search for minimum cost on a pseudo-tree: ADOPT's messages and bounds, with depth-first branch and bound
 instead of best-first search. A robot keeps its value until LB(d) reaches the cost of the best known complete solution
-(UB), or its threshold (TH). It sends far fewer messages than ADOPT, as it does not return to the same values again and
-again.
+(UB), or its threshold (TH). It sends far fewer messages than ADOPT, as it does not return to the same values
+repeatedly.
 
 - **When to use**: costs, a sparse graph, little memory.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
-- **Parameters (`--set`)**: `heuristic`. With `dp`, children first say what their subtrees cost at least for each value
-  of their parent (two messages a robot), and lower bounds begin there; with `none` (default) they begin at 0.
+- **Parameters (`--set`)**: `heuristic`. With `dp`, children first send lower bounds on the costs of their subtrees for
+  each value of their parent (two messages a robot); with `none` (default) lower bounds are 0 at first.
 - **References**: Yeoh, Felner, Koenig: "BnB-ADOPT: an asynchronous branch-and-bound DCOP algorithm", JAIR 38, 2010,
   Section 4; for redundant messages: Gutierrez, Meseguer: "Saving redundant messages in BnB-ADOPT", AAAI 2010;
   for the heuristic: Ali, Koenig, Tambe: "Preprocessing techniques for accelerating the DCOP algorithm ADOPT", AAMAS
@@ -25,8 +25,8 @@ Choices that the papers leave open, and differences:
 
 - Constraints may be n-ary, and there may be several trees (see `adopt`, also for hard constraints and unknown values
   of neighbours above).
-- Heuristic values h of a child count what it pays with its parent, and the h of its own children; what it pays with
-  others above is left out. A robot begins once it has those of all its children.
+- Heuristic values h of a child include its costs with its parent, and the h of its own children, but not its costs with
+  other robots above. A robot begins once it has the values of all its children.
 - A context grows as values become known; there is no initial value that all robots know. A value that was unknown
   before does not invalidate the threshold.
 - Bounds are computed when the inbox has been drained, also for InitSelf. The ID grows when the value changes. SCP of a
@@ -73,7 +73,7 @@ from robochoc.system.compiling import mypyc_attr
 class BnBADOPT(DepthFirstProtocol):
     """One agent of BnB-ADOPT+. State besides the search's (`depth_first`): `floors`.
 
-    These are, for each own value, what the subtree of each child costs at least in any context (h).
+    They are, for each value of this robot, the least cost of each child's subtree in any context (h).
     """
 
     messages: ClassVar[Any] = TreeMessage | Value | Cost | Domain | Floor | Terminate
@@ -107,38 +107,37 @@ class BnBADOPT(DepthFirstProtocol):
             super().decide()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Value | Cost | Domain | Floor | Terminate", message):
             case Domain(values):
-                self._take_domain(sender, values)
+                self._store_domain(sender, values)
             case Floor(costs):
-                self.take_floor(sender, costs)
+                self.raise_floor(sender, costs)
             case _:
                 super().handle(sender, message)
 
     # Floors
 
-    def _take_domain(self, sender: str, values: list[message.Value]) -> None:
+    def _store_domain(self, sender: str, values: list[message.Value]) -> None:
         """Note the values of the parent."""
         if sender != self.parent or self._parent_values is not None or not values:
-            raise ValueError(f"{sender} has no values to tell")
+            raise ValueError(f"unexpected values from {sender}")
         for value in values:
             self.problem.refuse_value(sender, value)
         self._parent_values = values
-        self._tell_floor()
+        self._send_floor()
 
-    def take_floor(self, child: str, costs: list[Number]) -> None:
-        """Raise the lower bounds of `child` to what its subtree costs at least."""
+    def raise_floor(self, child: str, costs: list[Number]) -> None:
+        """Raise the lower bounds of `child` to the least costs of its subtree."""
         if child not in self.bounds or child in self.floors or len(costs) != len(self.problem.values):
-            raise ValueError(f"{child} has no floor to tell")
+            raise ValueError(f"unexpected or repeated floor from {child}")
         self.floors[child] = costs
         bounds = self.bounds[child]
         bounds.lb = [max(pair) for pair in zip(bounds.lb, costs, strict=True)]
         self._moved = True
-        self._tell_floor()
+        self._send_floor()
 
-    def _tell_floor(self) -> None:
-        """Tell the parent the floor, once the parent's values and all children's floors are known."""
+    def _send_floor(self) -> None:
+        """Send the parent the floor, once the parent's values and all children's floors are known."""
         if self.parent is None or self._parent_values is None or len(self.floors) < len(self.children):
             return
         below = [sum(costs) for costs in zip(*self.floors.values(), strict=True)] or [0] * len(self.problem.values)

@@ -1,50 +1,52 @@
 """BnB-ADOPT+ with soft arc consistency (BnB-ADOPT+-FDAC, BnB-ADOPT+-AC).
 
 Complete search for minimum cost on a pseudo-tree. Before the search, costs are moved up the tree: a robot below hands
-over what each value of a robot above costs it at least, and the robot above counts that as its own. So robots above
-begin with good values, and with lower bounds near the optimum. Then BnB-ADOPT+ searches the problem as it is now, which
-costs the same in every assignment. Mostly that saves half or more of its messages.
+over its least cost with each value of a robot above, and the robot above counts it as its own cost. So robots above
+begin with good values, and with lower bounds near the optimum. Then BnB-ADOPT+ searches the resulting problem, in which
+every assignment has the same cost as before. This usually saves half or more of its messages.
 
 - **When to use**: costs, little memory, fewer messages than with `bnb-adopt`.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
-- **Parameters (`--set`)**: `level`. With `fdac` (default), full directional arc consistency: what a robot has to pay
-  itself is moved up too, with what robots below have moved to it. With `ac`, arc consistency: costs are moved out of
-  constraints only, and to the parent what the cheapest own value costs.
+- **Parameters (`--set`)**: `level`. With `fdac` (default), full directional arc consistency: a robot's unary costs are
+  moved up too, including the costs that robots below have moved to it. With `ac`, arc consistency: costs are moved only
+  out of constraints, and the cost of the robot's cheapest value to its parent.
 - **References**: Gutierrez, Meseguer: "BnB-ADOPT+ with several soft arc consistency levels", ECAI 2010, and "Improving
   BnB-ADOPT+-AC", AAMAS 2012; for the operations: Larrosa, Schiex: "In the quest of the best form of local consistency
   for weighted CSP", IJCAI 2003; for the search: `bnb_adopt`.
 
-What the papers call:
+The papers' terms:
 
     unary costs C_i          `unary`                     projection        `SoftArc.project_up`, `project_down`
     binary costs C_ij        `SoftArc.costs`             extension         within `project_up`
     C_phi                    the root's least `unary`    AC*, FDAC*        `move_costs`
 
-Who pays: a constraint is paid by its lowest robot on the tree, and that one alone moves its costs, to itself and to the
-other end. So no two robots ever change the same table, and nobody needs a copy of it: a robot above has to know the sum
-that it gets. A robot moves costs when those of all robots below have come. What it moves changes only tables of robots
-further up, so one pass from the leaves to the roots is the fixpoint: two messages for each pair with a binary
-constraint, and for each parent and child.
+Ownership: the lowest robot of a constraint on the tree pays it, and only this robot moves its costs, to itself and to
+the other end. So no two robots ever change the same table, and no robot needs a copy of it: a robot above only needs
+the sum that it receives. A robot moves costs when those of all robots below have arrived. Its moves change only tables
+of robots further up, so one pass from the leaves to the roots reaches the fixpoint: two messages for each pair with a
+binary constraint, and for each parent and child.
 
-In the search, delta of a robot with the values `a` above is what it pays in the given problem, plus what was moved to
-its value, minus what it has moved to `a`. Of a robot above whose value is unknown, only what was put into the arc is
-missing, so delta is never negative and grows as values become known: all that bounds rest on. Infinite costs are moved,
-never subtracted. A value that is infinite after the moves stays so, and is taken out of everything else.
+In the search, delta of a robot with the values `a` above is its cost in the given problem, plus the costs moved to its
+value, minus the costs it has moved to `a`. For a robot above whose value is unknown, only the costs put into the arc
+are missing, so delta is never negative and grows as values become known, which is all that the bounds require. Infinite
+costs are moved, never subtracted. A value with infinite cost after the moves keeps it, and is ignored elsewhere.
 
 Choices that the papers leave open, and differences:
 
 - The tree takes the place of the papers' total order: costs are moved up branches.
 - In the papers a copy of the costs is kept consistent, and the search uses the given ones: consistency serves to delete
-  values while the search goes on. Here the search uses the moved costs, and nothing is deleted: measured, deletions
-  cost as many messages as they save then (docs/explanation/replications.md).
-- All binary constraints between two robots are one arc, also where robots have several variables. Constraints over more
-  robots are not moved, nor are tables of more than 65,536 entries. The parent gets what every own value costs at least,
-  even if there is no constraint.
-- A robot whose values all cost infinity after the moves ends the search of all.
-- A robot begins its search with the first value of its parent. What it told before would be told anew then.
+  values during the search. Here the search uses the moved costs, and nothing is deleted: measured, deletions would cost
+  as many messages as they save (docs/explanation/replications.md).
+- All binary constraints between two robots are one arc, also if robots have several variables. Costs of constraints
+  over more robots are not moved, nor those of tables with more than 65,536 entries. The parent receives the cost of the
+  cheapest value even if there is no constraint.
+- A robot whose values all have infinite cost after the moves ends the search of all.
+- A robot begins its search with the first value of its parent. Earlier messages would have to be repeated then.
 
-Termination: as in `bnb_adopt`. Domains come from above at once, and costs from below, leaves first; then the roots
-have their costs, and tell values, and so on down the tree: every robot begins its search.
+Termination: as in `bnb_adopt`. Domains arrive from above at once, and costs from below, leaves first; then the roots
+have their costs and send values, and so on down the tree: every robot begins its search.
+
+Bounds and thresholds in messages are on costs after the moves: a subtree that costs 7, and has moved 5 up, sends 2.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -84,9 +86,9 @@ class SoftArc:
     """The binary constraints with one robot above.
 
     Attributes:
-        costs: What is left in the arc: a row for each value of that robot, with an entry for each own value.
-        up: For each row, what was moved to that robot's value. Infinite: no own value goes with it.
-        put_in: For each own value, what was moved into the arc, less what was moved out of it to that value.
+        costs: The costs left in the arc: a row for each value of that robot, with an entry for each value of this one.
+        up: For each row, the cost moved to that robot's value. Infinite: all of this robot's values conflict with it.
+        put_in: For each value of this robot, the cost moved into the arc, less the cost moved out of it to that value.
     """
 
     def __init__(self, costs: Sequence[Row], size: int) -> None:
@@ -97,8 +99,8 @@ class SoftArc:
     def project_up(self, own: Row, *, extending: bool) -> bool:
         """Move costs to the values above; return whether there were any.
 
-        With `extending`, as much of the `own` unary costs goes with them as can: full arc consistency of the robot
-        above.
+        With `extending`, as much of the `own` unary costs as possible is moved with them: full arc consistency of the
+        robot above.
         """
         live = _live(own)
         gains = [min([(own[i] if extending else 0) + row[i] for i in live], default=INFINITE) for row in self.costs]
@@ -113,7 +115,7 @@ class SoftArc:
         return moved
 
     def project_down(self, own: Row) -> bool:
-        """Move what each own value costs at least, whatever value is above, to the `own` costs; return if any."""
+        """Move the least cost of each value, over all values above, to the `own` costs; return whether any moved."""
         rows = [row for row, _ in self._rows(self.up)]
         moved = False
         for index in _live(own):
@@ -127,7 +129,7 @@ class SoftArc:
         return moved
 
     def move_least(self, own: Row) -> None:
-        """Move what the cheapest of the `own` values costs to all values above."""
+        """Move the least of the `own` costs to all values above."""
         least = min(own)
         self.up = [up + least for up in self.up]
         for index in _live(own):
@@ -135,7 +137,7 @@ class SoftArc:
             self.put_in[index] += least
 
     def _extend(self, own: Row, rows: Sequence[tuple[Row, Number]]) -> None:
-        """Move so much of the `own` costs into the arc that each of `rows` can give what it is to gain."""
+        """Move enough of the `own` costs into the arc for each of `rows` to yield its gain."""
         for index in _live(own):
             needed = max([gain - row[index] for row, gain in rows], default=0)
             if needed > 0:
@@ -152,11 +154,11 @@ class SoftArc:
 
 
 def move_costs(own: Row, arcs: Sequence[SoftArc], *, extending: bool) -> None:
-    """Make `arcs` soft arc consistent; of the `own` costs remain what could not be moved up.
+    """Make `arcs` soft arc consistent; costs that could not be moved up remain in `own`.
 
     Args:
-        own: What each own value costs by itself, with what robots below have moved to it. It is changed.
-        arcs: The arcs, that of the parent first: it gets what every own value costs at least (C_phi).
+        own: The unary cost of each value, including the costs that robots below have moved to it. It is changed.
+        arcs: The arcs, that of the parent first: the parent receives the least cost of all values (C_phi).
         extending: Full directional arc consistency (FDAC*): unary costs are moved up. Otherwise arc consistency (AC*).
     """
     going_on = bool(arcs)
@@ -174,13 +176,13 @@ def _live(own: Row) -> list[int]:
 
 
 class BnBADOPTFDACSettings(Settings, frozen=True):
-    """`level`: how costs are moved before the search: `fdac` (full directional), or only out of constraints (`ac`)."""
+    """`level`: the movement of costs before the search: full directional (`fdac`), or only from constraints (`ac`)."""
 
     level: Literal["fdac", "ac"] = "fdac"
 
 
 class Domain(Message, frozen=True):
-    """The sender's values, and a request for what can be moved to them."""
+    """The sender's values, and a request to move costs to them."""
 
     values: list[message.Value]
 
@@ -196,7 +198,7 @@ class Domain(Message, frozen=True):
 class Moved(Message, frozen=True):
     """For each value of the receiver, a cost of the sender's subtree that the receiver counts as its own from now on.
 
-    Infinite: no value of the sender goes with that value.
+    Infinite: all values of the sender conflict with that value.
     """
 
     costs: list[Number]
@@ -208,11 +210,8 @@ class Moved(Message, frozen=True):
         return f"count as your own, with your values one by one: {told}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver.
-
-        Costs of robots below the sender, and of its constraints with others, may be among the moved ones. So something
-        is proven only if there are no others: each of its values costs at least that much then.
-        """
+        # Costs of robots below the sender, and of its constraints with others, may be among the moved ones. So there
+        # is a proof only if there are no such robots: then each of the sender's values costs at least that much.
         values = hearing.values(hearing.receiver)
         if not hearing.is_only_neighbour() or values is None or len(values) != len(self.costs):
             return NOTHING
@@ -221,7 +220,7 @@ class Moved(Message, frozen=True):
 
 
 class Value(bnb_adopt.Value, frozen=True):
-    """The sender's value, the number of its changes (ID), and the receiver's threshold (TH) after what it moved up."""
+    """The sender's value, the number of its changes (ID), and the receiver's threshold (TH), less costs moved up."""
 
     def in_words(self, words: Wording) -> str:
         change = f"{words.own_value(self.value)} from now on (change {self.counter})"
@@ -231,7 +230,7 @@ class Value(bnb_adopt.Value, frozen=True):
 
 
 class Cost(bnb_adopt.Cost, frozen=True):
-    """Bounds on the cost of the sender's subtree in `context`, after what it moved up, and a threshold request."""
+    """Bounds on the cost of the sender's subtree in `context`, less costs moved up, and a threshold request."""
 
     def in_words(self, words: Wording) -> str:
         told = bounds_in_words(words, self.context, self.lb, self.ub)
@@ -239,23 +238,20 @@ class Cost(bnb_adopt.Cost, frozen=True):
         return f"{told}{beyond}{'; tell me my threshold again' if self.threshold_request else ''}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver.
-
-        Costs were moved out of the bounds, to robots that the receiver may not know. So the lower bound still is one,
-        where nobody is below the sender; of the upper bound only remains that it is finite.
-        """
+        # Costs were moved out of the bounds, to robots that the receiver may not know. So the lower bound is valid only
+        # if no robot is below the sender; of the upper bound, only its finiteness can be used.
         return bounds_prove(self.context, self.lb, self.ub if math.isinf(self.ub) else FINITE, hearing)
 
 
 MAX_ENTRIES = 65_536
-"""Constraints with a robot above are left as they are if their table has more entries."""
+"""The maximum size of a table whose costs are moved."""
 
 
 class BnBADOPTFDAC(DepthFirstProtocol):
     """One agent of BnB-ADOPT+-FDAC.
 
-    State besides the search's: `moved_here`, for each own value what robots below have moved to it; `unary`, what it
-    costs by itself after this robot has moved costs (infinite: no solution has it); `arcs`, by robot above.
+    State besides the search's: for each value of this robot, `moved_here`, the cost that robots below have moved to it,
+    and `unary`, its unary cost after this robot has moved costs (infinite: no solution has it); `arcs`, by robot above.
     """
 
     messages: ClassVar[Any] = TreeMessage | Domain | Moved | Value | Cost | Terminate
@@ -279,14 +275,14 @@ class BnBADOPTFDAC(DepthFirstProtocol):
         """By robot above, the row of the arc for each of its values."""
         self._above: set[str] = set()
         self._below: set[str] = set()
-        """Robots above whose values, and below whose costs, are still to come."""
+        """Robots above whose values, and below whose costs, have not arrived yet."""
         self._given: list[Number] = []
-        """What each own value costs by itself in the given problem."""
+        """The unary cost of each value of this robot in the given problem."""
 
     # Before the search
 
     def begin(self) -> None:
-        """Tell own values to those below that may move costs to them."""
+        """Send the values to the robots below that may move costs to them."""
         super().begin()
         paired = {robots[0] for robots, _ in self.problem.scopes(self.problem.neighbours) if len(robots) == 1}
         self._above = {name for name in self.ancestors if name == self.parent or name in paired}
@@ -297,19 +293,18 @@ class BnBADOPTFDAC(DepthFirstProtocol):
         self._move()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | Moved | Value | Cost | Terminate", message):
             case Domain(values):
-                self._take_domain(sender, values)
+                self._store_domain(sender, values)
             case Moved(costs):
-                self._take_costs(sender, costs)
+                self._add_costs(sender, costs)
             case _:
                 super().handle(sender, message)
 
-    def _take_domain(self, sender: str, values: list[message.Value]) -> None:
-        """Note the values of a robot above, and look at the constraints with it."""
+    def _store_domain(self, sender: str, values: list[message.Value]) -> None:
+        """Store the values of a robot above, and tabulate the constraints with it."""
         if sender not in self._above or not values:
-            raise ValueError(f"{sender} has no values to tell")
+            raise ValueError(f"unexpected or repeated values from {sender}")
         for value in values:
             self.problem.refuse_value(sender, value)
         self._above.discard(sender)
@@ -322,10 +317,10 @@ class BnBADOPTFDAC(DepthFirstProtocol):
             self.arcs[sender] = SoftArc([self.problem.added_by(sender, {sender: value}) for value in values], size)
         self._move()
 
-    def _take_costs(self, sender: str, costs: list[Number]) -> None:
-        """Add what a robot below has moved to the own values."""
+    def _add_costs(self, sender: str, costs: list[Number]) -> None:
+        """Add the costs that a robot below has moved to this robot's values."""
         if sender not in self._below or len(costs) != len(self.problem.values) or not all(cost >= 0 for cost in costs):
-            raise ValueError(f"{sender} has no costs to move")
+            raise ValueError(f"unexpected or repeated costs from {sender}")
         self._below.discard(sender)
         self.moved_here = [here + cost for here, cost in zip(self.moved_here, costs, strict=True)]
         self._move()
@@ -357,12 +352,12 @@ class BnBADOPTFDAC(DepthFirstProtocol):
     # The search
 
     def decide(self) -> None:
-        """Compute the bounds and act, once costs were moved and the parent has a value."""
+        """Compute the bounds and act, once costs have been moved and the parent has a value."""
         if not self._waits and (self.parent is None or self.parent in self.context):
             super().decide()
 
     def costs_in(self, view: Mapping[str, message.Value]) -> list[Number]:
-        """Return what each own value pays here with the values in `view`, after what was moved."""
+        """Return the cost of each value with the values in `view`, after the moves."""
         shift = [
             INFINITE if unary == INFINITE else unary - given
             for unary, given in zip(self.unary, self._given, strict=True)
@@ -380,14 +375,14 @@ class BnBADOPTFDAC(DepthFirstProtocol):
     def _row(self, robot: str, value: message.Value) -> int:
         row = self._rows[robot].get(value)
         if row is None:
-            raise ValueError(f"{robot} has no such value")
+            raise ValueError(f"{robot} has no such value: {value}")
         return row
 
     def value_for(self, name: str) -> Value:
-        """Return the own value, and the threshold of `name` if it is a child."""
+        """Return this robot's value, and the threshold of `name` if it is a child."""
         value = super().value_for(name)
         return Value(value.value, value.counter, value.threshold)
 
     def bounds_for_parent(self) -> Cost:
-        """Return the bounds on what the subtree costs more than it has moved up."""
+        """Return the bounds on the subtree's cost, less the costs it has moved up."""
         return Cost(dict(self.context), self.lb, self.ub)

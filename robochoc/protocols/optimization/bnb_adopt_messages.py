@@ -17,7 +17,7 @@ from robochoc.protocols.settings import Settings
 
 
 class BnBADOPTSettings(Settings, frozen=True):
-    """`heuristic`: where lower bounds begin: at 0 (`none`), or at what children say before the search (`dp`)."""
+    """`heuristic`: the initial lower bounds: 0 (`none`), or bounds that children send before the search (`dp`)."""
 
     heuristic: Literal["none", "dp"] = "none"
 
@@ -74,7 +74,7 @@ class Domain(Message, frozen=True):
 
 
 class Floor(Message, frozen=True):
-    """For each value of the receiver, what the sender's subtree costs at least, whatever the others' values are (h)."""
+    """For each value of the receiver, the least cost of the sender's subtree, over all values of the others (h)."""
 
     costs: list[Number]
 

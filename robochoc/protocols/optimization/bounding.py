@@ -1,8 +1,8 @@
-"""The common base of ADOPT and BnB-ADOPT: contexts, and bounds on the cost of each own value.
+"""The common base of ADOPT and BnB-ADOPT: contexts, and bounds on the cost of each value of a robot.
 
 Names and formulas are those of both papers (`adopt`, `bnb_adopt`). In the present context the subtree of child l costs
-between `lb(d, l)` and `ub(d, l)` if this robot takes value d; with what is paid here, delta(d), that makes LB(d) and
-UB(d), and LB and UB are the least of them. A context says who above has which value; it is what a bound rests on.
+between `lb(d, l)` and `ub(d, l)` if this robot takes value d; with this robot's cost, delta(d), the sums are LB(d) and
+UB(d), and LB and UB are the least of them. A context contains the values of robots above on which a bound depends.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from robochoc.system.compiling import mypyc_attr
 
 
 class Bounds:
-    """Bounds on the cost of a child's subtree, for each own value, in a context.
+    """Bounds on the cost of a child's subtree, for each value of this robot, in a context.
 
     `scope` holds the ancestors, without this robot, on whose values the subtree depends, as far as the child has sent
     them.
@@ -41,7 +41,7 @@ class Bounds:
 class BoundingProtocol(TreeProtocol):
     """One agent with bounds. State: `context` (CurrentContext), and for each child its `bounds`.
 
-    - `counter`: the number of changes of the own value.
+    - `counter`: the number of changes of the value.
     - `lower` and `upper`: LB(d) and UB(d) for each value. `lb` and `ub`: LB and UB. They are computed when the inbox is
     empty, before `act`.
     - `last_values`: all ancestors have taken their final values. `terminated`: this robot has, too.
@@ -64,11 +64,11 @@ class BoundingProtocol(TreeProtocol):
         self._last: dict[tuple[str, type[Message]], Message] = {}
 
     def begin(self) -> None:
-        """Initialise the bounds with the own charges."""
+        """Initialise the bounds with this robot's charges."""
         for child in self.children:
             self.bounds[child] = Bounds(len(self.problem.values))
             self.forget(child)
-        self.take(self.cheapest(self.delta))
+        self.assign(self.cheapest(self.delta))
 
     @abstractmethod
     def act(self) -> None:
@@ -128,9 +128,9 @@ class BoundingProtocol(TreeProtocol):
     # Bounds
 
     def bound(self, child: str, context: Mapping[str, Entry], lb: Number, ub: Number) -> int | None:
-        """Store the bounds of a Cost of `child`, after its context was merged; return the own value they are for.
+        """Store the bounds of a Cost of `child`, after its context was merged; return the value that they apply to.
 
-        Return None if they are for no value: the child did not know it yet, or its context is obsolete.
+        Return None if there is no such value: the child did not know it yet, or its context is obsolete.
         """
         values = {name: value for name, (value, _) in context.items()}
         own = values.pop(self.problem.agent, None)
@@ -160,7 +160,7 @@ class BoundingProtocol(TreeProtocol):
         self.lb, self.ub = min(self.lower), min(self.upper)
 
     def costs_in(self, view: Mapping[str, message.Value]) -> list[Number]:
-        """Return what each own value pays here with the values of neighbours above in `view` (delta)."""
+        """Return the cost of each value here with the values of neighbours above in `view` (delta)."""
         return self.problem.costs(view)
 
     def cheapest(self, costs: Sequence[Number]) -> int:
@@ -175,9 +175,9 @@ class BoundingProtocol(TreeProtocol):
         """The neighbours above whose values are known."""
         return [name for name in self.ancestors if name in self.context]
 
-    # The own value, and what is said of it
+    # This robot's value, and messages about it
 
-    def take(self, index: int) -> None:
+    def assign(self, index: int) -> None:
         """Take the value at `index`."""
         if index != self.value:
             self.value = index
@@ -185,18 +185,18 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def index(self) -> int:
-        """The place of the own value in the domain; it exists after `begin`."""
+        """The place of the value in the domain; it exists after `begin`."""
         assert self.value is not None  # noqa: S101
         return self.value
 
     @property
     def own(self) -> Entry:
-        """The own value as an entry of a context."""
+        """This robot's value as an entry of a context."""
         return self.problem.values[self.index], self.counter
 
     @property
     def may_end(self) -> bool:
-        """Whether no ancestor will change its value any more."""
+        """Whether all ancestors' values are final."""
         return self.parent is None or self.last_values
 
     def terminate(self) -> None:
@@ -205,7 +205,7 @@ class BoundingProtocol(TreeProtocol):
         for child in self.children:
             self.send(child, Terminate({**self.context, self.problem.agent: self.own}))
 
-    def tell(self, receiver: str, message: Message) -> None:
+    def send_if_new(self, receiver: str, message: Message) -> None:
         """Send a message to `receiver` unless it is equal to the last one of its type sent there."""
         key = receiver, type(message)
         last = self._last.get(key)

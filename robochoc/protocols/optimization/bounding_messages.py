@@ -12,7 +12,7 @@ from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
 
 Entry = tuple[message.Value, int]
-"""A robot's value, and the counter that says how often it has changed (the ID of BnB-ADOPT)."""
+"""A robot's value, and the number of its changes (the ID of BnB-ADOPT)."""
 
 
 Context = dict[str, Entry]
@@ -20,7 +20,7 @@ Context = dict[str, Entry]
 
 
 Number = int | float
-"""Infinite where something hard is broken, or nothing is known yet; integers stay integers on the wire."""
+"""Infinite where a hard constraint is broken, or the cost is unknown; integers remain integers on the wire."""
 
 
 class Terminate(Message, frozen=True):
@@ -52,9 +52,9 @@ def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Numb
 
 
 def bounds_prove(context: Context, lower: Number, upper: Number, hearing: Hearing) -> Sequence[Proof]:
-    """Return what bounds on the cost of the sender's subtree prove. Costs below the sender are 0 at least.
+    """Return the proofs of bounds on the cost of the sender's subtree. Costs below the sender are at least 0.
 
-    A sender whose neighbours are all in the context has nobody below: then the lower bound is on what it pays itself.
+    If all neighbours of the sender are in the context, no robot is below it, and the lower bound is on its own cost.
     """
     view = {robot: value for robot, (value, _) in context.items()}
     found: list[Proof] = [SomeValuePays(hearing.sender, view, upper)]

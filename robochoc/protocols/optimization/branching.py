@@ -1,10 +1,11 @@
-"""The common base of NCBB, PT-FB and HS-CAI: branch and bound in every subtree of a pseudo-tree by itself.
+"""The common base of NCBB, PT-FB and HS-CAI: branch and bound in every subtree of a pseudo-tree separately.
 
-While the robots above keep their values, a robot searches the subtrees of its children for a cost below a limit. No
-value of its own is agreed on: it tries its values in each subtree by increasing lower bound, and the subtrees may be
-at different values at the same time. For each value and child it knows a lower bound on the subtree's cost, and later
-the cost itself; or that no solution with the value costs less than the best one known. A value is out once its own cost
-and the bounds of all subtrees are no less than that. The cheapest value whose subtrees all have been searched wins.
+While the robots above keep their values, a robot has the subtrees of its children searched for a cost below a limit. It
+does not commit to a value: it tries its values in each subtree by increasing lower bound, and different subtrees may be
+searched with different values at the same time. For each value and child it knows a lower bound on the subtree's cost,
+and later the cost itself; or that no solution with the value costs less than the best known one. A value is ruled out
+once its own cost and the bounds of all subtrees add up to that cost. The cheapest value with all subtrees searched is
+the best.
 
 A child returns its subtree's best assignment with its cost. So nothing is searched again, and the root knows the best
 assignment of its tree at any time.
@@ -42,7 +43,7 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 Number = int | float
-"""Infinite where something hard is broken, or nothing is known yet; integers stay integers on the wire."""
+"""Infinite where a hard constraint is broken, or the cost is unknown; integers remain integers on the wire."""
 
 
 class Members(Message, frozen=True):
@@ -54,8 +55,8 @@ class Members(Message, frozen=True):
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        told = [f"{listed(names)} with {robot}" for robot, names in self.linked.items()]
-        return f"in my subtree constraints are shared by {listed(told)}"
+        shared = [f"{listed(names)} with {robot}" for robot, names in self.linked.items()]
+        return f"in my subtree constraints are shared by {listed(shared)}"
 
 
 class Request(Message, frozen=True):
@@ -85,7 +86,7 @@ class Report(Message, frozen=True):
         return f"with your value and those above you, I cost at least {cost_text(self.bound)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver, which may not know the values above it."""
+        # The receiver may not know the values above it.
         asked = hearing.last(Request, hearing.receiver, hearing.sender)
         return (
             NOTHING if asked is None else [SomeValuePays(hearing.sender, {hearing.receiver: asked.value}, self.bound)]
@@ -93,7 +94,7 @@ class Report(Message, frozen=True):
 
 
 class Result(Message, frozen=True):
-    """The cost of the sender's subtree and its `values`; infinite, and no values: nothing is below the bound."""
+    """The cost of the sender's subtree and its `values`; infinite and without values: none is below the bound."""
 
     cost: Number
     values: dict[str, Value]
@@ -106,10 +107,8 @@ class Result(Message, frozen=True):
         return f"my subtree costs {cost_text(self.cost)}, with {words.assigned(self.values.items())}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: nobody in the subtree pays more than all of them together.
-
-        A sender that shares constraints with the receiver alone answers with the least that it can pay.
-        """
+        # No robot of the subtree pays more than all of them together. A sender that shares constraints only with the
+        # receiver answers with its least cost.
         found: list[Proof] = []
         asked = hearing.last(Request, hearing.receiver, hearing.sender)
         view = {} if asked is None else {hearing.receiver: asked.value}
@@ -135,7 +134,7 @@ class Terminate(Message, frozen=True):
 
 
 def allowance(bound: Number) -> str:
-    """Return what a subtree may cost, in words."""
+    """Return the maximum cost of a subtree in words."""
     return "whatever it costs" if math.isinf(bound) else f"for less than {cost_text(bound)}"
 
 
@@ -148,13 +147,13 @@ Assignment = dict[str, Value]
 
 
 class Branch:
-    """The search of a child's subtree, for each own value.
+    """The search of a child's subtree, for each value of this robot.
 
     - `lower`: a lower bound on the subtree's cost. Once the value is `known` it is the cost itself, or infinite: no
-      solution with the value costs less than the best one known.
+      solution with the value costs less than the best known one.
     - `values`: the assignment of this cost.
-    - `index`: the own value that is searched now; None: all have been. `told` is the limit that the child has for it;
-      None: it has not begun.
+    - `index`: the value that is searched now; None: all have been searched. `sent_limit` is the limit that the child
+      has received for it; None: it has not begun.
     """
 
     def __init__(self, lower: Sequence[Number]) -> None:
@@ -162,7 +161,7 @@ class Branch:
         self.known = [False] * len(lower)
         self.values: dict[int, Assignment] = {}
         self.index: int | None = None
-        self.told: Number | None = None
+        self.sent_limit: Number | None = None
 
     @property
     def left(self) -> list[int]:
@@ -170,7 +169,7 @@ class Branch:
         return [index for index, known in enumerate(self.known) if not known]
 
     def close(self, indices: Iterable[int], cost: Number = INFINITE) -> None:
-        """Note the cost of values; infinite: they are out."""
+        """Store the cost of values; infinite: they are ruled out."""
         for index in indices:
             self.lower[index] = cost
             self.known[index] = True
@@ -180,9 +179,9 @@ class Branch:
 class BranchingProtocol(TreeProtocol):
     """One agent that searches its children's subtrees.
 
-    - `branches`: for each child its search. `local`: the cost of each own value with the values above.
-    - `limit`: only less is of use above. `best` and `solution`: the cheapest assignment of the own subtree below it.
-    - `searching`: a search of the own subtree is going on. `over`: the search of the whole tree has ended.
+    - `branches`: for each child its search. `local`: the cost of each value of this robot with the values above.
+    - `limit`: only lower costs matter above. `best` and `solution`: the cheapest assignment of the subtree below it.
+    - `searching`: the subtree is being searched. `over`: the search of the whole tree has ended.
     - `optimum`: at the root, its tree's least cost, once it is known.
     """
 
@@ -199,18 +198,18 @@ class BranchingProtocol(TreeProtocol):
         self._below: dict[str, tuple[str, ...]] = {}
 
     @abstractmethod
-    def look(self, child: str) -> None:
-        """Get a lower bound for the present value of the child's branch; `descend` when it is there."""
+    def request_bound(self, child: str) -> None:
+        """Request a lower bound for the present value of the child's branch; call `descend` when it has arrived."""
 
     @abstractmethod
     def explore(self, child: str, limit: Number) -> None:
-        """Tell `child` to search its subtree for less than `limit`, with the present value of its branch."""
+        """Request that `child` search its subtree for less than `limit`, with the present value of its branch."""
 
     def tighten(self, child: str, limit: Number) -> None:
-        """Tell `child`, which is searching, that its limit is lower now. Not everyone does."""
+        """Send `child`, which is searching, a lower limit. Not all protocols do so."""
 
     def floor(self, child: str) -> Sequence[Number]:  # noqa: ARG002 - for those that know one
-        """Return a lower bound on the cost of the child's subtree for each own value, before anyone is asked."""
+        """Return a lower bound on the cost of the child's subtree for each value of this robot, before any request."""
         return [0] * len(self.problem.values)
 
     # The search
@@ -221,7 +220,7 @@ class BranchingProtocol(TreeProtocol):
         return min(self.limit, self.best)
 
     def search(self, limit: Number, local: Sequence[Number]) -> None:
-        """Search the own subtree for less than `limit`; `local` is what each own value costs with the values above."""
+        """Search the subtree for less than `limit`; `local` is the cost of each value with the values above."""
         self.limit, self.local = limit, local
         self.best, self.solution = INFINITE, {}
         self.searching = True
@@ -233,83 +232,83 @@ class BranchingProtocol(TreeProtocol):
         self._finish_if_idle()
 
     def estimate(self, index: int) -> Number:
-        """Return a lower bound on the cost of the own subtree with the value at `index`."""
+        """Return a lower bound on the cost of this robot's subtree with the value at `index`."""
         return sum([branch.lower[index] for branch in self.branches.values()], self.local[index])
 
     @property
     def cheapest(self) -> int:
-        """The place of the own value that costs the least with the values above."""
+        """The place of the cheapest value of this robot with the values above."""
         return min(range(len(self.local)), key=self.local.__getitem__)
 
     def descend(self, child: str) -> None:
-        """Let `child` search, or take the next value if the present one is out: its bound has come."""
+        """Let `child` search, or take the next value if the present one is ruled out: its bound has arrived."""
         index = self.present(child)
         branch = self.branches[child]
         total = self.estimate(index)
         if total < self.bound:
             self.value = index
-            branch.told = self.bound - (total - branch.lower[index])
-            self.explore(child, branch.told)
+            branch.sent_limit = self.bound - (total - branch.lower[index])
+            self.explore(child, branch.sent_limit)
         else:
             branch.close([index])
             self._advance(child)
             self._finish_if_idle()
 
-    def take_result(self, child: str, result: Result) -> None:
-        """Note what the search of a child's subtree has come to, and go on."""
+    def store_result(self, child: str, result: Result) -> None:
+        """Store the result of the search of a child's subtree, and continue."""
         index = self.present(child)
         branch = self.branches[child]
         branch.close([index], result.cost)
         if result.cost < INFINITE:
-            self.learn(child, result)
+            self.store_subtree(child, result)
             branch.values[index] = result.values
         if all(other.known[index] for other in self.branches.values()):
             self._improve(index)
         self._advance(child)
-        self.tell_lower_limits()
+        self.send_lower_limits()
         self._finish_if_idle()
 
     def present(self, child: str) -> int:
-        """Return the place of the own value that is searched in the subtree of `child`.
+        """Return the place of the value that is searched in the subtree of `child`.
 
         Raises:
-            ValueError: if nothing is, so that `child` has nothing to say.
+            ValueError: if no value is, so that `child` must not send anything.
         """
         branch = self.branches.get(child)
         if branch is None or branch.index is None or not self.searching:
-            raise ValueError(f"{child} was asked nothing")
+            raise ValueError(f"unexpected message from {child}, which has no open request")
         return branch.index
 
-    def learn(self, child: str, result: Result) -> None:
-        """Note which robots are in the subtree of `child`, from its first assignment."""
+    def store_subtree(self, child: str, result: Result) -> None:
+        """Store the robots in the subtree of `child`, from its first assignment."""
         if child not in result.values or self.problem.agent in result.values:
             raise ValueError(f"{child} returns the values of other robots")
         self._below.setdefault(child, tuple(result.values))
 
-    def tell_lower_limits(self) -> None:
-        """Tell the children that are searching about limits that have become lower (`tighten`)."""
+    def send_lower_limits(self) -> None:
+        """Send the searching children the limits that have become lower (`tighten`)."""
         for child, branch in self.branches.items():
-            if branch.index is not None and branch.told is not None:
+            if branch.index is not None and branch.sent_limit is not None:
                 total = self.estimate(branch.index)
                 rest = self.bound - (total - branch.lower[branch.index]) if total < self.bound else 0
-                if rest < branch.told:
-                    branch.told = rest
+                if rest < branch.sent_limit:
+                    branch.sent_limit = rest
                     self.tighten(child, rest)
 
     def _advance(self, child: str) -> None:
-        """Take the value with the least lower bound in the subtree of `child`; none is left: the branch is idle."""
+        """Take the value with the least lower bound in the subtree of `child`; if none is left, the branch is idle."""
         branch = self.branches[child]
         left = branch.left
         index = min(left, key=self.estimate, default=None)
-        branch.index = branch.told = None
+        branch.index = branch.sent_limit = None
         if index is None or self.estimate(index) >= self.bound:
             branch.close(left)
             return
         branch.index = index
-        self.look(child)
+        self.request_bound(child)
 
     def _improve(self, index: int) -> None:
-        """Note the value at `index` as the best one if it is: all subtrees are known for it."""
+        """Store the value at `index` as the best one if it is: the costs of all its subtrees are known."""
         cost = self.estimate(index)
         if cost < self.bound:
             self.best = cost
@@ -318,18 +317,18 @@ class BranchingProtocol(TreeProtocol):
                 self.solution.update(branch.values[index])
 
     def _finish_if_idle(self) -> None:
-        """Return the best of all values once all branches are idle: to the parent, or the root ends the search."""
+        """Once all branches are idle, send the best value to the parent, or end the search as the root."""
         if not self.searching or any(branch.index is not None for branch in self.branches.values()):
             return
         self.searching = False
         if self.parent is not None:
             self.send(self.parent, Result(self.best, self.solution))
         else:
-            self.end(self.best, self.solution)
+            self.end_search(self.best, self.solution)
 
     # The end
 
-    def end(self, cost: Number, solution: Assignment) -> None:
+    def end_search(self, cost: Number, solution: Assignment) -> None:
         """End the search of the whole tree with its optimum, as the root."""
         if cost == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
@@ -338,21 +337,21 @@ class BranchingProtocol(TreeProtocol):
         self.finish(solution)
 
     def finish(self, values: Mapping[str, Value]) -> None:
-        """Take the own final value, and tell the children theirs and those below them.
+        """Take this robot's final value, and send the children the values of their subtrees.
 
         Raises:
-            ValueError: if one of them is missing, or the own one is none.
+            ValueError: if a value is missing, or this robot's is invalid.
         """
         wanted = {self.problem.agent, *(name for names in self._below.values() for name in names)}
         if not wanted <= values.keys() or len(self._below) < len(self.children):
-            raise ValueError(f"{self.problem.agent} and the robots below it do not get their final values")
-        # Of equal values, which neighbours cannot tell apart, the first: the last may be to withdraw.
+            raise ValueError(f"the final values of {self.problem.agent} and the robots below it are incomplete")
+        # The first of several values that look alike to neighbours: the last may mean withdrawal.
         self.value = self.problem.values.index(values[self.problem.agent])
         self.over = True
         for child in self.children:
             self.send(child, Terminate({name: values[name] for name in self._below[child]}))
 
-    # What is known
+    # Knowledge of the whole search
 
     @property
     def incumbent(self) -> Incumbent | None:

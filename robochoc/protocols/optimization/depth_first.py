@@ -1,7 +1,7 @@
-"""The search of BnB-ADOPT+ itself, which begins when its subclasses let it (`bnb_adopt`, `bnb_adopt_fdac`).
+"""The search of BnB-ADOPT+ itself; its subclasses decide when it begins (`bnb_adopt`, `bnb_adopt_fdac`).
 
 A robot keeps its value until LB(d) reaches the cost of the best known complete solution (UB), or its threshold (TH).
-The rules, what the paper leaves open, and why it terminates stand in `bnb_adopt`.
+The rules, the choices that the paper leaves open, and the proof of termination are in `bnb_adopt`.
 """
 
 from __future__ import annotations
@@ -67,26 +67,26 @@ class DepthFirstProtocol(BoundingProtocol):
             self.drop_threshold()
 
     def drop_threshold(self) -> None:
-        """Forget the threshold, which was for another context, and request it."""
+        """Forget the threshold of the previous context, and request a new one."""
         self.threshold = INFINITE
         self.threshold_request = True
 
     def act(self) -> None:
         """Choose a value and send values and costs that changed (Backtrack)."""
         self._choose()
-        self.tell_values()
+        self.send_values()
         for name in self.pseudo_children:
-            self.tell(name, self.value_for(name))
+            self.send_if_new(name, self.value_for(name))
         if self.settled and self.may_end:
             self.terminate()
         elif not self.may_end:
-            self._tell_cost()
+            self._send_cost()
 
     def _choose(self) -> None:
         if self.settled:
-            self.take(self.cheapest(self.upper))
+            self.assign(self.cheapest(self.upper))
         elif self._moved or self.leaves:
-            self.take(self.cheapest(self.lower))
+            self.assign(self.cheapest(self.lower))
         self._moved = False
 
     @property
@@ -96,29 +96,29 @@ class DepthFirstProtocol(BoundingProtocol):
 
     @property
     def leaves(self) -> bool:
-        """Whether the own value is to be left: its lower bound reaches UB or TH."""
+        """Whether to leave the value: its lower bound reaches UB or TH."""
         return self.lower[self.index] >= min(self.threshold, self.ub)
 
-    # What is said
+    # Sending
 
-    def tell_values(self) -> None:
-        """Send the children what changed."""
+    def send_values(self) -> None:
+        """Send the children the changes."""
         for child in self.children:
-            self._tell_value(child)
+            self._send_value(child)
 
-    def _tell_value(self, child: str) -> None:
+    def _send_value(self, child: str) -> None:
         """Send `child` a new value, a higher threshold, or a threshold that it requested."""
         value, last = self.value_for(child), self.sent_values.get(child)
-        if last is None or self.is_news(value, last):
+        if last is None or self.must_send(value, last):
             self.sent_values[child] = value
             self.send(child, value)
 
     def value_for(self, name: str) -> Value:
-        """Return the own value, and the threshold of `name` if it is a child."""
+        """Return this robot's value, and the threshold of `name` if it is a child."""
         return Value(*self.own, self.share(name) if name in self.bounds else INFINITE)
 
-    def is_news(self, value: Value, last: Value) -> bool:
-        """Return whether a child that was told `last` has to be told `value`."""
+    def must_send(self, value: Value, last: Value) -> bool:
+        """Return whether `value` must be sent to a child that was sent `last`."""
         return last.counter < value.counter or last.threshold < value.threshold
 
     def share(self, child: str) -> Number:
@@ -129,7 +129,7 @@ class DepthFirstProtocol(BoundingProtocol):
         others = sum(bounds.lb[self.index] for name, bounds in self.bounds.items() if name != child)
         return max(0, limit - self.delta[self.index] - others)
 
-    def _tell_cost(self) -> None:
+    def _send_cost(self) -> None:
         """Send the parent new bounds, bounds in a new context, or a request for the threshold."""
         cost = self.bounds_for_parent()
         if self.parent is not None and (self.threshold_request or cost != self.sent_cost):

@@ -1,15 +1,15 @@
-"""The common base of NCBB and PT-FB: before a value is searched in a subtree, the robots there are asked for bounds.
+"""The common base of NCBB and PT-FB: before a value is searched in a subtree, its robots are asked for bounds.
 
-A robot asks all robots of the subtree that it shares a constraint with. Each answers with the least that an own value
-costs with the values of the asker and of robots above that. It leaves out robots *below* the asker: their last values
-are of an earlier search. So it must know which robots are above which. It learns that from the order of the first
+A robot asks all robots of the subtree with which it shares a constraint. Each answers with the least cost of its values
+with the values of the requester and of robots above it. It ignores robots *below* the requester: their last values are
+from an earlier search. So it must know the order of the robots above, which it learns from the order of the first
 requests: a robot lets a subtree search only when all its linked robots there have answered.
 
-At the beginning each robot tells its parent which robots of its subtree are linked with which robots above (`Members`).
-A leaf answers its parent with the cost itself and its value, as all constraints of a leaf are with robots above.
+At the beginning each robot sends its parent, for each robot above, the linked robots of its subtree (`Members`). A leaf
+answers its parent with the cost itself and its value, as all constraints of a leaf are with robots above.
 
 A constraint belongs to its lowest robot, which pays it: constraints may be n-ary. It is checked when the last of the
-other robots asks. Costs with the robots above that one are known from their requests.
+other robots asks. Costs with robots above that robot are known from their requests.
 """
 
 from __future__ import annotations
@@ -26,15 +26,16 @@ from robochoc.system.compiling import mypyc_attr
 
 
 class CostsAbove:
-    """The own values' costs with robots above, which ask one after the other, the highest first.
+    """The costs of this robot's values with robots above, which ask one after the other, the highest first.
 
-    `values` are theirs. `totals`: for each of them, the cost of every own value with its value and those above it.
+    `values` are theirs. `totals`: for each of them, the cost of every value of this robot with its value and those of
+    robots above it.
     """
 
     def __init__(self, problem: LocalProblem) -> None:
         self._problem = problem
         self.alone: Sequence[Number] = problem.charges
-        """The cost of each own value, whatever the robots above do."""
+        """The cost of each value of this robot that does not depend on robots above."""
         self.values: dict[str, Value] = {}
         self.totals: dict[str, Sequence[Number]] = {}
 
@@ -50,7 +51,7 @@ class CostsAbove:
         return self.totals[name]
 
     def added(self, name: str, view: Mapping[str, Value]) -> Sequence[Number]:
-        """Return what each own value costs more with the value of `name`, below all others in `view`."""
+        """Return the additional cost of each value with the value of `name`, below all others in `view`."""
         return self._problem.added_by(name, view)
 
 
@@ -58,9 +59,9 @@ class CostsAbove:
 class ForwardBoundingProtocol(BranchingProtocol):
     """One agent that asks for bounds.
 
-    - `asked`: for each child, the robots of its subtree that share a constraint with this one. `members`: those, and
-      the ones that share a constraint with robots above this one.
-    - `handed`: lower bounds on what robots of the own subtree cost alone, with the values above this robot.
+    - `asked`: for each child, the robots of its subtree that share a constraint with this one. `members`: these robots,
+      and those that share a constraint with robots above this one.
+    - `handed`: lower bounds on the costs of single robots of this robot's subtree, with the values above it.
     - `answers`: the same with the value that is searched, from robots that were asked.
     """
 
@@ -76,32 +77,32 @@ class ForwardBoundingProtocol(BranchingProtocol):
         self._waiting: dict[str, set[str]] = {}
 
     def costs_above(self) -> CostsAbove:
-        """Return what finds the own costs; another one for those that know more of them."""
+        """Return the costs of this robot with robots above; subclasses that know more costs override it."""
         return CostsAbove(self.problem)
 
     def begin(self) -> None:
-        """Tell the parent who is linked with whom, once all children have done the same."""
+        """Send the parent the links of the subtree, once all children have done the same."""
         self._linked = {name: [self.problem.agent] for name in self.ancestors}
-        self._tell_members()
+        self._send_members()
 
     @abstractmethod
     def begin_search(self) -> None:
         """Begin, as the root; all robots know their members."""
 
-    def take_members(self, child: str, linked: Mapping[str, Sequence[str]]) -> None:
-        """Note who is in the child's subtree."""
+    def store_members(self, child: str, linked: Mapping[str, Sequence[str]]) -> None:
+        """Store the robots of the child's subtree."""
         own = linked.get(self.problem.agent, ())
         if child not in own or child in self.asked or not {*own} <= {*self.descendants}:
-            raise ValueError(f"{child} tells of links that cannot be")
+            raise ValueError(f"{child} sends impossible links: {linked}")
         self.asked[child] = [*own]
         self.members[child] = [*dict.fromkeys(name for names in linked.values() for name in names)]
         self._child_above.update(dict.fromkeys(own, child))
         for above, names in linked.items():
             if above != self.problem.agent:
                 self._linked.setdefault(above, []).extend(names)
-        self._tell_members()
+        self._send_members()
 
-    def _tell_members(self) -> None:
+    def _send_members(self) -> None:
         if len(self.asked) < len(self.children):
             return
         if self.parent is not None:
@@ -112,17 +113,17 @@ class ForwardBoundingProtocol(BranchingProtocol):
     # Bounds
 
     def floor(self, child: str) -> Sequence[Number]:
-        """Return the bounds of its robots that were handed down."""
+        # The bounds of its robots that were handed down.
         return [sum(self.handed.get(name, 0) for name in self.members[child])] * len(self.problem.values)
 
-    def look(self, child: str) -> None:
+    def request_bound(self, child: str) -> None:
         """Ask all linked robots in the child's subtree."""
         value = self.problem.values[self.present(child)]
         self._waiting[child] = {*self.asked[child]}
         for name in self.asked[child]:
             self.send(name, Request(value))
 
-    def take_request(self, sender: str, value: Value) -> None:
+    def answer_request(self, sender: str, value: Value) -> None:
         """Answer with a lower bound, or as a leaf to the parent with the cost."""
         if sender not in self.ancestors:
             raise ValueError(f"{sender} is not above {self.problem.agent}")
@@ -135,14 +136,14 @@ class ForwardBoundingProtocol(BranchingProtocol):
             self.send(sender, Result(least, {self.problem.agent: value} if least < INFINITE else {}))
 
     def knows_cost(self, sender: str) -> bool:
-        """Return whether the least that an own value costs is the cost of the own subtree, once `sender` has asked."""
+        """Return whether the least cost of a value is the cost of the subtree, once `sender` has asked."""
         return sender == self.parent and not self.children
 
-    def take_report(self, sender: str, bound: Number) -> None:
-        """Note a bound; when all are there, let the child search or take the next value."""
+    def store_report(self, sender: str, bound: Number) -> None:
+        """Store a bound; when all have arrived, let the child search or take the next value."""
         child = self._child_above.get(sender)
         if child is None or sender not in self._waiting.get(child, ()):
-            raise ValueError(f"{sender} was not asked for a bound")
+            raise ValueError(f"unexpected bound from {sender}, which was not asked")
         self.answers[sender] = bound
         self._waiting[child].remove(sender)
         if not self._waiting[child]:
@@ -156,12 +157,12 @@ class ForwardBoundingProtocol(BranchingProtocol):
             raise ValueError(f"{robot} is not known to be below {self.problem.agent}")
         return self._child_above[robot]
 
-    def take_result(self, child: str, result: Result) -> None:
-        """Note the cost of a subtree; a leaf's is its answer."""
+    def store_result(self, child: str, result: Result) -> None:
+        """Store the cost of a subtree; a leaf sends it as its answer."""
         self._waiting.pop(child, None)
-        super().take_result(child, result)
+        super().store_result(child, result)
 
     @property
     def reports(self) -> Mapping[str, Number]:
-        """For each robot of the own subtree, its latest bound."""
+        """For each robot of this robot's subtree, its latest bound."""
         return {**self.handed, **self.answers}

@@ -2,29 +2,30 @@
 
 Complete search for minimum cost on a pseudo-tree, with lower bounds from tables. Before the search each robot sends its
 parent a table of its subtree's least costs (PREUTIL), as in DPOP, but over at most k robots: others above are left
-out, so it is a lower bound. Then subtrees are searched side by side, and values tried by increasing bound; nobody is
-asked. When values of robots that were left out stay the same for more than t searches, a robot has its children's
-tables made again with these values (INFERCTXT, CTXTUTIL). These bounds are tighter while the values last. The search
-goes on meanwhile.
+out, so it is a lower bound. Then subtrees are searched in parallel, and values tried by increasing bound, without
+requests for bounds. When values of omitted robots stay the same for more than t searches, a robot requests new tables
+from its children with these values (INFERCTXT, CTXTUTIL). These bounds are tighter while the values stay. The search
+continues meanwhile.
 
 - **When to use**: costs, few but larger messages, a pseudo-tree too wide for DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table is over
   more than k robots, or has more than 131,072 cells.
-- **Parameters (`--set`)**: `k`, the most robots that a table is over (default 4), and `t`, how long values stay before
-  bounds are inferred with them (default 1).
+- **Parameters (`--set`)**: `k`, the maximum number of robots of a table (default 4), and `t`, the number of searches
+  with the same values before bounds are inferred with them (default 1).
 - **Reference**: Chen, Zhang, Deng, Chen, Li: "HS-CAI: a hybrid DCOP algorithm via combining search with context-based
   inference", AAAI 2020.
 
-The messages have the names of the paper, but for these: BACKTRACK is `Result`. The frame of the search is in
+The messages have the names of the paper, except BACKTRACK, which is `Result`. The frame of the search is in
 `branching`.
 
 Choices that the paper leaves open, and differences:
 
 - Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
-- The highest robots are left out of a table. Each part of a sum is minimised over them by itself.
-- Robots tell those below their domain and depth before (`Domain`). A CPA holds the values that matter to the subtree.
+- The highest robots are left out of a table. Each part of a sum is minimised over them separately.
+- Robots first send their domain and depth to the robots below (`Domain`). A CPA holds the values that matter to the
+  subtree.
 - A robot infers with all values that have stayed long enough, for one table of a child at a time.
-- Constraints are checked once for the tables, and again with each CPA. Sums and minima of tables are no checks.
+- Constraints are checked once for the tables, and again with each CPA. Sums and minima of tables are not checks.
 - Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -61,7 +62,7 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
 
 MOST_CELLS = 1 << 17
-"""Of a table, and of a message with one; and so many for each own value while it is made."""
+"""The maximum number of cells of a table and of its message; while it is computed, for each value of the robot."""
 
 
 class Table(NamedTuple):
@@ -71,12 +72,12 @@ class Table(NamedTuple):
     costs: NDArray[np.float64]
 
     def at(self, places: Mapping[str, int]) -> Table:
-        """Return the part of it with these robots' values at these places."""
+        """Return the part of the table with these robots' values at these places."""
         index = tuple([places.get(name, slice(None)) for name in self.names])
         return Table(tuple(name for name in self.names if name not in places), self.costs[index])
 
     def over(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Return the least costs with an axis for each of `names`, in this order; of length 1 where it has none."""
+        """Return the least costs with an axis for each of `names`, in this order; of length 1 if the table has none."""
         gone = tuple(axis for axis, name in enumerate(self.names) if name not in names)
         left = [name for name in self.names if name in names]
         least = self.costs.min(axis=gone)
@@ -85,8 +86,8 @@ class Table(NamedTuple):
         return aligned
 
 
-def kept_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
-    """Return the axes that a table may have: the lowest robots, at most `most`, and not too many cells together."""
+def limited_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
+    """Return the axes that a table may have: the lowest robots, at most `most`, without exceeding the cell limit."""
     kept: list[Axis] = []
     for axis in sorted(axes, key=lambda axis: axis[1], reverse=True)[:most]:
         if math.prod([size for _, _, size in kept]) * axis[2] > MOST_CELLS:
@@ -96,9 +97,9 @@ def kept_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
 
 
 def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables: Sequence[Table]) -> list[Number]:
-    """Return the least sum of `charges` and `tables` over the own values, for each combination of values of `axes`.
+    """Return the least sum of `charges` and `tables` over the robot's values, for each combination of `axes`' values.
 
-    Each table is minimised by itself over robots that are not in `axes`, so the sum is a lower bound.
+    Each table is minimised separately over robots that are not in `axes`, so the sum is a lower bound.
     """
     shape = [size for _, _, size in axes]
     names = [name for name, _, _ in axes]
@@ -116,11 +117,11 @@ def table_of(axes: Sequence[Axis], costs: Sequence[Number]) -> Table:
     """Return the table of a message.
 
     Raises:
-        ValueError: if the costs are not as many as the axes say, or too many.
+        ValueError: if the number of costs does not match the axes, or is too large.
     """
     shape = [size for _, _, size in axes]
     if min(shape, default=1) < 1 or math.prod(shape) != len(costs) or len(costs) > MOST_CELLS:
-        raise ValueError(f"{len(costs)} costs are no table of {shape}")
+        raise ValueError(f"{len(costs)} costs do not form a table of {shape}")
     return Table(tuple(name for name, _, _ in axes), np.array(costs, np.float64).reshape(shape))
 
 
@@ -132,8 +133,8 @@ def number_of(cost: float) -> Number:
 class HSCAISettings(Settings, frozen=True):
     """The amount of inference before and during the search.
 
-    `k`: the most robots above that a table may be over. With as many as the tree's induced width, all bounds are exact.
-    `t`: a robot has its bounds inferred anew when a value above has stayed the same for more than `t` searches.
+    `k`: the maximum number of robots above in a table. From the tree's induced width on, all bounds are exact.
+    `t`: a robot requests new bounds when a value above has stayed the same for more than `t` searches.
     """
 
     k: int = 4
@@ -167,7 +168,7 @@ class Domain(Message, frozen=True):
 class PreUtil(Message, frozen=True):
     """A lower bound on the cost of the sender's subtree for all values of the robots of `axes` (PREUTIL).
 
-    `dropped`: other robots above that matter to the subtree; the bound holds whatever their values are. `dearest`: no
+    `dropped`: other robots above that matter to the subtree; the bound holds for all of their values. `dearest`: no
     solution of the subtree costs more.
     """
 
@@ -190,7 +191,7 @@ class PreUtil(Message, frozen=True):
 class CPA(Message, frozen=True):
     """A request to search the receiver's subtree for less than `bound` (CPA).
 
-    `places`: of the robots above that matter to it, the places of their values in their domains.
+    `places`: the places in their domains of the values of robots above that matter to it.
     """
 
     bound: Number
@@ -228,17 +229,16 @@ class CtxtUtil(Message, frozen=True):
         return f"with these values my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver, whichever request it answers."""
         return bounds_prove(self.axes, self.costs, hearing)
 
 
 def places_in_words(places: dict[str, int]) -> str:
-    """Return values, by their places."""
+    """Return values in words, by their places."""
     return listed([f"{name}'s value number {place + 1}" for name, place in places.items()]) or "any values"
 
 
 def span_in_words(costs: list[Number]) -> str:
-    """Return between what and what lower bounds are: `at least 3 to 9`."""
+    """Return the range of lower bounds in words: `at least 3 to 9`."""
     finite = [cost for cost in costs if not math.isinf(cost)]
     if not finite:
         return "infinity"
@@ -247,7 +247,7 @@ def span_in_words(costs: list[Number]) -> str:
 
 
 def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], hearing: Hearing) -> Sequence[Proof]:
-    """Return what lower bounds over `axes` prove: as much as a table of DPOP, as they hold whatever is left out."""
+    """Return the proofs of lower bounds over `axes`: those of a DPOP table, as they hold for all omitted robots."""
     places = itertools.product(*[range(size) for _, _, size in axes])
     return table_proves([name for name, _, _ in axes], zip(places, costs, strict=True), hearing)
 
@@ -255,7 +255,7 @@ def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], hearing: Hearing
 Places = Mapping[str, int]
 
 MOST_WAITING = 2
-"""Requests for a tighter table that a robot may have: one for its parent's own search, one for its parent's parent."""
+"""The maximum number of open requests for a tighter table: one for the parent's search, one for the parent's parent."""
 
 
 class Tighter(NamedTuple):
@@ -268,11 +268,11 @@ class Tighter(NamedTuple):
 class HSCAI(BranchingProtocol):
     """One agent of HS-CAI.
 
-    - `domains` and `level`: the values of the linked robots above; how many robots are above at all.
+    - `domains` and `level`: the values of the linked robots above; the number of all robots above.
     - `tables`: the children's tables from before the search; `tighter`: those of a context.
-    - `places`: of the robots above that matter to the subtree, the places of their values in the last CPA.
-    - `stayed`: for how many CPAs in a row each of them has stayed.
-    - `inferring`: for each child, the contexts of the tables that are under way; None: a table for the parent.
+    - `places`: the places, in the last CPA, of the values of robots above that matter to the subtree.
+    - `stayed`: the number of successive CPAs for which each of them has stayed.
+    - `inferring`: for each child, the contexts of the requested tables; None: a table for the parent.
     """
 
     messages = TreeMessage | Domain | PreUtil | CPA | InferCtxt | CtxtUtil | Result | Terminate
@@ -305,25 +305,24 @@ class HSCAI(BranchingProtocol):
         self._made: dict[str, Table] = {}
 
     def begin(self) -> None:
-        """Tell the own domain to those below, as the root."""
+        """Send the domain to the robots below, as the root."""
         if self.parent is None:
-            self._tell_domain()
+            self._send_domain()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | PreUtil | CPA | InferCtxt | CtxtUtil | Result | Terminate", message):
             case Domain(values, level):
-                self._take_domain(sender, values, level)
+                self._store_domain(sender, values, level)
             case PreUtil() as util:
-                self._take_util(sender, util)
+                self._store_util(sender, util)
             case CPA(bound, places):
                 self._search(bound, places)
             case InferCtxt(places):
                 self._infer(places)
             case CtxtUtil(axes, costs):
-                self._take_tighter(sender, table_of(axes, costs))
+                self._store_tighter(sender, table_of(axes, costs))
             case Result() as result:
-                self.take_result(sender, result)
+                self.store_result(sender, result)
             case Terminate(values):
                 self.finish(values)
             case never:
@@ -331,34 +330,34 @@ class HSCAI(BranchingProtocol):
 
     # Before the search
 
-    def _tell_domain(self) -> None:
+    def _send_domain(self) -> None:
         for name in self.descendants:
             self.send(name, Domain(list(self.problem.values), self.level))
         self._pre_infer()
 
-    def _take_domain(self, sender: str, values: list[Value], level: int) -> None:
-        """Note the values of a robot above; the parent's depth tells the own one."""
+    def _store_domain(self, sender: str, values: list[Value], level: int) -> None:
+        """Store the values of a robot above; the parent's depth determines this robot's."""
         if sender not in self.ancestors or sender in self.domains or not values or level < 0:
-            raise ValueError(f"{sender} has no domain to tell")
+            raise ValueError(f"unexpected or invalid domain from {sender}")
         self.domains[sender] = values
         self._levels[sender] = level
         if sender == self.parent:
             self.level = level + 1
-            self._tell_domain()
+            self._send_domain()
         else:
             self._pre_infer()
 
-    def _take_util(self, child: str, util: PreUtil) -> None:
-        """Note a child's table."""
+    def _store_util(self, child: str, util: PreUtil) -> None:
+        """Store a child's table."""
         if child not in self.children or child in self.tables or util.dearest < 0:
-            raise ValueError(f"{child} has no table to tell")
+            raise ValueError(f"unexpected or repeated table from {child}")
         self._from[child] = util
         self.tables[child] = table_of(util.axes, util.costs)
         self.inferring[child] = []
         self._pre_infer()
 
     def _pre_infer(self) -> None:
-        """Send the own table to the parent once all is known, or begin the search as the root."""
+        """Send this robot's table to the parent once all tables have arrived, or begin the search as the root."""
         if len(self.domains) < len(self.ancestors) or len(self.tables) < len(self.children):
             return
         self._axes = self._separator()
@@ -380,28 +379,28 @@ class HSCAI(BranchingProtocol):
         """Return the robots above that matter to the subtree.
 
         Raises:
-            ValueError: if a child tells of values that they have not.
+            ValueError: if a child's table has another domain size or depth for a robot.
         """
         axes = {name: (name, self._levels[name], len(self.domains[name])) for name in self.ancestors}
         own = (self.problem.agent, self.level, len(self.problem.values))
         for child, util in self._from.items():
             for axis in (*util.axes, *util.dropped):
                 if axis != (own if axis[0] == own[0] else axes.setdefault(axis[0], axis)):
-                    raise ValueError(f"{child} has {axis[0]} elsewhere, or with other values")
+                    raise ValueError(f"{child} sends another depth or number of values for {axis[0]}")
         return axes
 
     def _least(self, context: Places, tables: Mapping[str, Table]) -> tuple[list[Axis], list[Number]]:
-        """Return the axes and costs of the own table, with the values of `context`."""
-        axes = kept_axes([axis for name, axis in self._axes.items() if name not in context], self.settings.k)
+        """Return the axes and costs of this robot's table, with the values of `context`."""
+        axes = limited_axes([axis for name, axis in self._axes.items() if name not in context], self.settings.k)
         parts = [table.at(context) for table in (*self._own_tables, *tables.values())]
         return axes, least_over(axes, self.problem.agent, self.problem.charges, parts)
 
     # The search
 
     def _search(self, bound: Number, places: Places) -> None:
-        """Search the own subtree with the values above."""
+        """Search the subtree with the values above."""
         if self.searching or not self._axes or places.keys() != self._axes.keys() or not self._fits(places):
-            raise ValueError(f"{self.problem.agent} is searching, or is told no values of the robots above")
+            raise ValueError(f"{self.problem.agent} is already searching, or the CPA lacks values of robots above")
         for name, place in places.items():
             self.stayed[name] = self.stayed.get(name, 0) + 1 if self.places.get(name) == place else 0
         self.places = dict(places)
@@ -414,7 +413,7 @@ class HSCAI(BranchingProtocol):
         return all(name in self._axes and 0 <= place < self._axes[name][2] for name, place in places.items())
 
     def floor(self, child: str) -> Sequence[Number]:
-        """Return the bounds of the child's table, and of a tighter one that holds now."""
+        # The bounds of the child's table, and of a tighter one that is valid now.
         bounds = self._bounds_in(self.tables[child])
         tighter = self.tighter.get(child)
         if tighter is None or any(self.places[name] != place for name, place in tighter.context.items()):
@@ -426,8 +425,8 @@ class HSCAI(BranchingProtocol):
         costs = [number_of(cost) for cost in part.costs.reshape(-1).tolist()]
         return costs if part.names else costs * len(self.problem.values)
 
-    def look(self, child: str) -> None:
-        """Nobody need be asked: the bound is there."""
+    def request_bound(self, child: str) -> None:
+        # No request is needed: the bound is known.
         self.descend(child)
 
     def explore(self, child: str, limit: Number) -> None:
@@ -439,7 +438,7 @@ class HSCAI(BranchingProtocol):
     # Inference in a context
 
     def _ask_if_it_pays(self, child: str) -> None:
-        """Have the child's table made again with the values that have stayed, if some that it lacks are among them."""
+        """Request a new table from the child with the values that have stayed, if it lacks some of them."""
         dropped = [name for name, _, _ in self._from[child].dropped if name != self.problem.agent]
         context = {name: self.places[name] for name in dropped if self.stayed[name] > self.settings.t}
         under_way = any(one is not None for one in self.inferring[child])
@@ -451,14 +450,14 @@ class HSCAI(BranchingProtocol):
         self.send(child, InferCtxt(dict(context)))
 
     def _infer(self, context: Places) -> None:
-        """Make the own table again for the parent; children are asked first whose tables lack robots of the context."""
+        """Compute this robot's table again for the parent; first ask the children whose tables lack a robot of it."""
         if len(self._asked) >= MOST_WAITING or not self._axes or not self._fits(context):
-            raise ValueError(f"{self.problem.agent} cannot infer, or was asked too often")
+            raise ValueError(f"{self.problem.agent} cannot infer a table yet, or has too many open requests")
         self._asked.append(context)
         if len(self._asked) == 1:
-            self._make_again(context)
+            self._recompute(context)
 
-    def _make_again(self, context: Places) -> None:
+    def _recompute(self, context: Places) -> None:
         self._made = dict(self.tables)
         for child, util in self._from.items():
             lacks = {name: context[name] for name, _, _ in util.dropped if name in context}
@@ -466,10 +465,10 @@ class HSCAI(BranchingProtocol):
                 self._ask(child, lacks, None)
         self._answer_if_all_are_there()
 
-    def _take_tighter(self, child: str, table: Table) -> None:
-        """Use a child's table, for the own search or for the parent: answers come in the order of the requests."""
+    def _store_tighter(self, child: str, table: Table) -> None:
+        """Use a child's table, for this search or for the parent: answers arrive in the order of the requests."""
         if not self.inferring.get(child) or not self._is_below(child, table):
-            raise ValueError(f"{child} was asked for no table, or has another one")
+            raise ValueError(f"unexpected table from {child}, or one over other robots")
         purpose = self.inferring[child].pop(0)
         if purpose is None:
             self._made[child] = table
@@ -492,4 +491,4 @@ class HSCAI(BranchingProtocol):
             return
         self.send(self.parent, CtxtUtil(*self._least(self._asked.pop(0), self._made)))
         if self._asked:
-            self._make_again(self._asked[0])
+            self._recompute(self._asked[0])

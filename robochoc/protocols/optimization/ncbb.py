@@ -1,13 +1,13 @@
 """No-Commitment Branch and Bound (NCBB).
 
 Complete search for minimum cost on a pseudo-tree, in linear memory. First a greedy assignment gives an upper bound.
-Then each robot lets the subtrees of its children be searched, for one own value after the other. It does not commit to
+Then each robot has the subtrees of its children searched, for one of its values after the other. It does not commit to
 a value: different subtrees may be searched for different values at the same time, each by increasing lower bound. The
 bounds come from the robots of the subtree that it shares constraints with: it asks them before it searches for a value.
 
 - **When to use**: costs, a pseudo-tree with branches, little memory.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Each robot
-  remembers a bound and an assignment for each child and own value. On a connected team, an answer is known early.
+  remembers a bound and an assignment for each child and value. On a connected team, an answer is known early.
 - **Parameters**: none.
 - **Reference**: Chechetka, Sycara: "No-commitment branch and bound search for distributed constraint optimization",
   AAMAS 2006.
@@ -22,11 +22,11 @@ The frame of the search is in `branching`, bounds are in `forward_bounding`: PT-
 Choices that the paper leaves open, and differences:
 
 - Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
-- A robot tells the asker its whole bound, with the values of all robots from the asker up. In the paper it tells the
-  difference that the asker's value makes. The whole bound is as true, and higher.
+- A robot sends the requester its total bound, with the values of all robots from the requester up. In the paper it
+  sends only the part that depends on the requester's value. The total bound is also valid, and higher.
 - The greedy assignment is remembered, with its cost as the bound: only cheaper ones are searched for.
 - Results hold the best assignment of the subtree. In the paper, the last search is repeated to find it.
-- A leaf answers its parent with its cost and value. It is never told to search.
+- A leaf answers its parent with its cost and value. It is never asked to search.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -80,7 +80,7 @@ class Greedy(Message, frozen=True):
 
 
 class Search(Message, frozen=True):
-    """A request to search the receiver's subtree for less than `bound`, with the values that were told (SEARCH)."""
+    """A request to search the receiver's subtree for less than `bound`, with the values sent before (SEARCH)."""
 
     bound: Number
 
@@ -114,31 +114,30 @@ class NCBB(ForwardBoundingProtocol):
         self._first_phase = True
 
     def begin(self) -> None:
-        """Tell the parent who is linked with whom."""
+        """Send the parent the links of the subtree."""
         super().begin()
-        self._greet()
+        self._choose_greedily()
 
     def begin_search(self) -> None:
-        """Do nothing: the root begins with the first phase, whose results come after the members."""
+        """Do nothing: the root begins with the first phase, whose results arrive after the members."""
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Members | Greedy | Request | Report | Search | Result | Terminate", message):
             case Members(linked):
-                self.take_members(sender, linked)
+                self.store_members(sender, linked)
             case Greedy(value):
                 self.greedy_view[sender] = value
-                self._greet()
+                self._choose_greedily()
             case Request(value):
-                self.take_request(sender, value)
+                self.answer_request(sender, value)
             case Report(bound):
-                self.take_report(sender, bound)
+                self.store_report(sender, bound)
             case Search(bound):
                 self._search(bound)
             case Result() as result if self._first_phase:
-                self._take_greedy_result(sender, result)
+                self._store_greedy_result(sender, result)
             case Result() as result:
-                self.take_result(sender, result)
+                self.store_result(sender, result)
             case Terminate(values):
                 self.finish(values)
             case never:
@@ -146,8 +145,8 @@ class NCBB(ForwardBoundingProtocol):
 
     # The first phase
 
-    def _greet(self) -> None:
-        """Take the cheapest value once all values above are known, and tell it to all below."""
+    def _choose_greedily(self) -> None:
+        """Take the cheapest value once all values above are known, and send it to all robots below."""
         if len(self.greedy_view) < len(self.ancestors):
             return
         self.local = self.problem.costs(self.greedy_view)
@@ -157,17 +156,17 @@ class NCBB(ForwardBoundingProtocol):
         if not self.children:
             self._add_up()
 
-    def _take_greedy_result(self, child: str, result: Result) -> None:
+    def _store_greedy_result(self, child: str, result: Result) -> None:
         if child not in self.children or child in self.greedy:
-            raise ValueError(f"{child} has no cost to tell")
+            raise ValueError(f"unexpected or repeated cost from {child}")
         self.greedy[child] = result
         if result.cost < INFINITE:
-            self.learn(child, result)
+            self.store_subtree(child, result)
         if len(self.greedy) == len(self.children):
             self._add_up()
 
     def _add_up(self) -> None:
-        """Tell the parent the cost of the first assignment, or begin the search with it as the root."""
+        """Send the parent the cost of the first assignment, or begin the search with it as the root."""
         self._first_phase = False
         cost = sum([result.cost for result in self.greedy.values()], self.local[self.cheapest])
         values: Assignment = {}
@@ -190,15 +189,15 @@ class NCBB(ForwardBoundingProtocol):
 
     def _search(self, bound: Number) -> None:
         if self.parent not in self.above.totals or self.searching:
-            raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is searching")
+            raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is already searching")
         self.search(bound, self.above.totals[self.parent])
 
-    def end(self, cost: Number, solution: Assignment) -> None:
-        """End the search, as the root: with the first assignment, if nothing is cheaper."""
+    def end_search(self, cost: Number, solution: Assignment) -> None:
+        """End the search, as the root: with the first assignment, if none is cheaper."""
         if cost < self.greedy_cost:
-            super().end(cost, solution)
+            super().end_search(cost, solution)
         else:
-            super().end(self.greedy_cost, self.greedy_values)
+            super().end_search(self.greedy_cost, self.greedy_values)
 
     @property
     def incumbent(self) -> Incumbent | None:

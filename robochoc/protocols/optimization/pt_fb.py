@@ -1,15 +1,15 @@
 """Pseudo-tree Forward Bounding (PT-FB).
 
 Complete search for minimum cost on a pseudo-tree, in linear memory, with bounds that are handed down. Before a robot
-lets the subtree of a child be searched for one of its values, it asks all robots there that it shares a constraint with
-for lower bounds. They go with the request (CPA) to the child, and on, so that the bound of a subtree has a part of
-every robot in it that shares a constraint with anyone above. Different subtrees are searched at the same time, also
-for different values. When one of them finds a better solution, or its cost comes to be known, the others have to be
-cheaper (REDUCE_UB).
+has the subtree of a child searched for one of its values, it asks all robots there with which it shares a constraint
+for lower bounds. They travel with the request (CPA) to the child and further down, so that the bound of a subtree has a
+part for every robot in it that shares a constraint with a robot above. Different subtrees are searched at the same
+time, also for different values. When one of them finds a better solution, or its cost is known, the limits of the
+others are reduced (REDUCE_UB).
 
 - **When to use**: costs, a pseudo-tree with branches, little memory; fewer messages than NCBB on dense graphs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Each robot
-  remembers a bound and an assignment for each child and own value.
+  remembers a bound and an assignment for each child and value.
 - **Parameters**: none.
 - **Reference**: Litov, Meisels: "Forward bounding on pseudo-trees for DCOPs and ADCOPs", AIJ 252, 2017.
 
@@ -18,18 +18,18 @@ The messages have the names of the paper, or these:
     CPA                     `CPA`                  LB_REQUEST   `Request`
     CPA (back) and UBs      `Result`               LB_REPORT    `Report`
     REDUCE_UB               `Reduce`               PCB, ECA     `Members`
-    assign CPA              `_advance`, `look`     STOP         `Terminate`
+    assign CPA              `_advance`, `request_bound`     STOP         `Terminate`
 
 The frame of the search is in `branching`, bounds are in `forward_bounding`: NCBB has both, too.
 
 Choices that the paper leaves open, and differences:
 
 - Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
-- The CPA holds no values: whom they concern has been asked with them.
-- Every robot reduces the bounds of its children; in the paper, those with more than one child. A leaf answers its
-  parent with its cost and value.
-- A bound that is reduced is one for the last CPA to that child, as no message overtakes another; so searches need no
-  numbers. A child that has answered ignores it.
+- The CPA holds no values: the requests for bounds have already sent them to the robots concerned.
+- Every robot reduces the bounds of its children; in the paper, only robots with more than one child do. A leaf answers
+  its parent with its cost and value.
+- A reduced bound always applies to the last CPA sent to that child, as no message overtakes another; so searches need
+  no numbers. A child that has answered ignores it.
 - Results hold the best assignment of the subtree, so nothing is searched again.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -57,9 +57,9 @@ from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 
 
 class CPA(Message, frozen=True):
-    """A request to search the receiver's subtree for less than `bound`, with the values that were told (CPA).
+    """A request to search the receiver's subtree for less than `bound`, with the values sent before (CPA).
 
-    `reports`: for robots of the subtree, what each of them costs alone at least, where that is more than 0.
+    `reports`: for robots of the subtree, a lower bound on the robot's own cost, if it is more than 0.
     """
 
     bound: Number
@@ -75,12 +75,12 @@ class CPA(Message, frozen=True):
         return f"{asked}; at least {least} of it is paid by {listed(self.reports)}"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver, which may not know the values that the bounds go with."""
+        # The receiver may not know the values on which the bounds depend.
         return [SomeValuePays(robot, {}, bound) for robot, bound in self.reports.items()]
 
 
 class Reduce(Message, frozen=True):
-    """A lower bound for the search that is going on (REDUCE_UB)."""
+    """A lower limit for the current search (REDUCE_UB)."""
 
     bound: Number
 
@@ -110,42 +110,41 @@ class PTFB(ForwardBoundingProtocol):
         self.search(self.limit, self.above.alone)
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Members | Request | Report | CPA | Reduce | Result | Terminate", message):
             case Members(linked):
-                self.take_members(sender, linked)
+                self.store_members(sender, linked)
             case Request(value):
-                self.take_request(sender, value)
+                self.answer_request(sender, value)
             case Report(bound):
-                self.take_report(sender, bound)
+                self.store_report(sender, bound)
             case CPA(bound, reports):
                 self._search(bound, reports)
             case Reduce(bound):
                 self._reduce(bound)
             case Result() as result:
-                self.take_result(sender, result)
+                self.store_result(sender, result)
             case Terminate(values):
                 self.finish(values)
             case never:
                 assert_never(never)
 
     def _search(self, bound: Number, reports: Mapping[str, Number]) -> None:
-        """Search the own subtree with the bounds that were handed down."""
+        """Search the subtree with the bounds that were handed down."""
         if self.parent not in self.above.totals or self.searching:
-            raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is searching")
+            raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is already searching")
         self.handed = dict(reports)
         self.search_subtree(bound)
 
     def search_subtree(self, bound: Number) -> None:
-        """Search the own subtree, with the values of the robots above."""
+        """Search the subtree, with the values of the robots above."""
         assert self.parent is not None  # noqa: S101 - for mypy: the root begins by itself
         self.search(bound, self.above.totals[self.parent])
 
     def _reduce(self, bound: Number) -> None:
-        """Take over a lower bound, unless the search that it is for has ended."""
+        """Adopt a lower limit, unless its search has ended."""
         if self.searching:
             self.limit = min(self.limit, bound)
-            self.tell_lower_limits()
+            self.send_lower_limits()
 
     def explore(self, child: str, limit: Number) -> None:
         """Send the CPA to `child`, with the bounds of the robots below it."""
@@ -153,5 +152,5 @@ class PTFB(ForwardBoundingProtocol):
         self.send(child, CPA(limit, {n: known[n] for n in self.members[child] if n != child and known.get(n)}))
 
     def tighten(self, child: str, limit: Number) -> None:
-        """Tell `child` that its search has a lower bound now."""
+        """Send `child` a lower limit for its search."""
         self.send(child, Reduce(limit))

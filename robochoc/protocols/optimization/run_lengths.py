@@ -1,7 +1,8 @@
 """Run-length encoding of lists with an item for each robot: for the first waves of `sfb`.
 
-Teams often have few kinds of robots. So a list with an item for each robot travels as its distinct items, and runs:
-which item it is, and for how many robots in succession. Alike robots take a few bytes then, however many they are.
+Teams often have few kinds of robots. So a list with an item for each robot is sent as its distinct items and runs: the
+item, and the number of successive robots that have it. A sequence of equal robots then takes a few bytes, whatever its
+length.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from itertools import groupby
 from typing import TypeVar
 
 Run = tuple[int, int]
-"""The place of an item among the distinct ones, and how many robots in succession have it."""
+"""The place of an item among the distinct ones, and the number of successive robots that have it."""
 T = TypeVar("T", bound=Hashable)
 
 

@@ -3,8 +3,8 @@
 Complete branch and bound for minimum cost. A current partial assignment (CPA) goes from robot to robot in priority
 order, as in SyncBB. Robots without a value are bounded from below, as in AFB. Here the CPA itself carries, for each of
 these robots, the cost of each of its values so far, as in partial forward checking. A robot that takes a value adds the
-costs of the constraints that it shares with them; all robots of a scope know it. So the holder alone knows the bound,
-and prunes before it sends: no estimates are requested.
+costs of the constraints that it shares with them; all robots of a scope know the constraint. So the holder knows the
+bound without requests for estimates, and prunes before it sends.
 
 - **When to use**: costs; it is the default for such problems. It needs few messages.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Memory is bounded
@@ -20,23 +20,23 @@ The methods and messages correspond to AFB's procedures:
     assign_CPA   `_extend`       backtrack      `_explored`
     CPA_MSG      `CPAs`          NEW_SOLUTION   `Solution`
 
-Batches are an addition of this project: one message carries many CPAs, all of the same robots. The first ones go alone,
-straight down to a first solution. Then each robot extends twice as many at a time as the time before, up to `batch` and
-`memory`, the lowest bounds first. The search stays depth first, by batches. One robot acts at a time. With `window` at
-2 or more, robots extend the next CPAs while lower robots work on the last ones, an idea of concurrent search (Zivan,
+Batches are an addition of this project: one message carries many CPAs, all of the same robots. The first CPAs are sent
+one at a time, down to a first solution. Then each robot doubles the number of CPAs it extends each time, up to `batch`
+and `memory`, the lowest bounds first. The search stays depth first, by batches. One robot acts at a time. With `window`
+at 2 or more, robots extend the next CPAs while lower robots work on the last ones, an idea of concurrent search (Zivan,
 Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it gained nothing.
 
-The course of a search: first, two waves tell all robots each other's domains. One goes down the order; one comes back
-up, with the charges of the values and an upper bound on all costs. The last robot turns CPAs into solutions. A solution
+The course of a search: first, two waves exchange the domains of all robots. One goes down the order; one comes back up,
+with the charges of the values and an upper bound on all costs. The last robot turns CPAs into solutions. A solution
 that is cheaper than all before goes up the order, and every robot stores its value in it; CPAs carry its cost down.
 When the first robot has nothing left to extend, the last solution is optimal, or there is none.
 
-The proof, and how it compares: docs/explanation/sfb.md.
+The proof, and a comparison with other protocols: docs/explanation/sfb.md.
 
 Without costs a value is consistent or not: CPAs carry bits instead of costs (`sfb_bits`). The rest is the same.
 
 Constraints may be n-ary: the last but one robot of a scope adds the costs that the last one will pay. Costs are read
-from tables that are made before the search (see `LocalProblem.tables`), so all constraint checks are done by then.
+from tables that are computed before the search (see `LocalProblem.tables`), so it makes no constraint checks itself.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -115,7 +115,7 @@ class SFBSettings(Settings, frozen=True):
 
     def __post_init__(self) -> None:
         if self.batch < 1 or self.window < 1 or self.memory < 1:
-            raise ValueError("batch, window and memory are 1 or more")
+            raise ValueError("batch, window and memory must be 1 or more")
 
 
 Domain = tuple[Value, ...]
@@ -204,7 +204,7 @@ class CPAs(Message, frozen=True):
         return f"{counted(self.count, 'partial assignment')} for {words.receiver} to extend; {known}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
-        """Return what the message proves to its receiver: each row holds what the robots from it on have to pay."""
+        # Each row contains the costs of the robots from the receiver on.
         if self.count > MOST_ROWS:
             return None
         if hearing.minimises:
@@ -253,13 +253,13 @@ def _chosen(robots: Sequence[str], places: Sequence[int], hearing: Hearing) -> d
 
 
 MOST_ROWS = 2_000
-"""For messages with more rows no rule says what they prove: it would take too long."""
+"""Messages with more rows give no proofs: computing them would take too long."""
 _SIZES = (1, 2, 4, 8)
 _COST, _VALUES = 1, 2
 
 
 def costs_prove(content: bytes, count: int, ceiling: int, hearing: Hearing) -> Iterator[Proof]:
-    """Yield what rows of costs prove. Raises `ValueError` if `content` is not of that form."""
+    """Yield the proofs of rows of costs. Raises `ValueError` if `content` is not of that form."""
     rank, domains = _known(hearing)
     largest = max(2 * ceiling, *map(len, domains))
     size = next(size for size in _SIZES if largest < 1 << 8 * size - (size == _SIZES[-1]))
@@ -281,7 +281,7 @@ def costs_prove(content: bytes, count: int, ceiling: int, hearing: Hearing) -> I
 
 
 def bits_prove(content: bytes, count: int, hearing: Hearing) -> Iterator[Proof]:
-    """Yield what rows of bits prove. Raises `ValueError` if `content` is not of that form."""
+    """Yield the proofs of rows of bits. Raises `ValueError` if `content` is not of that form."""
     rank, domains = _known(hearing)
     largest = max(map(len, domains))
     size = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
@@ -303,11 +303,11 @@ def bits_prove(content: bytes, count: int, hearing: Hearing) -> Iterator[Proof]:
 
 
 def _known(hearing: Hearing) -> tuple[int, list[Sequence[Value]]]:
-    """Return the receiver's rank, and all robots' values, which it has been told."""
+    """Return the receiver's rank, and all robots' values, as received."""
     domains = [hearing.values(robot) for robot in hearing.order]
     known = [values for values in domains if values is not None]
     if len(known) < len(domains):
-        raise ValueError("rows come before all robots' values")
+        raise ValueError("rows arrive before all robots' values")
     return hearing.order.index(hearing.receiver), known
 
 
@@ -316,11 +316,11 @@ def _view(places: Sequence[int], hearing: Hearing, domains: Sequence[Sequence[Va
 
 
 LARGEST = 4 * MIB
-"""No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""
+"""The maximum size of the CPAs in a message, unless there is only one: runtimes have limits, too."""
 
 
 class Batch:
-    """The content of one message: `rows` are still to be extended; `ready` is extended, and waits to be sent.
+    """The content of one message: `rows` have yet to be extended; `ready` is extended, and waits to be sent.
 
     `sent` is the number of its messages that are not yet explored.
     """
@@ -333,12 +333,12 @@ class Batch:
 
     @property
     def left(self) -> bool:
-        """Whether something is still to be sent."""
+        """Whether there are rows that have not been sent."""
         return bool(len(self.rows) or len(self.ready))
 
     @property
     def bound(self) -> int | None:
-        """The minimum lower bound of the rows still to be sent; None if there are none."""
+        """The minimum lower bound of the rows that have not been sent; None if there are none."""
         return min((self._bounds.least(rows) for rows in (self.rows, self.ready) if len(rows)), default=None)
 
     def take(self, count: int, upper_bound: int) -> Any:  # noqa: ANN401 - as above
@@ -354,7 +354,7 @@ class Batch:
 
 
 class SFB(Protocol):
-    """One agent. State: the `batches` that it is to explore, the oldest first, and the `best` solution.
+    """One agent. State: the `batches` to explore, the oldest first, and the `best` solution.
 
     - `upper_bound`: the cost of the best solution.
     - `under_way`: for each unanswered message to the next robot, its batch and its minimum lower bound.
@@ -389,27 +389,27 @@ class SFB(Protocol):
         self.first_sent = False
 
     def start(self) -> None:
-        """Send the own values, as the first robot; a robot with an empty domain ends the search."""
+        """Send the values, as the first robot; a robot with an empty domain ends the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif self.previous is None:
-            self._tell_below([])
+            self._send_domains([])
             self.settle()
         if self.problem.values and not self.problem.has_costs:
             self.problem.look_ahead()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type. Raises `ValueError` for a message that is not possible at this point."""
+        """Process one message. Raises `ValueError` for a message that is not possible at this point."""
         if self.verdict is not None:
             return
         heard = cast("Above | Below | CPAs | Explored | Solution", message)
         if not self._expects(sender, heard):
-            raise ValueError(f"{sender} says {type(message).__name__}, which it cannot say now")
+            raise ValueError(f"unexpected {type(message).__name__} from {sender}")
         match heard:
             case Above(domains, runs):
-                self._tell_below(expanded(domains, runs))
+                self._send_domains(expanded(domains, runs))
             case Below() as below:
-                self._tell_above(below.robots, below.most)
+                self._send_charges(below.robots, below.most)
             case CPAs() as cpas:
                 self._process_cpas(cpas)
             case Explored():
@@ -462,18 +462,18 @@ class SFB(Protocol):
 
     # Before the search
 
-    def _tell_below(self, domains: Sequence[Domain]) -> None:
+    def _send_domains(self, domains: Sequence[Domain]) -> None:
         self.domains = [*domains, self.problem.values]
         if self.next is None:
-            self._tell_above([], 0)
+            self._send_charges([], 0)
         else:
             self.send(self.next, Above.of(self.domains))
 
-    def _tell_above(self, below: Sequence[tuple[Domain, Charges]], most: int) -> None:
+    def _send_charges(self, below: Sequence[tuple[Domain, Charges]], most: int) -> None:
         """Store all robots' values and evaluate the constraints; the first robot begins the search."""
-        own = self.problem.values, tuple(map(_whole, self.problem.costs({})))
+        own = self.problem.values, tuple(map(_as_integer, self.problem.costs({})))
         self.domains += [domain for domain, _ in below]
-        self.bounds = self._made_bounds()
+        self.bounds = self._create_bounds()
         most += self.bounds.most + max_finite(own[1])
         check_exact(most)
         if self.previous is not None:
@@ -482,7 +482,7 @@ class SFB(Protocol):
             self._count_up_to(most + 1)
             self.batches.append(Batch(self.bounds.nothing([own[1], *(charges for _, charges in below)]), self.bounds))
 
-    def _made_bounds(self) -> Bounds:
+    def _create_bounds(self) -> Bounds:
         if self.problem.has_costs:
             from robochoc.protocols.optimization.sfb_bounds import ForwardBounds  # noqa: PLC0415 - start-up: numpy
 
@@ -532,7 +532,7 @@ class SFB(Protocol):
                 self._process_solution(Solution(cost, places))
 
     def _process_solution(self, solution: Solution) -> None:
-        """Store the own value of a cheaper solution, and send it on to the robots above."""
+        """Store this robot's value in a cheaper solution, and send the solution on to the robots above."""
         self.best = solution
         self.upper_bound = solution.cost
         self.value = solution.places[self.bounds.rank]
@@ -546,7 +546,7 @@ class SFB(Protocol):
         elif self.best is None:
             self.conclude(Verdict.NO_SOLUTION)
 
-    # What is known so far
+    # Knowledge of the whole search
 
     @property
     def incumbent(self) -> Incumbent | None:
@@ -558,7 +558,7 @@ class SFB(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """The best known solution; for the first robot also the minimum lower bound of all that is unexplored."""
+        """The best known solution; for the first robot also the minimum lower bound of all unexplored CPAs."""
         if not self.ceiling:
             return NOTHING
         bound = None
@@ -568,7 +568,7 @@ class SFB(Protocol):
         return Findings(self.incumbent, bound)
 
 
-def _whole(cost: float) -> float:
+def _as_integer(cost: float) -> float:
     """Return `cost` as an integer if it is finite: integers take fewer bytes in a message."""
     return cost if cost == math.inf else int(cost)
 

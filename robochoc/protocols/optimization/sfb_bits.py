@@ -1,14 +1,14 @@
-"""The bounds of `sfb` where there are no costs: a bit says all that a number would.
+"""The bounds of `sfb` for problems without costs: bits in place of numbers.
 
-Without costs the ceiling is 1. So an entry of a vector is 0 if the value is consistent with what has been chosen, and 1
-if not. Here it is a bit, 1 or 0: the vectors of all robots below are one integer, with a field for each robot. Choosing
-a value is one AND of integers. Whether a field is empty, which brings the bound to 1, takes one subtraction for all
-fields together. The rows are those that `sfb_bounds` makes of the same team, in the same order. A row takes fewer
-bytes, so more of them fit into a message.
+Without costs the ceiling is 1. So an entry of a vector is 0 if the value is consistent with the chosen values, and 1 if
+not. Here it is a bit, 1 or 0: the vectors of all robots below are one integer, with a field for each robot. Choosing a
+value is one AND of integers. The test for an empty field, which raises the bound to 1, takes one subtraction for all
+fields together. The rows are those of `sfb_bounds` for the same team, in the same order. A row takes fewer bytes, so
+more of them fit into a message.
 
 A row is a pair: the places of the values of all robots above, and the integer. Its lowest field is that of the robot
-that is to extend it. A field has a bit for each value, the first one lowest, and one more above that is 0: a borrow
-stops there (Lamport, "Multiple byte processing with full-word instructions", CACM 18, 1975).
+that extends it next. A field has a bit for each value, the first one lowest, and above them a bit that is 0, which
+stops a borrow (Lamport, "Multiple byte processing with full-word instructions", CACM 18, 1975).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ Row = tuple[bytes, int]
 Places = tuple[int, ...]
 
 CEILING = 1
-"""Where there are no costs."""
+"""The ceiling without costs."""
 
 
 class ForwardBits:
-    """What the choices of the robot of `problem` leave the robots below; `domains` are all robots' values.
+    """The values that the choices of the robot of `problem` leave the robots below; `domains` are all robots' values.
 
     See `ForwardBounds`, which has the same methods.
     """
@@ -60,10 +60,10 @@ class ForwardBits:
     def count_up_to(self, ceiling: int) -> None:
         """Check the `ceiling`. Raises `ValueError` if there are costs."""
         if ceiling != CEILING:
-            raise ValueError(f"costs of up to {ceiling - 1}, and the problem has none")
+            raise ValueError(f"costs of up to {ceiling - 1} for a problem without costs")
 
     def nothing(self, charges: Sequence[Sequence[float]]) -> list[Row]:
-        """Return the empty partial assignment, with all values of all robots: `charges` are none."""
+        """Return the empty partial assignment, with all values of all robots: `charges` are all 0."""
         field = sum(1 << place for place, charge in enumerate(charges[0]) if charge < math.inf)
         return [(b"", self._full << self._own + 1 | field)]
 
@@ -100,14 +100,14 @@ class ForwardBits:
         return 0
 
     def packed(self, rows: list[Row]) -> bytes:
-        """Return `rows` as they travel."""
+        """Return `rows` as the bytes of a message."""
         size = _bytes(self._bits)
         return b"".join([chosen + left.to_bytes(size, "little") for chosen, left in rows])
 
     def extended(self, rows: list[Row], upper_bound: int) -> list[Row]:
-        """Return all extensions of `rows` by an own value that leave each robot below a value.
+        """Return all extensions of `rows` by a value of this robot that leave each robot below a value.
 
-        Those that leave the other robots the most values come first.
+        Extensions that leave the other robots the most values come first.
         """
         if not upper_bound:
             return []
@@ -138,9 +138,10 @@ class ForwardBits:
         return CEILING, []
 
     def _ruled_out(self, allowed: Mapping[Places, int], start: int) -> dict[Places, list[int]]:
-        """Return the values that each own value rules out, for a robot whose field begins at `start`.
+        """Return the values that each value of this robot rules out, for a robot whose field begins at `start`.
 
-        `allowed` has the own values that go with the places of the others' values, the lowest robot's last.
+        `allowed` has this robot's values that are consistent with the places of the others' values, the lowest robot's
+        last.
         """
         found: dict[Places, list[int]] = {}
         for (*above, place), own in allowed.items():
@@ -164,7 +165,7 @@ def _count(found: tuple[int, Row]) -> int:
 
 
 def _largest(content: bytes, first: int, size: int, length: int) -> int:
-    """Return the largest number of `size` bytes that stands at the place `first` of a row of `length` bytes."""
+    """Return the largest number of `size` bytes at the place `first` of a row of `length` bytes."""
     if size == 1:
         return max(content[first::length])
     starts = range(first, len(content), length)

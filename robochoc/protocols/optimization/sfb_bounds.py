@@ -1,12 +1,11 @@
-"""Partial assignments as rows of an array, and what one robot adds to them: for `sfb`.
+"""Partial assignments as rows of an array, and the costs that one robot adds to them: for `sfb`.
 
-A row is a partial assignment: its lower bound, what its robots pay, the place of each one's value, and then, for
-each robot below in priority order, a vector: what each of that robot's values would cost it by what stands above.
-The bound is what is paid, plus the least of each vector.
+A row is a partial assignment: its lower bound, its robots' cost, the place of each robot's value, and then, for each
+robot below in priority order, a vector: the cost of each of that robot's values with the values above. The bound is the
+cost plus the least of each vector.
 
-All costs are whole numbers. More than all constraints and charges together can come to is the `ceiling`: it stands
-for infinity, and whatever grows beyond is cut to it. So the numbers are as small as the problem allows, mostly a
-byte each.
+All costs are whole numbers. The `ceiling`, one more than the sum of all constraints and charges can reach, represents
+infinity, and larger numbers are cut to it. So the numbers are as small as the problem allows, usually a byte each.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from robochoc.solver.compiled import LocalProblem
 Rows = NDArray[np.integer[Any]]
 
 BOUND, COST, VALUES = 0, 1, 2
-"""The columns of a row: its bound, what is paid, the first value's place."""
+"""The columns of a row: its bound, its cost, the first value's place."""
 
 _SIZES = ("<u1", "<u2", "<u4", "<i8")
 
@@ -32,7 +31,7 @@ _SIZES = ("<u1", "<u2", "<u4", "<i8")
 class _NAry(NamedTuple):
     """The costs that an n-ary constraint adds to `columns`, the vector of its lowest robot.
 
-    `table` has an axis for the value of each robot in `ranks` (all above), one for the own value, and the vector's.
+    `table` has an axis for the value of each robot in `ranks` (all above), then this robot's axis and the vector's.
     """
 
     ranks: tuple[int, ...]
@@ -112,13 +111,13 @@ class ForwardBounds:
         return int(rows[:, BOUND].min())
 
     def packed(self, rows: Rows) -> bytes:
-        """Return `rows` as they travel."""
+        """Return `rows` as the bytes of a message."""
         return rows.tobytes()
 
     def extended(self, rows: Rows, upper_bound: int) -> Rows:
-        """Return all extensions of `rows` by an own value with a lower bound below `upper_bound`.
+        """Return all extensions of `rows` by a value of this robot with a lower bound below `upper_bound`.
 
-        They are sorted by lower bound; ties go to those that leave the other robots the most values.
+        They are sorted by lower bound, then by decreasing number of values left to the other robots.
         """
         own = rows[:, self._first : self._first + self._own]
         before = rows[:, BOUND].astype(np.int64) - own.min(axis=1)  # the bound, without this robot's part
@@ -168,5 +167,5 @@ class ForwardBounds:
 
     @property
     def _first(self) -> int:
-        """The column after the values of the robots above: the own value's, or the own vector's first."""
+        """The column after the values of the robots above: that of this robot's value, or the first of its vector."""
         return VALUES + self.rank

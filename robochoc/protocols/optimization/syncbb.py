@@ -1,9 +1,9 @@
 """Synchronous Branch and Bound (SyncBB).
 
 Branch and bound, distributed. One path, the values of the robots so far and the cost of each, goes from robot to robot
-in priority order. Its holder adds the first own value with which it costs less than the bound n, the cost of the best
-path so far, and sends it on; without such a value, it sends the path back. A path that reaches the last robot is the
-new best one. One robot acts at a time, so no message is ever obsolete.
+in priority order. Its holder adds its first value with which the path costs less than the bound n (the cost of the best
+path so far), and sends it on; without such a value, it sends the path back. A complete path is the new best one. One
+robot acts at a time, so no message is ever obsolete.
 
 - **When to use**: as a simple baseline with costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The best path is
@@ -19,7 +19,7 @@ The methods:
 Choices that the paper leaves open:
 
 - Constraints may be n-ary. The lowest-priority robot of the scope pays them, when it holds the path.
-- `Backtrack` contains no values but those of the best path, as the robot before still has its own.
+- `Backtrack` contains only the values of the best path, as the robot before still has its own.
 - The last robot looks for further, cheaper values before it sends the path back.
 - A path that costs as much as a new bound goes back at once.
 - A robot with an empty domain reports it at once.
@@ -128,7 +128,7 @@ class Terminate(Message, frozen=True):
 
 
 def best_proves(best: BestPath, hearing: Hearing) -> list[Proof]:
-    """Return what the best path proves."""
+    """Return the proofs of the best path."""
     return [Total(dict(zip(hearing.order, best.values, strict=False)), best.bound)] if best.values else []
 
 
@@ -165,7 +165,6 @@ class SyncBB(Protocol):
             self._extend(0)
 
     def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - only neighbours in the order speak
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("Path | Backtrack | Terminate", message):
@@ -181,7 +180,7 @@ class SyncBB(Protocol):
                 self._extend(0 if self.value is None else self.value + 1)
             case Terminate(best):
                 self.best = best
-                self._take_best()
+                self._adopt_best()
             case never:
                 assert_never(never)
 
@@ -212,7 +211,7 @@ class SyncBB(Protocol):
         self._backtrack()
 
     def _pass_on(self, cost: Cost) -> bool:
-        """Send the path on with the own value, which costs so much. Return False if it is complete: the best one."""
+        """Send on the path with this robot's value and its `cost`. Return False if it is complete: the best one."""
         path = [*self.path, (self.problem.values[self.value or 0], cost)]
         if self.rank + 1 < len(self.order.names):
             self.send(self.order.names[self.rank + 1], Path(path, self.best))
@@ -226,14 +225,14 @@ class SyncBB(Protocol):
         if self.rank > 0:
             self.send(self.order.names[self.rank - 1], Backtrack(self.best))
         elif self._known:
-            self._take_best()
+            self._adopt_best()
             for robot in self.order.names[1:]:
                 self.send(robot, Terminate(self.best))
         else:
             self.conclude(Verdict.NO_SOLUTION)
 
-    def _take_best(self) -> None:
-        """Decide for the own value in the best path, at the end of the search."""
+    def _adopt_best(self) -> None:
+        """Take this robot's value in the best path, at the end of the search."""
         self.over = True
         self.value = self.problem.values.index(self.best.values[self.rank])
 
