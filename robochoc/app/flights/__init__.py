@@ -1,1 +1,1 @@
-"""Makes what is looked at and handed on after a run: the flight, the conversation, a recording, a report, its state."""
+"""Builds the outputs of an ended run: flight, conversation, recording, report, saved state."""

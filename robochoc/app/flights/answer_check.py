@@ -1,6 +1,6 @@
-"""Checks the answer of a run that came in a file: a stranger's claims are told as such, and checked where they can be.
+"""Check the answer of a run from an opened file, whose claims are untrusted.
 
-That no answer is better, or that there is none, is not checked: the team would have to decide again for that.
+Claims that no answer is better, or that there is none, are not checked: that would require another run.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ from robochoc.modelling.errors import ModelError
 from robochoc.verification.checker import RefutedError, check_told_cost, constraint_cost
 
 CHECK_S = 5.0
-"""Whether all constraints hold is looked at for so long; a team for which that is too short is not checked."""
+"""The time limit for checking all constraints; after it, the answer counts as not checked."""
 _MOST_DIGITS = 400
-"""A cost of more digits, before or after the point, is none: to compute with it could take all memory."""
+"""The maximum number of digits of a cost, before and after the point: longer numbers could exhaust the memory."""
 _UNREADABLE = (ModelError, InvalidInputError, OSError, ValueError, TypeError, LookupError, ArithmeticError)
 
 
-class _Told(msgspec.Struct):
-    """A result's cost with all its digits, read again from its file."""
+class _ExactCost(msgspec.Struct):
+    """The cost of a result with all its digits."""
 
     cost: int | Decimal | None = None
 
 
 def claim_words(run: Run, claims: str) -> str:
-    """Return what is told of a run. Of one that came in a file: that the file says so, and what a check has found.
+    """Return the description of a run; for a run from an opened file, say that the claim is the file's, and the check.
 
     Args:
         run: The run.
-        claims: What its result says, in words.
+        claims: The result in words.
     """
     if not run.record.opened or run.result is None:
         return claims
-    return f"{say('opened.says', claims=claims)} {' '.join(_found(run, run.result))}"
+    return f"{say('opened.says', claims=claims)} {' '.join(_check_words(run, run.result))}"
 
 
-def _found(run: Run, result: RunResult) -> list[str]:
+def _check_words(run: Run, result: RunResult) -> list[str]:
     checked = run.record.checked
     if checked is None:
         return [say("opened.unchecked")]
@@ -64,7 +64,7 @@ def _found(run: Run, result: RunResult) -> list[str]:
 
 
 def check(run: Run) -> None:
-    """Check the answer of a run that has come in a file; its record says then what was found."""
+    """Check the answer of a run from an opened file, and write the finding to its record."""
     record, result = run.record, run.read_result()
     record.checked, record.maximised = None, False
     with suppress(*_UNREADABLE):
@@ -76,27 +76,27 @@ def check(run: Run) -> None:
 
 
 _Code = Callable[[str, Value], int | None]
-"""Returns the code of a variable's value; None: it is none."""
+"""Returns the code of a variable's value; None for an invalid value."""
 
 
 def _drawn(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
-    """Return the team that has answered in the end, as it was drawn, and what encodes the user's values."""
+    """Return the final team of a run of a sketch, and the function that encodes the user's values."""
     changed = changed_to(run) if result is not None and len(result.epochs) > 1 else None
     sketch = run.sketch if changed is None else changed
     if errors_of(sketch):
-        raise ValueError("the sketch is none")
+        raise ValueError("the sketch has errors")
     model = model_of(sketch)
     team, codes = model.team, dict[str, dict[Value, int]]()
     for decision in sketch.decisions:
         names = [f"{robot}.{decision.name}" for robot in sketch.deciders(decision)]
-        if names:  # all have the same values
+        if names:  # the robots of a decision have the same values
             own = {value_of(model, names[0], code): code for code in team.variables[names[0]].domain}
             codes |= dict.fromkeys(names, own)
     return team, lambda name, value: codes.get(name, {}).get(value)
 
 
 def _of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
-    """Return the team of files that has answered in the end, and what encodes values as files say them."""
+    """Return the final team of a run of files, and the function that encodes the files' values."""
     events = max(0, len(result.epochs) - 1) if result is not None else 0
     team = team_after_events(read_team(run.team), events)
     named = {name for name, variable in team.variables.items() if variable.domain.symbols}
@@ -112,7 +112,7 @@ def _of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
 
 
 def _checked(team: Team, code: _Code, result: RunResult, content: bytes) -> Checked | None:
-    """Hold an answer against a team. None: there was not enough time."""
+    """Check an answer for a team. None: the time limit was reached."""
     aside = frozenset(result.withdrawn)
     flying = {name: one.domain for name, one in team.variables.items() if team.owner[name] not in aside}
     values = {name: known for name, value in result.assignment.items() if (known := code(name, value)) is not None}
@@ -127,12 +127,12 @@ def _checked(team: Team, code: _Code, result: RunResult, content: bytes) -> Chec
         known = all(name in values for name in constraint.variables)
         if known and constraint_cost(constraint, values) == INFINITE:
             return Checked.BROKEN
-    return Checked.KEPT if _costs_so_much(team, values, content, aside) else Checked.COST
+    return Checked.KEPT if _is_cost_correct(team, values, content, aside) else Checked.COST
 
 
-def _costs_so_much(team: Team, values: Mapping[str, int], content: bytes, aside: frozenset[str]) -> bool:
-    """Return whether values cost what a result says; its numbers are read again, with all their digits."""
-    cost = msgspec.json.decode(content.partition(b"\n")[0], type=_Told).cost
+def _is_cost_correct(team: Team, values: Mapping[str, int], content: bytes, aside: frozenset[str]) -> bool:
+    """Return whether the cost in a result is that of the values; it is decoded again, with all its digits."""
+    cost = msgspec.json.decode(content.partition(b"\n")[0], type=_ExactCost).cost
     if isinstance(cost, Decimal) and not (cost.is_finite() and max(map(abs, _reach(cost))) <= _MOST_DIGITS):
         return False
     try:
@@ -143,6 +143,6 @@ def _costs_so_much(team: Team, values: Mapping[str, int], content: bytes, aside:
 
 
 def _reach(cost: Decimal) -> tuple[int, int]:
-    """Return how far a number reaches before the point, and after it."""
+    """Return the positions of the first and the last digit of a number, relative to the point."""
     exponent = cost.as_tuple().exponent
     return cost.adjusted(), exponent if isinstance(exponent, int) else _MOST_DIGITS

@@ -1,12 +1,12 @@
-"""Makes what is to be looked at of a run, by robochoc's own commands, each in a process of its own.
+"""Build the flight and the conversation of a run with robochoc's commands, each in a separate process.
 
-map.json             the map of the ground, on which the flight begins
-flight.html          the scene of the flight, which is simulated
-flight.json          how it went, or why it could not be flown
-conversation.html    all messages, as the sniffer shows them
-flight.mcap          a recording, if somebody asks for it
+map.json             the map of the ground, where the flight begins
+flight.html          the scene of the simulated flight
+flight.json          the result of the flight, or the reason why there was none
+conversation.html    all messages, as shown by the sniffer
+flight.mcap          a recording, on request
 
-They stay in the run's folder. Whoever wants them says so, and the work ends when nobody wants them any more.
+The files are stored in the run's folder. The work ends when no page requests them any more.
 """
 
 from __future__ import annotations
@@ -14,25 +14,27 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from enum import StrEnum
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
-from robochoc.app.flights.captions import captioned
-from robochoc.app.flights.flight_map import MAP, ground_of
+from robochoc.app.flights.flight_map import MAP, ground_of, happened_in
 from robochoc.app.flights.flight_result import FLOWN, flight_result_of, refused
+from robochoc.app.foreign.facts import events_in_words
 from robochoc.app.jobs.job import Call, Job, event_loop_caller
 from robochoc.app.jobs.process import Command
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import error_text
 from robochoc.app.runs.options import JOURNAL, RESULT
-from robochoc.app.runs.run import Run
+from robochoc.app.runs.run import MAX_RESULT, Run
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Kind
-from robochoc.formats import InvalidInputError
+from robochoc.formats import InvalidInputError, read_team
 from robochoc.modelling.errors import ModelError
 from robochoc.system.files import write_atomically
 
@@ -40,18 +42,18 @@ FLIGHT = "flight.html"
 CONVERSATION = "conversation.html"
 RECORDING = "flight.mcap"
 CAPTIONED = "told.json"
-"""The result, with what has happened in words."""
+"""The result, with its events in words."""
 MOST_MESSAGES = 100_000
-"""Messages of a conversation that are shown: a page with more would open slowly."""
+"""The maximum number of shown messages: a page with more would open slowly."""
 _NOT_AS_PLANNED = 4
-"""The exit status of `robochoc fly` for a flight in which somebody has not arrived: it can be looked at."""
+"""The exit status of `robochoc fly` if a drone has not arrived: the flight can be shown nevertheless."""
 _MAX_MESSAGE = 600
 _REFUSAL = "the result cannot be flown: "
-"""What `robochoc fly` says before the reason."""
+"""The text of `robochoc fly` before the reason."""
 
 
 class Stage(StrEnum):
-    """The stage that making a file has reached."""
+    """The stage of the work."""
 
     WAITING = "waiting"
     FLIGHT = "flight"
@@ -60,13 +62,13 @@ class Stage(StrEnum):
 
 
 class CannotMakeError(Exception):
-    """A command has failed; the text is what it said."""
+    """A command has failed, with its error text."""
 
 
 def flies(run: Run) -> bool:
-    """Return whether there is anything to fly: decisions that say where a robot is to be.
+    """Return whether there is a flight: whether some decisions are positions of robots.
 
-    A sketch without decisions is the picture of a team that was not drawn here: it flies as its files have it.
+    A sketch without decisions is the picture of an imported team, which flies according to its files.
     """
     if run.record.flies is not None:
         return run.record.flies
@@ -75,20 +77,20 @@ def flies(run: Run) -> bool:
 
 
 def can_record() -> bool:
-    """Return whether the extra that writes recordings is installed."""
+    """Return whether the extra for recordings is installed."""
     return find_spec("mcap") is not None
 
 
 class FlightBuilder:
-    """Makes the files of one run that are looked at or handed on. `builder_of` returns the one object of each."""
+    """Builds the files of one run. `builder_of` returns the object of a run."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
         self.stage = Stage.WAITING
         self.troubles: dict[Stage, str] = {}
-        """What could not be made, and why."""
+        """The errors of failed stages."""
         self._began = time.monotonic()
-        self._wanted = Listeners()
+        self._requests = Listeners()
         self._job: Job[None] | None = None
         self._before: Job[None] | None = None
         self._call: Call = event_loop_caller()
@@ -96,32 +98,32 @@ class FlightBuilder:
 
     @property
     def has_answer(self) -> bool:
-        """Whether the team has decided something that can be flown: in the end, or before something happened."""
+        """Whether the team has an answer that can be flown: at the end, or before an event."""
         return self.run.result is not None and self.run.result.has_decided
 
     @property
     def has_flight(self) -> bool:
-        """Whether there is a flight to be shown, once it is made."""
+        """Whether there is a flight to show, when it is built."""
         return self.has_answer and flies(self.run) and Stage.FLIGHT not in self.troubles
 
     @property
     def has_conversation(self) -> bool:
-        """Whether there are messages to be shown."""
+        """Whether there are messages to show."""
         return self.run.artefact(JOURNAL) is not None and Stage.CONVERSATION not in self.troubles
 
     @property
     def flight(self) -> Path | None:
-        """The scene, if it is there."""
+        """The page of the scene, if it exists."""
         return self.run.artefact(FLIGHT)
 
     @property
     def conversation(self) -> Path | None:
-        """The messages, if they are there."""
+        """The page of the messages, if it exists."""
         return self.run.artefact(CONVERSATION)
 
     @property
     def seconds(self) -> float:
-        """How long it has been at work."""
+        """The elapsed time of the work."""
         return time.monotonic() - self._began
 
     @property
@@ -129,39 +131,39 @@ class FlightBuilder:
         """Whether only the first messages are shown."""
         return self.run.result is not None and self.run.result.messages > MOST_MESSAGES
 
-    def wanted(self, told: Callable[[], None]) -> Callable[[], None]:
-        """Begin, if that has not been done; call `told` at every stage. Return what says that it is not wanted."""
-        leave = self._wanted.add(told)
+    def request(self, on_stage: Callable[[], None]) -> Callable[[], None]:
+        """Start the work if necessary, and call `on_stage` at each stage; return a function that ends the request."""
+        leave = self._requests.add(on_stage)
         if self.stage == Stage.WAITING:
-            self._begin()
+            self._start()
 
         def release() -> None:
             leave()
-            if not self._wanted:
+            if not self._requests:
                 self.cancel()
 
         return release
 
-    def again(self) -> None:
-        """Try again to make what could not be made, and a flight that was refused. Raises `OSError`."""
+    def retry(self) -> None:
+        """Repeat the failed stages, and a flight that was rejected. Raises `OSError`."""
         if self.stage != Stage.DONE:
             return
         flown = flight_result_of(self.run)
         if flown and flown.refused:
             for name in (FLIGHT, FLOWN):
                 (self.run.folder / name).unlink(missing_ok=True)
-        if self.troubles or self._wants_flight:
-            self._begin()
+        if self.troubles or self._needs_flight:
+            self._start()
 
     def cancel(self) -> None:
-        """End the work. What is there already stays."""
+        """End the work. Existing files remain."""
         if self._job is not None:
             self._job.end()
             self._before, self._job = self._job, None
-            self._become(Stage.WAITING)
+            self._set_stage(Stage.WAITING)
 
     async def recording(self) -> Path:
-        """Return a recording of the flight, which is made now if it is not there. Raises `CannotMakeError`."""
+        """Return a recording of the flight, which is created if it does not exist. Raises `CannotMakeError`."""
         async with self._recording:
             file = self.run.artefact(RECORDING)
             if file is None:
@@ -171,28 +173,28 @@ class FlightBuilder:
                     file = job.future.result()
                 except CannotMakeError:
                     raise
-                except Exception as fault:  # noqa: BLE001 - it was ended, or the file of errors has it
+                except Exception as fault:  # noqa: BLE001 - the job was ended, or the error is in the error log
                     raise CannotMakeError(error_text(fault)) from None
             return file
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         self.troubles.clear()
         self._began = time.monotonic()
         self._call = event_loop_caller()
-        self.stage = Stage.FLIGHT if self._wants_flight else Stage.CONVERSATION
+        self.stage = Stage.FLIGHT if self._needs_flight else Stage.CONVERSATION
         before, self._before = self._before, None
         self._job = job = Job(f"flight {self.run.folder}", partial(self._make, before), folder=self.run.folder)
-        job.over = partial(self._broken_off, job)
+        job.over = partial(self._interrupted, job)
         job.start()
 
     @property
-    def _wants_flight(self) -> bool:
+    def _needs_flight(self) -> bool:
         return self.flight is None and self.has_answer and flies(self.run)
 
     def _make(self, before: Job[None] | None, job: Job[None]) -> None:
-        if before:  # two shall not write the same files
+        if before:  # two jobs must not write the same files
             before.join()
-        if self._wants_flight:
+        if self._needs_flight:
             self._part(job, Stage.FLIGHT, self._make_flight)
         if self.conversation is None and self.run.artefact(JOURNAL):
             self._part(job, Stage.CONVERSATION, self._make_conversation)
@@ -205,27 +207,27 @@ class FlightBuilder:
         except CannotMakeError as why:
             self.troubles[stage] = str(why)
 
-    def _broken_off(self, job: Job[None], why: str) -> None:
+    def _interrupted(self, job: Job[None], why: str) -> None:
         if self._job is job and why:
             self.troubles[self.stage] = why
         self._advance(job, Stage.DONE if why else Stage.WAITING)
 
     def _make_flight(self, job: Job[None]) -> None:
-        self._team_is_there()
+        self._write_team()
         given = [self._result(), "--team", self.run.team.name, *self._map()]
         try:
-            told = self._ran(job, "fly", *given, "--json", "--html", FLIGHT)
-        except CannotMakeError as why:  # too near to each other, say: where they end can be seen all the same
-            self._ran(job, "animate", *given, "--html", FLIGHT)
-            told = refused(str(why).rpartition(_REFUSAL)[2])
-        write_atomically(self.run.folder / FLOWN, told)
+            result = self._run(job, "fly", *given, "--json", "--html", FLIGHT)
+        except CannotMakeError as why:  # for example, drones too near to each other: show the goals nevertheless
+            self._run(job, "animate", *given, "--html", FLIGHT)
+            result = refused(str(why).rpartition(_REFUSAL)[2])
+        write_atomically(self.run.folder / FLOWN, result)
 
     def _make_conversation(self, job: Job[None]) -> None:
         cut = ["--to", str(MOST_MESSAGES - 1)] if self.is_cut else []
-        self._ran(job, "journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
+        self._run(job, "journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
 
     def _map(self) -> list[str]:
-        """Write the map of the ground; return the options that name it. Without a map there are none."""
+        """Write the map of the ground, if there is one; return the options that name it."""
         ground = ground_of(self.run)
         if ground is None:
             return []
@@ -233,22 +235,22 @@ class FlightBuilder:
         return ["--map", MAP]
 
     def _result(self) -> str:
-        """Return the file of the run's result: with what has happened in words, if something has."""
-        told = captioned(self.run)
-        if told is None:
+        """Return the file of the run's result, with its events in words if there are any."""
+        result = captioned(self.run)
+        if result is None:
             return RESULT
-        write_atomically(self.run.folder / CAPTIONED, told)
+        write_atomically(self.run.folder / CAPTIONED, result)
         return CAPTIONED
 
     def _record(self, job: Job[Path]) -> Path:
-        self._team_is_there()
+        self._write_team()
         fresh = f"{RECORDING}.new"
         given = [RESULT, "--team", self.run.team.name, *self._map()]
-        self._ran(job, "fly", *given, "--json", "--ros", f"mcap:{fresh}")
+        self._run(job, "fly", *given, "--json", "--ros", f"mcap:{fresh}")
         return (self.run.folder / fresh).replace(self.run.folder / RECORDING)
 
-    def _team_is_there(self) -> None:
-        """Write the team's files, if they are not there: a state from elsewhere comes without."""
+    def _write_team(self) -> None:
+        """Write the team's files, if they do not exist: an opened state does not contain them."""
         run = self.run
         if run.team.is_dir():
             return
@@ -257,25 +259,50 @@ class FlightBuilder:
         except (ModelError, InvalidInputError, ValueError, TypeError) as mistake:
             raise CannotMakeError(str(mistake)) from None
 
-    def _ran(self, job: Job[None] | Job[Path], *arguments: str) -> bytes:
-        """Run a command of robochoc in the run's folder; return what it wrote."""
+    def _run(self, job: Job[None] | Job[Path], *arguments: str) -> bytes:
+        """Run a command of robochoc in the run's folder; return its output."""
         finished = job.run(Command(arguments, self.run.folder))
         if finished.status not in {0, _NOT_AS_PLANNED}:
             raise CannotMakeError(finished.why[-_MAX_MESSAGE:])
         return finished.out
 
     def _advance(self, job: Job[None], stage: Stage) -> None:
-        """Note the stage that a job has reached, unless nobody wants that job any more."""
+        """Set the stage that a job has reached, unless the job was cancelled."""
         if self._job is job:
             if stage in {Stage.DONE, Stage.WAITING}:
                 self._job = None
-            self._become(stage)
+            self._set_stage(stage)
 
-    def _become(self, stage: Stage) -> None:
+    def _set_stage(self, stage: Stage) -> None:
         self.stage = stage
-        self._call(self._wanted)
+        self._call(self._requests)
 
 
 def builder_of(run: Run) -> FlightBuilder:
-    """Return what is made of a run, the same object for all pages that show it."""
+    """Return the builder of a run; the same object for all pages."""
     return run.part(FlightBuilder)
+
+
+def captioned(run: Run) -> bytes | None:
+    """Return the result of a run with its events in words; None if there are none, or they are not known."""
+    with suppress(OSError, ValueError, TypeError, LookupError, msgspec.MsgspecError, RecursionError, InvalidInputError):
+        happened = _events(run)
+        file = run.folder / RESULT
+        if not happened or file.stat().st_size > MAX_RESULT:
+            return None
+        result: dict[str, Any] = msgspec.json.decode(file.read_bytes().partition(b"\n")[0], type=dict[str, Any])
+        first, *others = result["epochs"]
+        if len(others) != len(happened):
+            return None
+        captions = zip(others, happened, strict=True)
+        result["epochs"] = [first, *({**epoch, "opened_by": caption} for epoch, caption in captions)]
+        return msgspec.json.encode(result) + b"\n"
+    return None
+
+
+def _events(run: Run) -> list[str]:
+    """Return the event before each epoch except the first, without a full stop."""
+    if run.sketch.decisions:
+        sentences = happened_in(run)
+        return [" ".join(sentences).removesuffix(".")] if sentences else []
+    return [sentence.removesuffix(".") for sentence in events_in_words(read_team(run.team))]

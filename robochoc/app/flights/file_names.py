@@ -1,4 +1,4 @@
-"""Names of files that are handed on: whatever a team is called, any system can keep them."""
+"""Names of downloaded files that are valid on all systems, for any name of a team."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ _OTHERS = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST = 60
 _USUAL = "team"
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com[0-9]|lpt[0-9])")
-"""Windows keeps these for devices."""
+"""Names of devices on Windows."""
 
 
 def file_name(name: str, ending: str = "") -> str:
-    """Return a file's name for `name`: ASCII letters, digits, `_` and `-`; then `ending`."""
+    """Return a file name for `name` with ASCII letters, digits, `_` and `-` only, followed by `ending`."""
     plain = _OTHERS.sub("-", name).strip("-")[:_LONGEST].strip("-")
     return f"{_USUAL if not plain or _RESERVED.fullmatch(plain) else plain}{ending}"

@@ -1,4 +1,4 @@
-"""The map of a team as its flight wants it (`robochoc fly --map`): where robots stand, and which cells are blocked."""
+"""The map of a team for its flight (`robochoc fly --map`): positions of robots, and blocked cells."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MAP = "map.json"
 
 
 _MOST_TOLD = 100_000
-"""Characters of all that is told of a change: fifty sentences have far fewer."""
+"""The maximum number of characters in the texts of a change."""
 
 
 class Change(msgspec.Struct):
-    """What is read of `change.json`: the team after what has happened; if it decided `anew`, in another run."""
+    """The content of `change.json`: the team after the events, and why it decided `anew` in another run, if so."""
 
     after: Sketch
     happened: list[str] = []
@@ -28,12 +28,12 @@ class Change(msgspec.Struct):
 
     @property
     def is_sound(self) -> bool:
-        """Whether it can be shown at all, wherever its file is from."""
+        """Whether the change is within the limits, since its file may be untrusted."""
         return is_sound(self.after) and len(self.anew) + sum(map(len, self.happened)) <= _MOST_TOLD
 
 
 def ground_of(run: Run) -> GroundMap | None:
-    """Return the map of a run's team; None for a team that was not drawn here. Raises as `Run.sketch`."""
+    """Return the map of a run's team; None for an imported team. Raises as `Run.sketch`."""
     sketch = run.sketch
     if not sketch.decisions:
         return None
@@ -43,7 +43,7 @@ def ground_of(run: Run) -> GroundMap | None:
         sketch.area.rows,
         {
             robot.name: (robot.at.x + 1, robot.at.y + 1)
-            for robot in (*after.robots, *sketch.robots)  # where both have one, it stands where it stood first
+            for robot in (*after.robots, *sketch.robots)  # a robot in both has its first position
             if sketch.area.has(robot.at)
         },
         tuple(_blocked(sketch, after)),
@@ -51,13 +51,13 @@ def ground_of(run: Run) -> GroundMap | None:
 
 
 def changed_to(run: Run) -> Sketch | None:
-    """Return the team after what has happened to it during a run, for which it decided again; None: nothing has."""
+    """Return the team after the events during a run, for which it decided again; None if there were none."""
     change = _change(run)
     return change.after if change else None
 
 
 def happened_in(run: Run) -> list[str]:
-    """Return what has happened to the team during a run, in sentences."""
+    """Return the events during a run, in sentences."""
     change = _change(run)
     return change.happened if change else []
 
@@ -70,7 +70,7 @@ def _change(run: Run) -> Change | None:
 
 
 def _blocked(before: Sketch, after: Sketch) -> Iterator[BlockedCell]:
-    """Yield all blocked cells; those that are blocked by what has happened, from the second epoch on."""
+    """Yield all blocked cells; cells blocked by an event are blocked from the second epoch on."""
     for cell in sorted(before.area.blocked | after.area.blocked):
         if before.area.has(cell):
             yield BlockedCell(cell.x + 1, cell.y + 1, 0 if cell in before.area.blocked else 1)

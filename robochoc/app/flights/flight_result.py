@@ -1,4 +1,4 @@
-"""How a flight went, as `robochoc fly --json` tells it; or why it could not be flown."""
+"""The result of a simulated flight (the output of `robochoc fly --json`), or the reason why there was none."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.app.texts import say
 
 FLOWN = "flight.json"
 _ARRIVED_M = 0.1
-"""As `robochoc fly` has it: who is further away has not arrived."""
+"""The tolerance of `robochoc fly`: a drone farther from its goal has not arrived."""
 _MOST_TOLD = 6
 _MAX_BYTES = 64 << 20
 
@@ -29,13 +29,13 @@ class _Drone(msgspec.Struct, frozen=True):
 
 
 class FlightResult(msgspec.Struct, frozen=True):
-    """How a flight went.
+    """The result of a flight.
 
     Attributes:
-        as_planned: Whether all have arrived, and kept their distance.
-        refused: Why it was not flown. Empty: it was.
-        drones: Where they are in the end.
-        happenings: What happened on the way.
+        as_planned: Whether all drones have arrived and kept their distance.
+        refused: The reason why there was no flight. Empty: there was one.
+        drones: The drones at the end.
+        happenings: Events during the flight.
     """
 
     as_planned: bool = True
@@ -45,12 +45,12 @@ class FlightResult(msgspec.Struct, frozen=True):
 
 
 def refused(why: str) -> bytes:
-    """Return the content of a file that says why nothing was flown."""
+    """Return the content of a result file with the reason why there was no flight."""
     return msgspec.json.encode({"as_planned": False, "refused": why})
 
 
 def flight_result_of(run: Run) -> FlightResult | None:
-    """Return how the flight of a run went; None: that is not known."""
+    """Return the result of a run's flight; None if it is not known."""
     file = run.artefact(FLOWN)
     try:
         if file is None or file.stat().st_size > _MAX_BYTES:
@@ -61,7 +61,7 @@ def flight_result_of(run: Run) -> FlightResult | None:
 
 
 def flight_words(flown: FlightResult) -> list[str]:
-    """Return what is to be told of a flight, in sentences: nothing of one in which all went well."""
+    """Return the problems of a flight in sentences; none if it went as planned."""
     return [*_words(flown)]
 
 

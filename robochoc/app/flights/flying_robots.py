@@ -1,4 +1,4 @@
-"""Who flies in a run, and who stays on the ground, and why."""
+"""The robots that fly in a run, and the reasons why others do not."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from robochoc.app.sketch.words import listed
 from robochoc.app.texts import say
 
 SENT_BY = frozenset({Kind.LEVEL, Kind.PLACE})
-"""The kinds of decisions that say where a robot is to be."""
+"""The kinds of decisions that are positions of robots."""
 
 
 def flying_robots_words(run: Run) -> list[str]:
-    """Return sentences on how many robots fly, and which do not and why; none where nobody flies, or it is not known.
+    """Return sentences on the number of flying robots, and on the others; none if no robot flies, or it is not known.
 
     Raises as `Run.sketch`.
     """
@@ -24,10 +24,10 @@ def flying_robots_words(run: Run) -> list[str]:
     after = changed_to(run) or before
     if run.result is None or not run.result.assignment or not before.decisions:
         return []
-    return [*_told(before, after, run.result)]
+    return [*_sentences(before, after, run.result)]
 
 
-def _told(before: Sketch, after: Sketch, result: RunResult) -> Iterator[str]:
+def _sentences(before: Sketch, after: Sketch, result: RunResult) -> Iterator[str]:
     names = [robot.name for robot in after.robots]
     left = [robot.name for robot in before.robots if robot.name not in {*names}]
     sent = {

@@ -1,4 +1,4 @@
-"""A run in a few words, for a list of runs: when it was, what for, and what came of it."""
+"""A run in one line, for a list of runs: time, purpose and verdict."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def run_words(run: Run, now: datetime | None = None) -> str:
 
     Args:
         run: The run.
-        now: The local time; by default as it is. Of runs of other days the day is told, too.
+        now: The local time; by default the present. The lines of runs on other days include the date.
     """
     began = datetime.fromtimestamp(run.record.started).astimezone()
     when = (
@@ -27,7 +27,7 @@ def run_words(run: Run, now: datetime | None = None) -> str:
 
 
 def purpose_words(run: Run) -> str:
-    """Return what a run was for."""
+    """Return the purpose of a run in words."""
     key = "opened" if run.record.opened else _PURPOSES.get(run.record.purpose, "other")
     return say(f"fly.run.{key}")
 

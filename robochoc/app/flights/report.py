@@ -1,13 +1,13 @@
-"""The report of a run: one HTML file to hand on, which needs no network and no robochoc to be read.
+"""The report of a run: one self-contained HTML file.
 
-Names come from files that others wrote. They reach HTML as escaped text only, and the page's Content-Security-Policy
-lets no script run but those of the scene and of the conversation, which stand in frames of their own.
+Names are untrusted input: they are escaped, and the page's Content-Security-Policy allows only the scripts of the scene
+and the conversation, which are in frames.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -18,7 +18,6 @@ from typing import Any
 
 import msgspec
 
-from robochoc.app.flights.answer import broken
 from robochoc.app.flights.answer_check import claim_words
 from robochoc.app.flights.builder import flies
 from robochoc.app.flights.flight_map import changed_to, happened_in
@@ -26,40 +25,49 @@ from robochoc.app.flights.flight_result import flight_result_of, flight_words
 from robochoc.app.flights.flying_robots import flying_robots_words
 from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.result import robots_in
-from robochoc.app.runs.rule_costs import Decided, rule_cost, rules_with_costs, values_by_robot
+from robochoc.app.runs.rule_costs import Decided, rule_cost, rules_with_costs, values_by_robot, violated_links
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Sketch, Value
+from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
 from robochoc.app.sketch.words import listed, sentence, value_words, weight_of
 from robochoc.app.texts import LANGUAGE, say
 from robochoc.model.cost_units import cost_shown
 from robochoc.system.plain_text import printable
 
 _MOST_VALUES = 12
-"""Values of a decision that are listed."""
+"""The maximum number of listed values of a decision."""
 _MOST_LINKS = 4
 _SCRIPTS = re.compile(rb"script-src ([^;]*);")
 _HEAD_BYTES = 4096
-"""A page's policy stands in so many bytes, at its beginning."""
+"""The number of bytes at the start of a page that contain its policy."""
 
 
 @dataclass(frozen=True)
 class Pages:
-    """The pages that a report contains: the scene, and the conversation. None: it has none."""
+    """The pages in a report: the scene and the conversation, or None."""
 
     flight: bytes | None = None
     conversation: bytes | None = None
+
+
+@dataclass(frozen=True)
+class ViolatedRule:
+    """A rule that an answer violates, the robots of each violation, and the cost (None for a hard rule)."""
+
+    rule: SketchRule
+    links: tuple[tuple[str, ...], ...]
+    cost: int | None
 
 
 def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
     """Return the report of a run, UTF-8.
 
     Args:
-        sketch: What the run was made from.
+        sketch: The sketch of the run.
         run: The run.
-        pages: What can be looked at.
-        version: That of robochoc.
+        pages: The pages in the report.
+        version: The version of robochoc.
     """
     after = changed_to(run) or sketch
     parts = [
@@ -67,7 +75,7 @@ def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
         _rules(after, run),
         _frame("report.flight", pages.flight),
         _team(after),
-        _talk(run),
+        _messages(run),
         _frame("report.conversation", pages.conversation),
         _again(run, version),
     ]
@@ -79,17 +87,17 @@ def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
         name=_text(sketch.name),
         when=_text(_when(run)),
         summary=_text(summary(sketch, run)),
-        story="".join(f"<p>{_text(told)}</p>" for told in _story(run)),
+        story="".join(f"<p>{_text(sentence)}</p>" for sentence in _story(run)),
         parts="\n".join(filter(None, parts)),
     ).encode()
 
 
 def summary(sketch: Sketch, run: Run) -> str:
-    """Return what came of a run, in a sentence."""
+    """Return the outcome of a run, in a sentence."""
     result = run.result
     if result is None:
         return say("report.no-answer")
-    if result.epochs and not sketch.decisions:  # of files: some come and go
+    if result.epochs and not sketch.decisions:  # an imported team, whose robots may change
         there = len(robots_in(result.epochs[-1]))
     else:
         there = len((changed_to(run) or sketch).robots)
@@ -98,7 +106,7 @@ def summary(sketch: Sketch, run: Run) -> str:
     worth = run.record.maximised
     verdict = "most" if worth and verdict == "optimal" else verdict
     words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
-    if result.withdrawn and not flying_robots_words(run):  # which tells it, too
+    if result.withdrawn and not flying_robots_words(run):  # which mention withdrawn robots, too
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))
     if result.cost:
         words.append(say("report.worth" if worth else "report.cost", cost=cost_shown(result.cost)))
@@ -106,7 +114,7 @@ def summary(sketch: Sketch, run: Run) -> str:
 
 
 def _story(run: Run) -> list[str]:
-    """Return what happened to the team, who flies, and what went wrong on the way."""
+    """Return sentences on events, on the flying robots, and on problems of the flight."""
     happened = happened_in(run)
     flown = flight_result_of(run)
     return [
@@ -121,14 +129,14 @@ _VERDICTS = frozenset({"solution", "optimal", "most", "fewest", "no-solution", "
 
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
-    """Return what robots have decided, by robot and decision."""
+    """Return the values of an answer by robot and decision."""
     return values_by_robot(sketch, run.result.assignment) if run.result else {}
 
 
 def _answer(sketch: Sketch, run: Run) -> str:
     if run.result and not sketch.decisions:
-        told = [[name, value] for name, value in run.result.assignment.items()]
-        return _section("report.answer", _table([say("report.decision"), say("report.values")], told)) if told else ""
+        pairs = [[name, value] for name, value in run.result.assignment.items()]
+        return _section("report.answer", _table([say("report.decision"), say("report.values")], pairs)) if pairs else ""
     values = values_of(sketch, run)
     if not values:
         return ""
@@ -146,33 +154,40 @@ def _rules(sketch: Sketch, run: Run) -> str:
     if not sketch.rules:
         return ""
     values = values_of(sketch, run)
-    found = {one.rule.id: one for one in broken(sketch, values)}
-    costs = _by_degrees(sketch, values)
+    found = {violated.rule.id: violated for violated in violated_rules(sketch, values)}
+    costs = _graded_costs(sketch, values)
     items = []
     for rule in sketch.rules:
         marks = [f'<span class="soft">{_text(weight_of(rule))}</span>']
-        if one := found.get(rule.id):
-            links = listed([" - ".join(robots) for robots in one.links], _MOST_LINKS)
-            key = "report.broken" if one.cost is None else "report.broken-costs"
-            marks.append(f'<span class="bad">{_text(say(key, links=links, cost=one.cost))}</span>')
+        if violated := found.get(rule.id):
+            links = listed([" - ".join(robots) for robots in violated.links], _MOST_LINKS)
+            key = "report.broken" if violated.cost is None else "report.broken-costs"
+            marks.append(f'<span class="bad">{_text(say(key, links=links, cost=violated.cost))}</span>')
         if rule.id in costs:
             marks.append(f"<span>{_text(say('report.cost', cost=f'{costs[rule.id]:,}'))}</span>")
         items.append(f"<li>{_text(sentence(sketch, rule))} {' '.join(marks)}</li>")
     count = sum(rule.on for rule in sketch.rules)
     how = say("report.rules-broken", broken=len(found), count=count) if found else say("report.rules-kept", count=count)
-    told = f"<p>{_text(how)}</p>" if values else ""
-    return _section("report.rules", f"{told}<ol>{''.join(items)}</ol>")
+    head = f"<p>{_text(how)}</p>" if values else ""
+    return _section("report.rules", f"{head}<ol>{''.join(items)}</ol>")
 
 
-def _by_degrees(sketch: Sketch, values: Decided) -> dict[str, int]:
-    """Return what rules cost that are never broken, but cost more or less: by their ids."""
+def violated_rules(sketch: Sketch, values: Decided) -> Iterator[ViolatedRule]:
+    """Yield the rules that an answer violates. Withdrawn robots violate none."""
+    for rule in sketch.rules:
+        if rule.on and rule.kind in PALETTE and (links := violated_links(sketch, rule, values)):
+            yield ViolatedRule(rule, links, None if rule.cost is None else rule.cost * len(links))
+
+
+def _graded_costs(sketch: Sketch, values: Decided) -> dict[str, int]:
+    """Return the costs of graded rules, by their ids."""
     graded = (rule for rule in rules_with_costs(sketch) if values and PALETTE[rule.kind].graded)
     return {rule.id: rule_cost(sketch, rule, values) for rule in graded}
 
 
 def _team(sketch: Sketch) -> str:
     area = sketch.area
-    told = say("report.map", columns=area.columns, rows=area.rows, blocked=len(area.blocked))
+    size = say("report.map", columns=area.columns, rows=area.rows, blocked=len(area.blocked))
     decisions = []
     for decision in sketch.decisions:
         values = [value_words(sketch, decision, value) for value in sketch.values(decision)]
@@ -188,11 +203,11 @@ def _team(sketch: Sketch) -> str:
     drawn = f'<figure class="map">{picture(sketch)}</figure>' if sketch.decisions else ""
     return _section(
         "report.team",
-        f"{story}<p>{_text(told)}</p>{drawn}{_table(headings, decisions)}{_table(own, robots, fold=True)}",
+        f"{story}<p>{_text(size)}</p>{drawn}{_table(headings, decisions)}{_table(own, robots, fold=True)}",
     )
 
 
-def _talk(run: Run) -> str:
+def _messages(run: Run) -> str:
     result = run.result
     if result is None:
         return ""
@@ -220,15 +235,15 @@ def _again(run: Run, version: str) -> str:
 
 
 def _types(run: Run) -> dict[str, int]:
-    """Return how many messages of each type there were, if the result tells."""
+    """Return the number of messages of each type, if the result has them."""
     with suppress(OSError, msgspec.MsgspecError, LookupError, TypeError, ValueError, OverflowError):
-        whole: dict[str, Any] = msgspec.json.decode((run.folder / RESULT).read_bytes().splitlines()[0])
-        return {str(kind): int(count) for kind, count in whole["metrics"]["messages_by_type"].items()}
+        result: dict[str, Any] = msgspec.json.decode((run.folder / RESULT).read_bytes().splitlines()[0])
+        return {str(kind): int(count) for kind, count in result["metrics"]["messages_by_type"].items()}
     return {}
 
 
 def _frame(key: str, page: bytes | None) -> str:
-    """Return a page in a frame that can do nothing but draw itself."""
+    """Return a page in a sandboxed frame."""
     if page is None:
         return ""
     inside = escape(page.decode())
@@ -237,7 +252,7 @@ def _frame(key: str, page: bytes | None) -> str:
 
 
 def _policy(pages: Pages) -> str:
-    """Return the report's policy. A frame's page is bound by it, too: it lists their scripts."""
+    """Return the report's policy. It also applies to the frames, so it lists their scripts."""
     found = [_SCRIPTS.search(page[:_HEAD_BYTES]) for page in (pages.flight, pages.conversation) if page]
     scripts = " ".join(match[1].decode() for match in found if match) or "'none'"
     return (
@@ -262,7 +277,7 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[object]], *, fold: b
 
 
 def _when(run: Run) -> str:
-    with suppress(OverflowError, ValueError, OSError):  # a stranger's file may say any number
+    with suppress(OverflowError, ValueError, OSError):  # an opened file may contain any number
         return datetime.fromtimestamp(run.record.started, UTC).strftime("%Y-%m-%d %H:%M UTC")
     return ""
 

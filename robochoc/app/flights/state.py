@@ -1,9 +1,9 @@
-"""The state of a team as one file: the team and its last run, to be opened again elsewhere.
+"""The state of a team as one file: the team and one run, which can be opened elsewhere.
 
-It is the archive of the team (`sketch.files.zipped`), which every version opens, with the run beside:
+The file is the archive of the team (`sketch.files.zipped`), which all versions can open, with the run in addition:
 
-TEAM/...             the team's files, and how it was drawn
-TEAM/run/1/...       the run: how it was started, its answer, what was said
+TEAM/...             the team's files, and its sketch
+TEAM/run/1/...       the run: record, result and journal
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import FILES
 
 MAX_BYTES = 256 << 20
-"""Bytes of a run, unpacked."""
+"""The maximum number of bytes of an unpacked run."""
 MOST_SAID = opening.MAX_BYTES * 3 // 4
-"""Bytes of the messages of a run: of more, none are packed, so that the file can be opened again."""
+"""The maximum number of bytes of a packed journal. A larger one is left out, so that the file can be opened again."""
 MOST_AT_ONCE = {RECORD: MAX_SKETCH, SKETCH: MAX_SKETCH, CHANGE: MAX_SKETCH, RESULT: MAX_RESULT}
-"""Bytes of a file of the run that is read at once. A larger one is none of ours."""
+"""The maximum number of bytes of files that are read at once. Larger files are rejected."""
 _FILES = (RECORD, SKETCH, RESULT, JOURNAL, CHANGE)
 _AT_ONCE = 1 << 20
 _PLACE = "run/1"
@@ -44,7 +44,7 @@ _FRESH = "new"
 
 
 def team_archive(run: Run) -> bytes:
-    """Return the team of a run as a ZIP archive of its folder; with its sketch, if it was drawn here.
+    """Return the team of a run as a ZIP archive of its folder, with its sketch unless it is an imported team.
 
     Raises:
         InvalidInputError: if the sketch has errors.
@@ -55,7 +55,7 @@ def team_archive(run: Run) -> bytes:
 
 
 def files_archive(folder: Path, name: str) -> bytes:
-    """Return the files of a team that was not drawn here as a ZIP archive. Raises `OSError` if one cannot be read."""
+    """Return the files of an imported team as a ZIP archive. Raises `OSError` if a file cannot be read."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for file in sorted(folder.rglob("*.xml")):
@@ -75,31 +75,31 @@ def packed(run: Run) -> bytes:
 
 
 def is_too_long(run: Run) -> bool:
-    """Return whether so much was said in a run that it is packed without."""
+    """Return whether the journal of a run is too long to be packed."""
     journal = run.artefact(JOURNAL)
     return journal is not None and journal.stat().st_size > MOST_SAID
 
 
 def _add(archive: zipfile.ZipFile, name: str, file: Path) -> None:
-    """Add a file; it has no time, so that the same makes the same archive."""
+    """Add a file without its time, so that equal contents give equal archives."""
     entry = zipfile.ZipInfo(name)
     entry.compress_type = zipfile.ZIP_DEFLATED
     with file.open("rb") as source, archive.open(entry, "w") as packed_file:
-        shutil.copyfileobj(source, packed_file, _AT_ONCE)  # a piece at a time: it may be long
+        shutil.copyfileobj(source, packed_file, _AT_ONCE)  # in pieces, since the file may be long
 
 
 def unpack_run(file: Path, folder: Path) -> bool:
-    """Put the run of a packed state into `folder`, a team's that has none yet.
+    """Unpack the run of a packed state into the folder of a team without runs.
 
     Args:
-        file: What `packed` returned; or any other file: nothing is done then.
+        file: A file with the content of `packed`. Nothing is done for other files.
         folder: The team's folder.
 
     Returns:
-        Whether there was a run, and it is whole.
+        Whether there was a complete run.
 
     Raises:
-        OSError: if it cannot be written.
+        OSError: if the run cannot be written.
     """
     try:
         with bounded_archive(file) as archive:
@@ -113,7 +113,7 @@ def unpack_run(file: Path, folder: Path) -> bool:
     record.opened, record.checked = True, None
     found[RECORD] = msgspec.json.encode(record)
     run = Run(_written(found, folder / "runs"), record, sketch)
-    if (folder / FILES).is_dir():  # of a sketch, they are written when they are needed
+    if (folder / FILES).is_dir():  # the files of a sketch are written when they are needed
         shutil.copytree(folder / FILES, run.team)
     check(run)
     run.save()
@@ -121,20 +121,20 @@ def unpack_run(file: Path, folder: Path) -> bool:
 
 
 def _written(found: dict[str, bytes], runs: Path) -> Path:
-    """Return the folder of a run of these files: all of them, or none. Raises `OSError` if they cannot be written."""
+    """Write the files of a run atomically, and return its folder. Raises `OSError` if they cannot be written."""
     fresh = runs / _FRESH
     fresh.mkdir(mode=0o700, parents=True)
     try:
         for name, piece in found.items():
             (fresh / name).write_bytes(piece)
-        return fresh.rename(runs / _FIRST)  # only now it is seen: what has no record yet is removed
+        return fresh.rename(runs / _FIRST)  # only now it is visible: folders without a record are removed
     except BaseException:
         shutil.rmtree(fresh, ignore_errors=True)
         raise
 
 
 def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:
-    """Return the files of the run; none, if one is too large. Names are compared, never used as paths."""
+    """Return the files of the run; none if a file is too large. Names are compared, never used as paths."""
     found: dict[str, bytes] = {}
     left = MAX_BYTES
     for entry in archive.infolist():
@@ -143,7 +143,7 @@ def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:
         if name == inside or name not in _FILES or name in found:
             continue
         most = min(left, MOST_AT_ONCE.get(name, left))
-        with archive.open(entry) as stream:  # what an entry says of its own size need not be true
+        with archive.open(entry) as stream:  # the size in the entry is untrusted
             found[name] = stream.read(most + 1)
         if len(found[name]) > most:
             return {}
@@ -160,4 +160,4 @@ def _is_sound(found: dict[str, bytes]) -> bool:
         return False
     if not is_sound(sketch) or (change is not None and not change.is_sound):
         return False
-    return not (sketch.decisions and errors_of(sketch))  # without any: the picture of a team that was not drawn here
+    return not (sketch.decisions and errors_of(sketch))  # a sketch without decisions is the picture of an imported team

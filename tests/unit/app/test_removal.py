@@ -50,7 +50,7 @@ def test_all_that_it_does_is_ended(projects: Projects) -> None:
     its = runs_of(other).start(RunOptions(protocol="syncbb"))
     study_on(project).start(project.sketch, Question(("syncbb", "afb"), timeout=MOST_SECONDS))
     search = ConflictSearch(project.sketch, folder=project.folder)
-    FlightBuilder(kept).wanted(lambda: None)
+    FlightBuilder(kept).request(lambda: None)
     assert len(jobs_alive()) == 5
     wait_until(lambda: all(job.pid for job in jobs_alive()), "not all of them have begun")
     projects.remove(project.id)

@@ -1,4 +1,4 @@
-"""An answer in words, and robot by robot."""
+"""An answer as a headline in words, and as a table of robots."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _WHOLE = frozenset({"solution", "optimal"})
 
 
 def headline(run: Run, foreign: Facts | None = None) -> str:
-    """Return what came of a run, in a sentence or two. `foreign`: what is known of a team that was not drawn here.
+    """Return the outcome of a run in one or two sentences. `foreign`: the facts about an imported team.
 
-    Of one that came in a file, it says that the file says so, and what a check has found.
+    For a run from an opened file, the text says that it is a claim of the file, and whether it was checked.
     """
     return claim_words(run, _headline(run, foreign))
 
@@ -61,7 +61,7 @@ def _so_far(result: RunResult, state: State) -> str:
 
 
 def _cost(result: RunResult, *, worth: bool) -> str:
-    """Return what an answer costs, or is `worth`."""
+    """Return the cost of an answer, or its `worth`."""
     if result.cost is None:
         return ""
     if result.verdict == "optimal" and not result.withdrawn:
@@ -72,7 +72,7 @@ def _cost(result: RunResult, *, worth: bool) -> str:
 
 
 def _bound(run: Run, result: RunResult, foreign: Facts | None, *, worth: bool) -> str:
-    """Return what any answer costs at least; where robots may step aside, how many of them have to."""
+    """Return the lower bound of the cost, or of the number of robots that must withdraw."""
     if result.verdict in _WHOLE or result.bound is None:
         return ""
     if not run.record.options.withdraw:
@@ -84,8 +84,8 @@ def _bound(run: Run, result: RunResult, foreign: Facts | None, *, worth: bool) -
     return say("decide.aside-bound-weight" if weighted else "decide.aside-bound", bound=cost_shown(result.bound))
 
 
-def took(run: Run) -> str:
-    """Return what it took, in words."""
+def effort(run: Run) -> str:
+    """Return the protocol, runtime, messages and time of a run, in words."""
     result = run.result
     if result is None:
         return say("decide.took-time", seconds=f"{run.seconds:.1f}")
@@ -100,7 +100,7 @@ def took(run: Run) -> str:
 
 
 def table_html(sketch: Sketch, result: RunResult) -> str:
-    """Return what each robot has decided, as a table. All that users have named is escaped in it."""
+    """Return each robot's decisions as a table. Names given by users are escaped."""
     heads = "".join(f'<th scope="col">{escape(decision.name)}</th>' for decision in sketch.decisions)
     rows = []
     for robot in sketch.robots:

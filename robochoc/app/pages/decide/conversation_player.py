@@ -1,4 +1,4 @@
-"""What the robots say, in words: the last messages while they talk; afterwards all of it, played back."""
+"""The robots' conversation in words: the last messages during a run, and a playback afterwards."""
 
 from __future__ import annotations
 
@@ -10,24 +10,28 @@ from nicegui import run as background
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from robochoc.app.runs.conversation import conversation_of
+from robochoc.app.runs.options import JOURNAL
 from robochoc.app.runs.player import SPEEDS, Player
+from robochoc.app.runs.prepared_team import from_run
 from robochoc.app.runs.run import Run
-from robochoc.app.runs.tape import Said, Tape
+from robochoc.app.runs.tape import Said, Tape, recorded
 from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
+from robochoc.journal.entries import JournalError
+from robochoc.modelling.errors import ModelError
 
 TICK_S = 0.1
-"""A conversation that is played is drawn so often."""
+"""The interval at which a playback is drawn."""
 _LISTED = 6
 _ANSWERS_S = 20.0
-"""A browser that takes longer to answer is busy enough."""
+"""The time limit for a browser's answer; without an answer, nothing is played."""
 _CALM = "matchMedia('(prefers-reduced-motion: reduce)').matches"
 
 
 class ConversationPlayer:
-    """The list of messages, and below it, once the run is over, the controls that play it back.
+    """The list of messages, with controls for a playback after the run.
 
-    `draw` is called when the picture is to be drawn again: `shown` says which moment is to be seen.
+    `draw` is called when the picture must be drawn again; `shown` has the moment to show.
     """
 
     def __init__(self, draw: Callable[[], None]) -> None:
@@ -59,40 +63,40 @@ class ConversationPlayer:
 
     @property
     def shown(self) -> tuple[Tape, int] | None:
-        """The conversation that is played back, and the moment that is to be seen. None: what there is at the end."""
+        """The conversation that is played back, and its present moment. None: show the end of the run."""
         if self._tape is None or not self._opened or self._player.ended:
             return None
         return self._tape, self._player.moment
 
     @property
     def playing(self) -> bool:
-        """Whether the conversation that is played back goes on by itself."""
+        """Whether the playback is running."""
         return self._player.playing
 
-    def tell(self, said: Sequence[Said]) -> None:
-        """Show the last messages of a run that goes on."""
-        self._forget()
+    def show_live(self, said: Sequence[Said]) -> None:
+        """Show the last messages of a run in progress."""
+        self._reset()
         self._controls.set_visibility(False)
         self._list.set_content(said_html(said[:_LISTED]))
 
     def offer(self, run: Run | None) -> None:
-        """Let a run that is over be played back; None: there is none."""
+        """Offer the playback of an ended run; None: there is no run."""
         if run is self._run:
             return
-        self._forget()
+        self._reset()
         self._run = run
         self._controls.set_visibility(run is not None)
         self._list.set_content(said_html(run.live.said[:_LISTED]) if run else "")
         self._refresh()
 
-    def begin(self) -> None:
-        """Play it, unless the reader wants things to stand still."""
+    def start(self) -> None:
+        """Start the playback, unless the user prefers reduced motion."""
         with self._box:
-            ui.timer(0, self._begin, once=True)
+            ui.timer(0, self._start, once=True)
 
-    # What happens
+    # Events
 
-    async def _begin(self) -> None:
+    async def _start(self) -> None:
         try:
             calm = await ui.run_javascript(_CALM, timeout=_ANSWERS_S)
         except TimeoutError:
@@ -101,7 +105,7 @@ class ConversationPlayer:
             await self._toggle()
 
     async def _open(self) -> bool:
-        """Read the conversation, the first time; return whether it is there."""
+        """Read the conversation, if that is not done yet; return whether it is available."""
         run = self._run
         if self._tape is None and run is not None and not self._loading:
             self._loading = True
@@ -137,7 +141,7 @@ class ConversationPlayer:
             self._redraw()
 
     async def _sought(self, event: ValueChangeEventArguments[float | None]) -> None:
-        """Go where the slider was moved; it is drawn at the next tick: a slider moves more often."""
+        """Seek to the slider's position; it is drawn at the next tick, since a slider moves more often."""
         if event.value != self._player.moment and await self._open():
             self._player.seek(event.value)
             self._timer.active = True
@@ -148,13 +152,13 @@ class ConversationPlayer:
         self._ticked = now
         self._redraw()
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self._run = self._tape = None
         self._opened = False
         self._player = Player(1)
         self._timer.deactivate()
 
-    # What is shown
+    # Content
 
     def _redraw(self) -> None:
         self._refresh()
@@ -173,12 +177,25 @@ class ConversationPlayer:
             return
         self._slider.set_value(player.moment)
         self._list.set_content(said_html(tape.said_at(player.moment, _LISTED)))
-        told = {"number": f"{tape.messages_at(player.moment):,}", "all": f"{tape.messages:,}"}
-        self._where.set_text(say("decide.talk-where" if tape.is_whole else "decide.talk-where-first", **told))
+        counts = {"number": f"{tape.messages_at(player.moment):,}", "all": f"{tape.messages:,}"}
+        self._where.set_text(say("decide.talk-where" if tape.is_whole else "decide.talk-where-first", **counts))
+
+
+def conversation_of(run: Run, wanted: Callable[[], bool] = lambda: True) -> Tape | None:
+    """Return the conversation of a run; None if it is not available, or not `wanted` any more.
+
+    The function is slow: call it in a thread.
+    """
+    try:
+        ready = from_run(run)
+        tape = recorded(run.folder / JOURNAL, Tape(ready.robots, ready.label, ready.called), wanted)
+    except (OSError, JournalError, ModelError, InvalidInputError, ValueError, TypeError, KeyError):
+        return None
+    return tape if tape.messages and wanted() else None
 
 
 def said_html(said: Sequence[Said]) -> str:
-    """Return messages as a list, the last one first. All that robots say and are called is escaped in it."""
+    """Return messages as a list, the last one first. Names and texts are escaped."""
     if not said:
         return ""
     items = "".join(

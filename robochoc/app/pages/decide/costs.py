@@ -1,4 +1,4 @@
-"""What the rules cost in an answer: a bar for each, and what they come to together."""
+"""The costs of rules in an answer: a bar for each rule, and the sum."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from robochoc.app.texts import say
 from robochoc.model.cost_units import cost_shown
 
 MOST_BARS = 40
-"""Rules that have a bar of their own; what others cost stands in one line."""
+"""The maximum number of rules with a bar; the cost of the others is summed up in one line."""
 
 
 async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> None:
-    """Fill `where` with what rules cost, if there are costs. It is found beside the event loop."""
+    """Fill `where` with the costs of rules, if there are any. They are computed in a thread."""
     costs = await run.io_bound(rule_costs, sketch, result.assignment)
     if not costs or where.is_deleted:
         return
@@ -31,13 +31,13 @@ async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> No
 
 
 def _bars(sketch: Sketch, costs: Mapping[str, int]) -> None:
-    dearest_first = sorted(costs.items(), key=lambda one: -one[1])
+    highest_first = sorted(costs.items(), key=lambda item: -item[1])
     most = max(1, *costs.values())
     with ui.element("ul").classes("rules"):
-        for name, cost in dearest_first[:MOST_BARS]:
+        for name, cost in highest_first[:MOST_BARS]:
             rule = sketch.rule(name)
             _bar(f"{name}: {sentence(sketch, rule)}" if rule else name, cost, most)
-        if rest := dearest_first[MOST_BARS:]:
+        if rest := highest_first[MOST_BARS:]:
             _bar(say("decide.other-rules", count=len(rest)), sum(cost for _, cost in rest), most)
     with ui.element("p").classes("together"):
         ui.label(say("decide.together", cost=cost_shown(sum(costs.values()))))

@@ -1,4 +1,4 @@
-"""The map on which a team decides places: its cells and walls, where each robot stands, and where it is to go."""
+"""The map of a team that decides places: cells, walls, the robots' positions and their targets."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ UNIT = 56
 """The size of a cell."""
 Point = tuple[float, float]
 _HOME = 9
-"""The radius of what stands for a robot's own cell."""
+"""The radius of the ring in a robot's own cell."""
 _HALF = 13
-"""Half the height of what stands for a robot in the cell that it has chosen."""
+"""Half the height of a robot's label in its target cell."""
 _TIP = 9
 _LONGEST = 9
-"""Letters of a name that fit into a cell."""
+"""The number of letters of a name that fit into a cell."""
 _BESIDE = (7, 11)
-"""Robots of one cell stand so far beside and below each other."""
+"""The horizontal and vertical distance between robots in one cell."""
 
 
 class Target(msgspec.Struct, frozen=True):
-    """Where a robot has decided to go, and its other decisions in short (empty: there are none)."""
+    """The target cell of a robot, and its other decisions in short (empty if there are none)."""
 
     cell: Cell
     beside: str = ""
 
 
 def decides_places(sketch: Sketch) -> bool:
-    """Return whether somebody decides a place, so that the picture of the team is a map."""
+    """Return whether a robot decides a place, so that the picture of the team is a map."""
     return any(decision.kind == Kind.PLACE for decision in sketch.decisions)
 
 
 def targets_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, Target]:
-    """Return where robots have decided to go, by their names. Of several places that one decides, it is the first."""
+    """Return the targets of robots by their names; if a robot decides several places, the first one."""
     cells: dict[str, Cell] = {}
     beside: dict[str, list[str]] = {}
     for decision in sketch.decisions:
@@ -52,12 +52,12 @@ def targets_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, Tar
 
 
 def homes(sketch: Sketch) -> dict[str, Point]:
-    """Return where each robot stands in the picture. Those in one cell stand beside each other."""
+    """Return each robot's position in the picture; robots in one cell are drawn beside each other."""
     return _spread({robot.name: robot.at for robot in sketch.robots})
 
 
 def shown_part(sketch: Sketch) -> tuple[Cell, Cell]:
-    """Return the south-western and the north-eastern cell of what is drawn: all that matters, and a cell around it."""
+    """Return the south-western and north-eastern cell of the drawn part: all relevant cells and a margin."""
     cells = [robot.at for robot in sketch.robots]
     for decision in sketch.decisions:
         if decision.kind == Kind.PLACE:
@@ -69,7 +69,7 @@ def shown_part(sketch: Sketch) -> tuple[Cell, Cell]:
 
 
 def map_svg(sketch: Sketch) -> Iterator[str]:
-    """Yield the cells of the map, those that are blocked, and the numbers of columns and rows."""
+    """Yield the cells of the map, the blocked cells, and the numbers of columns and rows."""
     first, last = shown_part(sketch)
     left, top = first.x * UNIT, -(last.y + 1) * UNIT
     width, height = (last.x - first.x + 1) * UNIT, (last.y - first.y + 1) * UNIT
@@ -91,7 +91,7 @@ def map_svg(sketch: Sketch) -> Iterator[str]:
 
 
 def view_box(sketch: Sketch) -> str:
-    """Return what of the picture is shown, as an SVG says it."""
+    """Return the `viewBox` of the picture's SVG."""
     first, last = shown_part(sketch)
     width, height = (last.x - first.x + 1) * UNIT, (last.y - first.y + 1) * UNIT
     return f"{first.x * UNIT - 26} {-(last.y + 1) * UNIT - 6} {width + 32} {height + 30}"
@@ -106,9 +106,9 @@ def goers_svg(
     *,
     named: bool,
 ) -> Iterator[str]:
-    """Yield the robots: a ring at home, an arrow to the cell that is chosen, and there the name.
+    """Yield the robots: a ring at the robot's position, an arrow to its target, and the name there.
 
-    Whoever has chosen no cell is at home. `named`: there is room for names.
+    A robot without a target has its name at its position. `named`: whether there is room for names.
     """
     at_home = homes(sketch)
     chosen = _spread({name: target.cell for name, target in targets.items() if name in at_home})
@@ -126,7 +126,7 @@ def goers_svg(
 
 
 def brief(text: str, most: int) -> str:
-    """Return a text that has at most so many letters."""
+    """Return a text, shortened to a maximum number of letters."""
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
@@ -153,7 +153,7 @@ def _pill(at: Point, text: str) -> str:
 
 
 def _arrow(home: Point, there: Point) -> str:
-    """Return an arrow that begins at the ring, and ends before the name."""
+    """Return an arrow from the ring to the label."""
     across, along = there[0] - home[0], there[1] - home[1]
     far = hypot(across, along)
     if far < 2 * (_HOME + _HALF):

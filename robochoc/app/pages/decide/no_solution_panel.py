@@ -1,4 +1,4 @@
-"""No solution: who would have to step aside, and which rules are in each other's way, to be clicked away."""
+"""The panel for a team without a solution: withdraw robots, or find conflicting rules and change them."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _MOST_HINTS = 3
 
 
 def hints_about_rules(sketch: Sketch) -> list[Trouble]:
-    """Return which rules can be seen to be impossible, each with what to do."""
-    return [one for one in troubles(sketch) if one.about == About.RULE and not one.is_error]
+    """Return the hints on rules that are obviously impossible, each with a remedy."""
+    return [trouble for trouble in troubles(sketch) if trouble.about == About.RULE and not trouble.is_error]
 
 
 class NoSolutionPanel:
-    """The two doors out of a team without a solution.
+    """The two ways out for a team without a solution: withdraw robots, or change conflicting rules.
 
-    `decide` lets the team decide again, with `withdraw` so that robots may step aside.
+    `decide` starts a new run; with `withdraw`, robots may withdraw.
     """
 
     def __init__(self, project: Project, sketch: Sketch, decide: Callable[..., None]) -> None:
@@ -43,34 +43,34 @@ class NoSolutionPanel:
                 ui.label(say("decide.doors"))
             self._known = TroubleLines()
             with ui.element("div").classes("two"):
-                self._door("decide.door-aside", partial(decide, withdraw=True))
-                self._door("decide.door-conflict", self._look)
+                self._choice("decide.door-aside", partial(decide, withdraw=True))
+                self._choice("decide.door-conflict", self._search_conflict)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
         on_leave(self.end)
-        ui.timer(0, self._look_at_once, once=True)
+        ui.timer(0, self._show_hints, once=True)
 
-    async def _look_at_once(self) -> None:
-        """Tell what can be seen without a search: the same that the page "Model" tells at these rules."""
+    async def _show_hints(self) -> None:
+        """Show the hints that need no search, as on the page "Model"."""
         hints = await run.io_bound(hints_about_rules, self._sketch)
         if hints is not None and not self._found.is_deleted:
             self._known.show(hints[:_MOST_HINTS])
 
-    def _door(self, key: str, does: Callable[[], object]) -> None:
+    def _choice(self, key: str, does: Callable[[], object]) -> None:
         with ui.element("button").classes("card door").props("type=button").on("click", does):
             with ui.element("h3"):
                 ui.label(say(key))
             ui.label(say(f"{key}-help")).classes("soft")
 
     def end(self) -> None:
-        """Search no more."""
+        """End the search."""
         if self._search:
             self._search.end()
 
-    async def _look(self) -> None:
-        if self._search:  # it searches already
+    async def _search_conflict(self) -> None:
+        if self._search:  # a search is running
             return
         self._search = search = ConflictSearch(self._sketch, folder=self._project.folder)
-        self._tell(say("decide.searching", seconds=int(PATIENCE_S)))
+        self._set_text(say("decide.searching", seconds=int(PATIENCE_S)))
         try:
             conflict = await search.found()
         finally:
@@ -80,7 +80,7 @@ class NoSolutionPanel:
             hints = await run.io_bound(hints_about_rules, with_only(self._sketch, conflict.rules or ()))
             self._show(conflict, hints or [])
 
-    def _tell(self, text: str) -> None:
+    def _set_text(self, text: str) -> None:
         self._found.clear()
         with self._found:
             ui.label(text)
@@ -88,18 +88,18 @@ class NoSolutionPanel:
     def _show(self, conflict: Conflict, hints: list[Trouble]) -> None:
         if conflict.rules:
             one = len(conflict.rules) == 1
-            self._tell(say("decide.conflict-one") if one else say("decide.conflict", count=len(conflict.rules)))
+            self._set_text(say("decide.conflict-one") if one else say("decide.conflict", count=len(conflict.rules)))
             with self._found:
                 with ui.element("ul").classes("rules"):
                     for name in conflict.rules:
                         self._rule(name, [hint for hint in hints if hint.element == name])
                 ui.label(say("decide.by-cpmpy" if conflict.finder == Finder.CPMPY else "decide.by-own")).classes("soft")
         elif conflict.why:
-            self._tell(say("decide.conflict-failed", why=conflict.why))
+            self._set_text(say("decide.conflict-failed", why=conflict.why))
         elif conflict.late:
-            self._tell(say("decide.conflict-late", seconds=int(PATIENCE_S)))
+            self._set_text(say("decide.conflict-late", seconds=int(PATIENCE_S)))
         else:
-            self._tell(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
+            self._set_text(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
 
     def _rule(self, name: str, hints: list[Trouble]) -> None:
         rule = self._sketch.rule(name)
@@ -128,7 +128,7 @@ class NoSolutionPanel:
 
     def _soften(self, rule: SketchRule, cost: float | None) -> None:
         def softer(sketch: Sketch) -> Sketch:
-            now = sketch.rule(rule.id)  # as it is by now: somebody may have changed or removed it
+            now = sketch.rule(rule.id)  # the present rule: it may have been changed or removed
             return sketch if now is None else with_rule(sketch, msgspec.structs.replace(now, cost=int(cost or 0)))
 
         self._change(softer)

@@ -1,4 +1,4 @@
-"""The page `decide` of a team: one button; what the robots say to each other; the answer in words."""
+"""The page `decide` of a team: a button that starts a run, the robots' conversation, and the answer in words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from importlib.resources import files
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from robochoc.app.pages.decide.answer import headline, table_html, took
+from robochoc.app.pages.decide.answer import effort, headline, table_html
 from robochoc.app.pages.decide.conversation_player import ConversationPlayer
 from robochoc.app.pages.decide.costs import show_costs
 from robochoc.app.pages.decide.map_picture import decides_places, targets_of
@@ -34,13 +34,13 @@ from robochoc.model.cost_units import cost_shown
 
 PURPOSE = "decide"
 MOST_LIVE = 300
-"""Of more robots, the picture is drawn when they have decided, and now and then while they are played."""
+"""The picture of a larger team is drawn only at the end of the run, and from time to time during playback."""
 _SINGLE_CLICKS = (0, 1)
-"""How many clicks there were in a row (`UIEvent.detail`); of keys, 0."""
+"""Numbers of successive clicks (`UIEvent.detail`) that count as one; keys have 0."""
 SHORT_S = 3.0
-"""Of a search that took no longer, nobody has seen what was said."""
+"""Searches shorter than this are replayed, since they ended before anyone could watch."""
 FEW_MESSAGES = 100
-"""So many are played back however long they took: robots wait for a busy machine, too."""
+"""Searches with at most so many messages are also replayed: they may take longer on a busy machine."""
 
 
 def build_decide(project: Project) -> None:
@@ -50,17 +50,17 @@ def build_decide(project: Project) -> None:
 
 
 class _Page:
-    """What one browser tab shows of a team that decides."""
+    """The page in one browser tab."""
 
     def __init__(self, project: Project) -> None:
         self._project, self._runs = project, runs_of(project)
         self._foreign = project.facts if project.foreign else None
-        """What is known of a team that was not drawn here."""
+        """The facts about an imported team."""
         self._run: Run | None = None
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
-        self._told_below: tuple[object, ...] = ()
-        self._doors: NoSolutionPanel | ForeignNoSolutionPanel | None = None
+        self._shown_below: tuple[object, ...] = ()
+        self._no_solution: NoSolutionPanel | ForeignNoSolutionPanel | None = None
         self._pressed: Run | None = None
         self._frames = Frames()
         with ui.element("h1"):
@@ -73,13 +73,13 @@ class _Page:
                 self._status = ui.label("").classes("status").props("role=status")
                 self._facts = ui.label("").classes("soft facts")
             self._not_ready = ui.element("div").classes("not-ready")
-            self._how = RunOptionsPanel(project)
+            self._options = RunOptionsPanel(project)
         with ui.element("div").classes("decide-body"):
             with ui.element("section").classes("panel team-picture"):
                 self._picture = ui.html("", sanitize=False)
                 self._legend = ui.label(say("decide.legend")).classes("soft small")
                 self._falling = ui.html("", sanitize=False).classes("cost-line")
-                self._talk = ConversationPlayer(self._draw)
+                self._player = ConversationPlayer(self._draw)
             self._answer = ui.element("section").classes("panel answer")
         self._below = ui.element("div").classes("decide-below")
         on_leave(project.on_change(self._follow_team))
@@ -88,10 +88,10 @@ class _Page:
         self._follow_latest()
         self._follow_team()
 
-    # What happens
+    # Events
 
     def _press(self, event: GenericEventArguments) -> None:
-        """Decide, or stop; the second click of a double click does not stop what the first one has begun."""
+        """Start or stop a run; the second click of a double click does not stop the run that the first one started."""
         if event.args not in _SINGLE_CLICKS:
             return
         if self._run is not None and self._run.state == State.RUNNING:
@@ -102,11 +102,11 @@ class _Page:
             self._decide()
 
     def _decide(self, *, withdraw: bool = False) -> None:
-        options = self._how.options(withdraw=withdraw)
+        options = self._options.options(withdraw=withdraw)
         self._pressed = self._runs.start(options, files=self._project.files, purpose=PURPOSE)
 
     def _follow_latest(self) -> None:
-        """Show the run that was started last, perhaps in another tab."""
+        """Show the last started run, which may have been started in another tab."""
         self._end()
         self._run = self._runs.latest_for(PURPOSE)
         self._end_following = self._run.on_change(self._show) if self._run else None
@@ -117,7 +117,7 @@ class _Page:
             self._end_following()
 
     def _follow_team(self) -> None:
-        """Say what keeps the team from deciding, or that it is another than the one that has decided."""
+        """Show errors of the team, or that it differs from the team of the shown run."""
         errors = [] if self._foreign else errors_of(self._project.sketch)  # files were checked when they were opened
         self._not_ready.clear()
         if errors:
@@ -132,13 +132,13 @@ class _Page:
         self._go.set_enabled(running or not errors)
         self._show()
 
-    # What is shown
+    # Content
 
     def _show(self) -> None:
         shown, sketch = self._run, self._sketch()
         running = shown is not None and shown.state == State.RUNNING
         self._show_button(running=running)
-        self._show_talk(shown)  # first: what is played back may be of the run before
+        self._show_conversation(shown)  # first, since the playback may be of the previous run
         self._show_live(shown, sketch)
         changed = shown is not None and sketch != self._project.sketch
         now = (shown, shown and shown.state, shown and shown.result, changed)
@@ -146,8 +146,8 @@ class _Page:
             self._answered = now
             self._show_answer(shown, sketch, changed=changed)
         result = shown.result if shown else None
-        if (shown, result) != self._told_below:  # not when the state changes: somebody may have clicked there already
-            self._told_below = shown, result
+        if (shown, result) != self._shown_below:  # unchanged by a change of the state: the user may have clicked there
+            self._shown_below = shown, result
             self._clear_below()
             if shown is not None and result is not None:
                 with self._below:
@@ -168,22 +168,22 @@ class _Page:
             self._go.set_enabled(not any(self._not_ready))
         self._status.set_text(say("decide.running") if running else "")
 
-    def _show_talk(self, shown: Run | None) -> None:
-        """Show what the robots say. Who has pressed the button sees a short conversation afterwards, played slowly."""
+    def _show_conversation(self, shown: Run | None) -> None:
+        """Show the messages. A short conversation is played back in the tab where the run was started."""
         if shown is not None and shown.state == State.RUNNING:
-            self._talk.tell(shown.live.said)
+            self._player.show_live(shown.live.said)
             return
-        self._talk.offer(shown if shown and shown.result else None)
+        self._player.offer(shown if shown and shown.result else None)
         if shown is not None and shown is self._pressed:
             self._pressed = None
             if shown.state == State.ENDED and shown.result and _is_short(shown.result):
-                self._talk.begin()
+                self._player.start()
 
     def _draw(self) -> None:
-        """Draw the picture again: the conversation that is played back is at another moment."""
+        """Draw the picture again, after a change of the playback's moment."""
         sketch = self._sketch()
         large = len(sketch.robots) > MOST_LIVE
-        if self._frames.is_due(time.monotonic(), large=large, playing=self._talk.playing):
+        if self._frames.is_due(time.monotonic(), large=large, playing=self._player.playing):
             self._show_live(self._run, sketch)
 
     def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
@@ -198,7 +198,7 @@ class _Page:
         if shown is None:
             self._picture.set_content(team_svg(sketch, {}))
             return
-        played = self._talk.shown
+        played = self._player.shown
         self._picture.classes(add="playing" if played else "", remove="" if played else "playing")
         if played:
             self._show_moment(sketch, *played)
@@ -206,7 +206,7 @@ class _Page:
         live, result = shown.live, shown.result
         running = shown.state == State.RUNNING
         if running and len(sketch.robots) > MOST_LIVE and self._picture.content:
-            self._tell_facts(shown)
+            self._show_facts(shown)
             return
         values: dict[str, Value] = {}
         for some in [*live.values.values()]:
@@ -223,9 +223,9 @@ class _Page:
         falls = not (self._foreign and self._foreign.maximised)
         until = shown.seconds if running else 0.0
         self._falling.set_content(falling_svg([*live.costs], live.bound, until) if falls else "")
-        self._tell_facts(shown)
+        self._show_facts(shown)
 
-    def _tell_facts(self, shown: Run) -> None:
+    def _show_facts(self, shown: Run) -> None:
         live, running = shown.live, shown.state == State.RUNNING
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
@@ -249,7 +249,7 @@ class _Page:
                 ui.label(headline(shown, self._foreign))
             if shown.result is None:
                 return
-            ui.label(took(shown)).classes("soft")
+            ui.label(effort(shown)).classes("soft")
             if shown.message and shown.state == State.ENDED:
                 ui.label(say("decide.beside", why=shown.message)).classes("error")
             if why := shown.result.chosen.get("protocol"):
@@ -262,9 +262,9 @@ class _Page:
 
     def _show_below(self, shown: Run, result: RunResult, sketch: Sketch) -> None:
         if self._foreign:
-            self._doors = show_foreign_below(self._project, self._foreign, result, self._decide)
+            self._no_solution = show_foreign_below(self._project, self._foreign, result, self._decide)
         elif result.verdict == "no-solution":
-            self._doors = NoSolutionPanel(self._project, sketch, self._decide)
+            self._no_solution = NoSolutionPanel(self._project, sketch, self._decide)
         if shown.live.is_cut:
             ui.label(say("decide.live-cut", messages=f"{shown.live.messages:,}")).classes("soft")
         if result.assignment and not self._foreign:
@@ -273,9 +273,9 @@ class _Page:
         _command(shown)
 
     def _clear_below(self) -> None:
-        if self._doors:
-            self._doors.end()
-            self._doors = None
+        if self._no_solution:
+            self._no_solution.end()
+            self._no_solution = None
         self._below.clear()
 
 
@@ -306,5 +306,5 @@ def _style() -> str:
 
 
 def _is_short(result: RunResult) -> bool:
-    """Return whether the conversation was over before anybody could see it."""
+    """Return whether the conversation was too short to be watched."""
     return result.metrics.wall_s < SHORT_S or result.messages <= FEW_MESSAGES

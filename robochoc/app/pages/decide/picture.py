@@ -1,4 +1,4 @@
-"""A team that decides, as an SVG: what each has decided so far, and who has spoken in the last second."""
+"""A team during a run, as an SVG: the robots' values, and the messages of the last second."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from robochoc.model.cost_units import Cost, cost_shown
 UNIT = 56
 """The size of a cell."""
 MOST_MESSAGES = 200
-"""Lines between robots that have spoken. With more, nobody sees them apart."""
+"""The maximum number of lines for messages, for readability."""
 MOST_NAMED = 60
-"""Of more robots, only the values are written."""
+"""The maximum number of robots with names; in larger teams only the values are written."""
 _BRIEF = 12
 _FEW_LETTERS = 3
 _HALF = 19
-"""Half the height of what stands for a robot."""
+"""Half the height of a robot's label."""
 Says = Mapping[str, str]
 
 
 def values_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, str]:
-    """Return what each robot has decided, in short, by its name: places as column and row."""
+    """Return each robot's decisions in short, by its name; places as column and row."""
     said: dict[str, list[str]] = {}
     for decision in sketch.decisions:
         for robot in sketch.deciders(decision):
@@ -44,15 +44,15 @@ def team_svg(
     spoken: Mapping[tuple[str, str], int] = {},
     targets: Mapping[str, Target] = {},
 ) -> str:
-    """Return the picture: a map where places are decided. All that users have named is escaped in it.
+    """Return the picture; a map if places are decided. Names given by users are escaped.
 
     Args:
         sketch: The team.
-        says: What stands at each robot.
-        unsettled: Whose values may still change: they are grey.
-        aside: Who steps aside.
-        spoken: How many messages went from whom to whom in the last second.
-        targets: Which cells robots have chosen.
+        says: The text at each robot.
+        unsettled: Robots whose values may still change, which are grey.
+        aside: Withdrawn robots.
+        spoken: The number of messages in the last second, by sender and receiver.
+        targets: The cells that robots have chosen.
     """
     if decides_places(sketch):
         named = len(sketch.robots) <= MOST_NAMED
@@ -76,9 +76,9 @@ def _svg(view: str, parts: list[str], robots: int) -> str:
 
 
 def _places(sketch: Sketch) -> dict[str, tuple[float, float]]:
-    """Return where each robot is drawn: columns and rows in which nobody stands are left out.
+    """Return each robot's position in the picture, without empty columns and rows.
 
-    Those in one cell stand beside each other.
+    Robots in one cell are drawn beside each other.
     """
     columns = {x: place for place, x in enumerate(sorted({robot.at.x for robot in sketch.robots}))}
     rows = {y: place for place, y in enumerate(sorted({robot.at.y for robot in sketch.robots}))}
@@ -121,15 +121,15 @@ def _robots(
 
 
 def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, until: float = 0.0) -> str:
-    """Return how the cost has fallen, as a small line with its caption, and a band down to what it is at least.
+    """Return a small chart of the decreasing cost with its caption, and a band down to the lower bound.
 
     Args:
-        costs: The costs of the best so far: seconds since the start, and the cost.
-        bound: Nothing costs less. None: not known.
-        until: The line goes on to this time, in seconds since the start.
+        costs: The costs of the best answers so far: seconds since the start, and the cost.
+        bound: The lower bound of the cost. None: not known.
+        until: The end of the line, in seconds since the start.
 
     Returns:
-        The picture; empty where there is nothing to tell.
+        The picture; empty if the cost has not changed and no bound is known.
     """
     known = bound is not None and bool(costs) and bound <= costs[-1][1]
     if len(costs) < 2 and not known:  # noqa: PLR2004 - a line
@@ -150,7 +150,7 @@ def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, 
         words.append(say("decide.falling", first=cost_shown(costs[0][1]), last=cost_shown(best), seconds=fell))
     if known and low < best:
         words.append(say("decide.band", bound=cost_shown(low), best=cost_shown(best)))
-    if not words:  # the first answer was the best, and is known to be
+    if not words:  # the first answer was proven to be the best
         return ""
     said = escape(" ".join(words))
     band = f'<path class="band" d="{path}H{width}V{height}H0Z"/>' if known else ""

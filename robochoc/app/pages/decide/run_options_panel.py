@@ -1,4 +1,4 @@
-"""How a team decides: protocol, runtime, seed and time limit, folded away below the button."""
+"""The options of a run: protocol, runtime, seed and time limit, in a panel that is folded at first."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _MOST_REASONS = 12
 
 
 class RunOptionsPanel:
-    """The options, folded. `options` are those that are set."""
+    """The panel. `options` returns the chosen options."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
-        self._looked_at: object = None
-        with ui.expansion(say("decide.how"), on_value_change=self._look).classes("how") as self._fold:
+        self._shown_sketch: object = None
+        with ui.expansion(say("decide.how"), on_value_change=self._show_protocols).classes("how") as self._fold:
             with ui.element("div").classes("fields"):
                 self._protocol = ui.select({AUTO: say("decide.auto")}, value=AUTO, label=say("decide.protocol"))
                 names = {Runtime.SIMULATOR: "simulator", Runtime.PROCESSES: "processes"}
@@ -36,7 +36,7 @@ class RunOptionsPanel:
             self._why = ui.element("div").classes("why")
 
     def options(self, *, withdraw: bool = False) -> RunOptions:
-        """Return what is set. What cannot be is left to the usual."""
+        """Return the chosen options, with the default for each invalid value."""
         limit = self._limit.value
         return RunOptions(
             protocol=str(self._protocol.value or AUTO)[:MAX_LABEL],
@@ -46,21 +46,21 @@ class RunOptionsPanel:
             withdraw=withdraw,
         )
 
-    async def _look(self) -> None:
-        """Find out which protocols fit, when it is unfolded and the team is another than before."""
+    async def _show_protocols(self) -> None:
+        """Show the protocols that suit the team, when the panel is unfolded after a change of the team."""
         sketch = self._project.sketch
-        if not self._fold.value or self._looked_at is sketch:
+        if not self._fold.value or self._shown_sketch is sketch:
             return
-        self._looked_at = sketch
-        self._tell(say("decide.looking"))
+        self._shown_sketch = sketch
+        self._set_text(say("decide.looking"))
         found = await run_query(fitting, sketch, self._project.files)
         if isinstance(found, ErrorText):
-            self._looked_at = None  # unfolded anew, it is looked at again
-            self._tell(say("decide.fits-none", why=found))
+            self._shown_sketch = None  # try again when the panel is unfolded
+            self._set_text(say("decide.fits-none", why=found))
         elif found is not None:
             self._show(found)
 
-    def _tell(self, text: str) -> None:
+    def _set_text(self, text: str) -> None:
         self._why.clear()
         with self._why:
             ui.label(text).classes("soft")
@@ -70,7 +70,7 @@ class RunOptionsPanel:
         fit = {name: say(words[complete], name=name) for name, complete in found.protocols}
         chosen = self._protocol.value if self._protocol.value in fit else AUTO
         self._protocol.set_options({AUTO: say("decide.auto"), **fit}, value=chosen)
-        self._tell(say("decide.auto-would", protocol=found.chosen, why=found.why))
+        self._set_text(say("decide.auto-would", protocol=found.chosen, why=found.why))
         with self._why:
             ui.label("; ".join(found.facts)).classes("soft")
             if found.rejected:

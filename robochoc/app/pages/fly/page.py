@@ -1,4 +1,4 @@
-"""The page `fly` of a team: its flight, its conversation, and what can be handed on."""
+"""The page `fly` of a team: its flight, its conversation, and files to share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.app.flights.flight_result import flight_result_of, flight_words
 from robochoc.app.flights.flying_robots import flying_robots_words
 from robochoc.app.flights.listing import run_words
 from robochoc.app.flights.report import summary
-from robochoc.app.pages.fly.saved_files import beside
+from robochoc.app.pages.fly.saved_files import relative_address
 from robochoc.app.pages.fly.share_panel import build_share_panel
 from robochoc.app.pages.fly.stage import Stage as Frames
 from robochoc.app.pages.shell import on_leave
@@ -37,7 +37,7 @@ def build_fly(project: Project) -> None:
 
 
 class _Page:
-    """The page, which follows the run that it shows; without `?run=`, that is the last one."""
+    """The page of a run, which is updated; without `?run=`, of the last run."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
@@ -59,7 +59,7 @@ class _Page:
         return asked or self._runs.latest_for("decide") or self._runs.latest_for("whatif")
 
     def _follow(self) -> None:
-        """Show the run as it is now, where that is not what is shown."""
+        """Show the run, if it or its state has changed."""
         run = self._run()
         shown = (run.id, run.state) if run else None
         if shown == self._shown and shown is not None:
@@ -76,7 +76,7 @@ class _Page:
             key = "fly.gone" if run else "fly.gone-nothing"
             ui.label(say(key, run=self._asked, most=MOST_KEPT)).classes("note").props("role=status")
         if run is None:
-            _told("fly.nothing", "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
+            _empty_page("fly.nothing", "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
             return
         try:
             sketch = run.sketch
@@ -91,7 +91,7 @@ class _Page:
                 ui.label(say("fly.running"))
         elif run.state == State.FAILED:
             why = say("fly.failed", why=run.message)
-            _told(why, "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
+            _empty_page(why, "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
         else:
             self._result(run, sketch)
 
@@ -115,12 +115,12 @@ class _Page:
             ui.label(say("fly.no-answer")).classes("note")
         elif run.result and run.result.ends_unsolved:
             ui.label(say("fly.unsolved")).classes("note")
-        shown = _Made(making)
+        shown = _BuiltFrames(making)
         build_share_panel(making, shown.frames)
         self._leave = shown.leave
 
     def _choice(self, run: Run) -> None:
-        """Let earlier runs be chosen, where there are some."""
+        """Add the choice of earlier runs, if there are any."""
         runs = [one for one in self._runs.all() if one.state in {State.ENDED, State.STOPPED}]
         if len(runs) < 2:  # noqa: PLR2004 - nothing to choose
             return
@@ -133,11 +133,11 @@ class _Page:
         select.props("dense outlined").classes("fly-choice")
 
 
-class _Made:
-    """The frames of a run, which appear as soon as they are made, and what is said until then."""
+class _BuiltFrames:
+    """The frames of a run, which appear when they are built, with the progress until then."""
 
     def __init__(self, making: FlightBuilder) -> None:
-        self._making = making
+        self._builder = making
         self._line = ui.element("div").classes("fly-line").props("role=status")
         with self._line:
             self._spinner = ui.spinner(size="1.4rem")
@@ -146,72 +146,72 @@ class _Made:
             self._again = ui.button(say("fly.again"), on_click=self._begin).props("flat no-caps dense")
         self._troubles = ui.element("div").classes("fly-troubles").props("role=status")
         self.frames = Frames(flies=making.has_flight, talks=making.has_conversation)
-        self._timer = ui.timer(_TICK_S, self._tell_time)
+        self._timer = ui.timer(_TICK_S, self._show_time)
         self._release: Callable[[], None] = _nothing
         self._begin()
 
     def leave(self) -> None:
-        """Nobody looks any more."""
+        """End the request for the files, after the page was closed."""
         self._release()
 
     def _begin(self) -> None:
         self._release()
-        self._release = self._making.wanted(self._told)
-        self._told()
+        self._release = self._builder.request(self._update)
+        self._update()
 
     def _stop(self) -> None:
-        self._making.cancel()
-        self._told()
+        self._builder.cancel()
+        self._update()
 
-    def _told(self) -> None:
-        making, stage = self._making, self._making.stage
+    def _update(self) -> None:
+        making, stage = self._builder, self._builder.stage
         works = stage in {Stage.FLIGHT, Stage.CONVERSATION}
         self._line.set_visibility(stage != Stage.DONE)
         self._spinner.set_visibility(works)
         self._cancel.set_visibility(works)
         self._again.set_visibility(stage == Stage.WAITING)
         self._timer.active = works
-        self._tell_time()
+        self._show_time()
         flight, talk = _framed(making, making.flight), _framed(making, making.conversation)
         self.frames.show(flight, talk, flies=making.has_flight, talks=making.has_conversation)
         self.frames.set_visibility(making.has_flight or making.has_conversation)
         self._troubles.clear()
         with self._troubles:
-            self._tell_troubles()
+            self._show_troubles()
             if making.is_cut and talk:
                 ui.label(say("fly.cut", most=f"{MOST_MESSAGES:,}")).classes("soft")
 
-    def _tell_troubles(self) -> None:
-        making = self._making
+    def _show_troubles(self) -> None:
+        making = self._builder
         for place, why in making.troubles.items():
             ui.label(say(f"fly.trouble.{place}", why=why)).classes("error")
         flown = flight_result_of(making.run) if making.flight else None
         words = flight_words(flown) if flown else []
-        for told in words:
-            ui.label(told).classes("error" if flown and flown.refused else "note")
+        for sentence in words:
+            ui.label(sentence).classes("error" if flown and flown.refused else "note")
         failed = making.troubles or (flown and flown.refused)
         if making.stage == Stage.DONE and failed:
             ui.button(say("fly.try-again"), icon="refresh", on_click=self._try_again).props("flat no-caps dense")
 
     def _try_again(self) -> None:
         try:
-            self._making.again()
+            self._builder.retry()
         except OSError as why:
             ui.notify(say("fly.trouble.flight", why=why), type="negative")
-        self._told()
+        self._update()
 
-    def _tell_time(self) -> None:
-        stage = self._making.stage
+    def _show_time(self) -> None:
+        stage = self._builder.stage
         if stage == Stage.WAITING:
             self._says.set_text(say("fly.cancelled"))
         elif stage != Stage.DONE:
-            self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._making.seconds)))
+            self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._builder.seconds)))
 
 
 def _framed(making: FlightBuilder, page: Path | None) -> str | None:
-    """Return the address of a page for a frame: another one for each time that it was made."""
+    """Return the address of a page for a frame, with the time of the page against caching."""
     with suppress(OSError):
-        return f"{beside(making.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None
+        return f"{relative_address(making.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None
     return None
 
 
@@ -224,8 +224,8 @@ def _title() -> None:
         ui.label(say("fly.title"))
 
 
-def _told(what: str, remedy: str, link: str, address: str) -> None:
-    """Say what keeps the page from being filled, and where to go."""
+def _empty_page(what: str, remedy: str, link: str, address: str) -> None:
+    """Show why the page is empty, with a remedy and a link."""
     _title()
     ui.label(say(what) if what.startswith("fly.") else what)
     _remedy(remedy, link, address)

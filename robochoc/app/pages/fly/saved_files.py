@@ -1,6 +1,6 @@
-"""What a run has left, served as it is: its pages for frames of this application, and files to be saved.
+"""Serve the files of a run: its pages, for frames in this application, and downloads.
 
-/team/ID/kept/RUN/flight.html, conversation.html      whole documents, with policies of their own
+/team/ID/kept/RUN/flight.html, conversation.html      complete documents with their own policies
 /team/ID/kept/RUN/report.html, flight.mcap, team.zip, state.zip
 """
 
@@ -27,19 +27,19 @@ REPORT = "report.html"
 TEAM = "team.zip"
 STATE = "state.zip"
 MOST_IN_REPORT = 24 << 20
-"""Bytes of a page that a report contains: with a larger one it could hardly be sent to anybody."""
+"""The maximum number of bytes of a page in a report, so that the report can be sent by mail."""
 _HEADERS = {"Content-Security-Policy": "frame-ancestors 'self'"}
 _APART = {"Content-Security-Policy": "sandbox allow-scripts allow-popups allow-downloads; frame-ancestors 'self'"}
-"""Of a document that nothing here has to reach into: for the browser it is of another origin than the application."""
+"""The headers of the report, which gets another origin than the application: no page needs to access it."""
 
 
 def address(team: str, run: Run, file: str) -> str:
-    """Return where a file of a run is, below the application's own address."""
+    """Return the address of a file of a run, relative to the application's address."""
     return f"/team/{team}/kept/{run.id}/{file}"
 
 
-def beside(run: Run, file: str) -> str:
-    """Return the same as a relative address, for pages of the team: frames and links that scripts set need it."""
+def relative_address(run: Run, file: str) -> str:
+    """Return the address of a file of a run, relative to the pages of the team, for frames and links set by scripts."""
     return f"kept/{run.id}/{file}"
 
 
@@ -57,7 +57,7 @@ def install_saved_files(projects: Projects) -> None:
         if file in {FLIGHT, CONVERSATION}:
             return _page(run.artefact(file))
         try:
-            return await asyncio.to_thread(_made, run, file)
+            return await asyncio.to_thread(_built, run, file)
         except InvalidInputError as mistakes:
             return Response(str(mistakes), status_code=409, media_type="text/plain")
         except (OSError, ValueError):
@@ -68,8 +68,8 @@ def _page(file: Path | None) -> Response:
     return Response(status_code=404) if file is None else FileResponse(file, media_type="text/html", headers=_HEADERS)
 
 
-def _made(run: Run, file: str) -> Response:
-    """Return a file that is made when somebody asks for it, or a recording. It takes its time."""
+def _built(run: Run, file: str) -> Response:
+    """Return a file that is built on request, or a recording. This is slow."""
     sketch = run.sketch
     match file:
         case "report.html":

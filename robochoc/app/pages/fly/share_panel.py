@@ -1,4 +1,4 @@
-"""The part "Tell others": a report, a recording, the team's files, all of it, and a link."""
+"""The panel "Tell others": report, recording, the team's files, the saved state, and a link."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nicegui import ui
 from robochoc.app.flights.builder import RECORDING, CannotMakeError, FlightBuilder, can_record, flies
 from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.state import MOST_SAID, is_too_long
-from robochoc.app.pages.fly.saved_files import REPORT, STATE, TEAM, beside
+from robochoc.app.pages.fly.saved_files import REPORT, STATE, TEAM, relative_address
 from robochoc.app.pages.fly.stage import Stage
 from robochoc.app.texts import say
 
@@ -24,15 +24,15 @@ def build_share_panel(making: FlightBuilder, stage: Stage | None) -> None:
             ui.label(say("tell.title"))
         with ui.element("ul").classes("cards"):
             with _card("tell.report", "tell.report-hint"):
-                _link(say("tell.get"), "tell.report", beside(run, REPORT), file_name(name, ".html"))
-                _link(say("tell.report-open"), "tell.report", beside(run, REPORT))
+                _link(say("tell.get"), "tell.report", relative_address(run, REPORT), file_name(name, ".html"))
+                _link(say("tell.report-open"), "tell.report", relative_address(run, REPORT))
             _recording(making)
             with _card("tell.team", "tell.team-hint"):
-                _link(say("tell.get"), "tell.team", beside(run, TEAM), file_name(name, ".zip"))
+                _link(say("tell.get"), "tell.team", relative_address(run, TEAM), file_name(name, ".zip"))
             with _card("tell.state", "tell.state-hint"):
                 if is_too_long(run):
                     ui.label(say("tell.state-long", most=MOST_SAID >> 20)).classes("soft")
-                _link(say("tell.get"), "tell.state", beside(run, STATE), file_name(name, ".robochoc.zip"))
+                _link(say("tell.get"), "tell.state", relative_address(run, STATE), file_name(name, ".robochoc.zip"))
             with _card("tell.link", "tell.link-hint"):
                 _copy(run.id, stage)
 
@@ -53,7 +53,7 @@ def _recording(making: FlightBuilder) -> None:
                 except (CannotMakeError, OSError, ValueError) as why:
                     ui.notify(say("tell.not-made", why=why), type="negative")
                 else:
-                    ui.run_javascript(f"location.assign({json.dumps(beside(making.run, RECORDING))})")
+                    ui.run_javascript(f"location.assign({json.dumps(relative_address(making.run, RECORDING))})")
                 finally:
                     button.props(remove="loading")
 
@@ -68,7 +68,7 @@ def _copy(run: str, stage: Stage | None) -> None:
 
 
 class _card:  # noqa: N801 - a context manager, as NiceGUI's are
-    """A card with a title and a hint; inside, what can be done."""
+    """A card with a title, a hint, and actions."""
 
     def __init__(self, title: str, hint: str) -> None:
         with ui.element("li").classes("card told"):
@@ -85,7 +85,7 @@ class _card:  # noqa: N801 - a context manager, as NiceGUI's are
 
 
 def _link(text: str, what: str, address: str, saved_as: str | None = None) -> None:
-    """Add a link that looks like a button. With `saved_as`, the file is saved, else it is opened in a tab."""
+    """Add a link that looks like a button. With `saved_as`, it saves the file, else it opens the file in a tab."""
     link = ui.element("a").classes("button")
     link._props["href"] = address  # noqa: SLF001 - `props` would parse it
     link._props["aria-label"] = f"{say(what)}: {text}"  # noqa: SLF001

@@ -1,4 +1,4 @@
-"""The stage: the flight and the conversation in frames, on one line of time. The browser draws it (`stage.js`)."""
+"""The frames of the flight and the conversation, with a common time line, drawn in the browser (`stage.js`)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from robochoc.app.texts import say
 
 
 class Stage(Element, component="stage.js"):
-    """The two pages of a run.
+    """The frames of a run.
 
     Args:
-        flies: Whether there is a flight, or will be.
-        talks: The same for the conversation.
+        flies: Whether there is or will be a flight.
+        talks: Whether there is or will be a conversation.
     """
 
     def __init__(self, *, flies: bool, talks: bool) -> None:
@@ -29,15 +29,15 @@ class Stage(Element, component="stage.js"):
             "talks": say("fly.line.talks"),
             "flies": say("fly.line.flies"),
             "waiting": say("fly.line.waiting"),
-            "step": _left_open("fly.line.step"),
-            "seconds": _left_open("fly.line.seconds"),
-            "epoch": _left_open("fly.line.epoch"),
+            "step": _template("fly.line.step"),
+            "seconds": _template("fly.line.seconds"),
+            "epoch": _template("fly.line.epoch"),
         }
 
     def show(self, flight: str | None, talk: str | None, *, flies: bool, talks: bool) -> None:
-        """Show pages by their addresses, which are relative to this one. None: it is not there (yet).
+        """Show pages by their relative addresses; None for a page that does not exist (yet).
 
-        `flies` and `talks` are as they were when it was made, or as what could not be made has changed them.
+        `flies` and `talks` differ from their first values after the building of a page has failed.
         """
         self._props["flight"] = flight
         self._props["talk"] = talk
@@ -46,6 +46,6 @@ class Stage(Element, component="stage.js"):
         self.update()
 
 
-def _left_open(key: str) -> str:
-    """Return a text whose names in braces are filled in by the browser."""
+def _template(key: str) -> str:
+    """Return a text in which the browser replaces names in braces."""
     return say(key)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from robochoc.app.pages.decide.answer import headline, table_html, took
+from robochoc.app.pages.decide.answer import effort, headline, table_html
 from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.pages.whatif.story import Story
@@ -63,7 +63,7 @@ class WaysOut:
             with ui.element("h2").classes("headline"):
                 ui.label(headline(run))
             if run.result is not None:
-                ui.label(took(run)).classes("soft")
+                ui.label(effort(run)).classes("soft")
                 if run.result.assignment:
                     ui.html(table_html(self._after, run.result), sanitize=False).classes("values")
 

@@ -45,7 +45,7 @@ async def _made(making: FlightBuilder) -> list[Stage]:
         if making.stage is Stage.DONE:
             over.set()
 
-    making.wanted(told)
+    making.request(told)
     await over.wait()
     return stages
 
@@ -65,7 +65,7 @@ def test_a_run_without_its_teams_files_is_flown_and_a_damaged_journal_told(tmp_p
 
 def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path) -> None:
     making = FlightBuilder(kept_run(tmp_path, cube()))
-    one, other = making.wanted(lambda: None), making.wanted(lambda: None)
+    one, other = making.request(lambda: None), making.request(lambda: None)
     (job,) = jobs_alive()
     wait_until(lambda: job.pid is not None, "it has no process")
     one()
@@ -82,14 +82,14 @@ def test_what_failed_can_be_tried_again(tmp_path: Path, monkeypatch: pytest.Monk
     asyncio.run(_made(making))
     assert making.troubles[Stage.FLIGHT] == error_text(ValueError())
     assert not making.has_flight
-    making.wanted(lambda: None)
+    making.request(lambda: None)
     assert making.stage is Stage.DONE  # not by itself
     monkeypatch.undo()
     monkeypatch.setattr(
         FlightBuilder, "_make_flight", lambda self, _: self.run.folder.joinpath(FLIGHT).write_bytes(b"scene")
     )
     monkeypatch.setattr(FlightBuilder, "_make_conversation", lambda *_: None)
-    making.again()
+    making.retry()
     wait_until(lambda: making.stage is Stage.DONE, "it is not made")
     assert making.flight
     assert making.troubles == {}
@@ -115,7 +115,7 @@ def test_a_flight_that_is_refused_tells_why_and_is_made_again(tmp_path: Path) ->
     assert "cannot be flown" not in flown.refused
     low = kept_run(tmp_path / "low", cube(2))
     (making.run.folder / RESULT).write_bytes((low.folder / RESULT).read_bytes())
-    making.again()
+    making.retry()
     wait_until(lambda: making.stage is Stage.DONE, "it is not made")
     flown = flight_result_of(making.run)
     assert flown is not None

@@ -10,8 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.app.flights.builder import FlightBuilder
-from robochoc.app.flights.captions import captioned
+from robochoc.app.flights.builder import FlightBuilder, captioned
 from robochoc.app.flights.flight_map import changed_to, ground_of, happened_in
 from robochoc.app.flights.flight_result import FLOWN, flight_result_of, flight_words, refused
 from robochoc.app.flights.flying_robots import flying_robots_words
