@@ -121,9 +121,9 @@ def test_the_cheapest_that_a_robot_has_heard_of_is_asked_for_and_one_that_does_n
 
 def test_nobody_checks_what_it_was_not_asked_to() -> None:
     around = Round()
-    why = "it was not asked to check that"
+    why = "it sent a check that was not requested"
     assert around.state.handle("RA", CheckResult(1, allowed=True, cost=0, snapshot=3)) == why
-    around.state.begin_check(3)
+    around.state.start_check(3)
     assert not around.state.handle("RA", CheckResult(1, allowed=True, cost=0, snapshot=3))
     assert around.state.handle("RA", CheckResult(1, allowed=True, cost=0, snapshot=3)) == why
 

@@ -155,7 +155,7 @@ def test_frames_are_numbered_by_pair_and_come_once() -> None:
         opened = reader.read("R1", content)
         assert opened == Opened(number, said(number))
         reader.accept("R1", opened.number)
-        with pytest.raises(FrameRefusedError, match=f"replay: frame {number} has come before"):
+        with pytest.raises(FrameRefusedError, match=f"replay: frame {number} has already arrived"):
             reader.read("R1", content)
 
 

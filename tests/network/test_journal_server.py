@@ -118,7 +118,7 @@ def test_where_nothing_can_be_written_the_run_goes_on_and_followers_are_told() -
         assert desk.welcome("Eye", JournalRequest(1)).why == ""
         publication.write(b"block")
         publication.write(b"block")
-        assert "cannot be kept any more: No space left" in desk.welcome("Eye", JournalRequest(1)).why
+        assert "cannot be written any more: No space left" in desk.welcome("Eye", JournalRequest(1)).why
         assert desk.answer("Eye", question(RUN, 0)) is None
 
 
@@ -154,7 +154,7 @@ def test_the_desk_asks_who_may_and_tells_what_it_said(publication: Publication) 
     told: list[AnyEvent] = []
     may: set[str] = {"Eye"}
     desk = JournalServer(RUN, may.__contains__, MasterEvents(told.append))
-    assert desk.welcome("Eye", JournalRequest(1)).why.endswith("it needs --sniffable")
+    assert desk.welcome("Eye", JournalRequest(1)).why.endswith("start it with --sniffable")
     assert desk.answer("Eye", question(RUN, 0)) is None
     assert not desk.lagging
     told.clear()

@@ -52,8 +52,9 @@ def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment)
     late = follow(site, "Late", sniffers["Late"])
     wait_until(lambda: "Registered" in heard(site, "Late"), lambda: late.errors)
     assert refused.status() == 4
-    assert "does not let Spy sniff: it has no right to; say: robochoc authority enrol Spy --may sniff" in one_line(
-        refused
+    assert (
+        "does not let Spy sniff: it does not have the right: grant it by robochoc authority enrol Spy --may sniff"
+        in one_line(refused)
     )
     assert not copy_of(site, "Spy").exists()
     second = site.robot(files / "RB.xml", "--token", tokens["RB"])
@@ -151,7 +152,7 @@ def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deploym
     master = site.master()
     eye = follow(site, "Eye", tokens["Eye"])
     assert eye.status() == 4
-    assert "this master gives its journal to nobody; it needs --sniffable" in one_line(eye)
+    assert "this master does not publish its journal: start it with --sniffable" in one_line(eye)
     master.strike(signal.SIGINT)
     master.status()
     master = site.master("--sniffable")

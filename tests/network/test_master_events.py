@@ -46,7 +46,7 @@ def test_robots_tell_of_themselves_only() -> None:
     own, others = (Decided(t=3.0, robot=name, assignment={"V": 1}, clock=1) for name in "AB")
     chronicle.relay_from("A", [own, others, own])
     assert [event for event in told if isinstance(event, Decided)] == [own, own]
-    assert [(event.who, event.what) for event in told if isinstance(event, Refused)] == [("A", "tell of Decided")]
+    assert [(event.who, event.what) for event in told if isinstance(event, Refused)] == [("A", "report Decided")]
 
 
 def test_where_nobody_observes_nothing_is_told() -> None:
@@ -74,7 +74,7 @@ def test_a_robot_that_floods_reports_of_others_is_named(monkeypatch: pytest.Monk
     refused = [event for event in told if isinstance(event, Refused)]
     assert len(refused) < BURST_S * REPORTS_A_SECOND + 10
     assert ("A", "report others", "more than 10 times a second") in [(one.who, one.what, one.why) for one in refused]
-    assert (refused[-1].who, refused[-1].why) == ("B", "no (C says so)")
+    assert (refused[-1].who, refused[-1].why) == ("B", "no (reported by C)")
     now += 1.0
     hear("A", Objection("D", "a frame", "no"))
     assert isinstance(told[-1], Refused)
@@ -92,4 +92,4 @@ def test_who_tells_more_than_robots_have_to_tell_is_refused(monkeypatch: pytest.
     decided = [event.robot for event in told if isinstance(event, Decided)]
     assert (decided.count("A"), decided.count("B")) == (BURST_S * EVENTS_A_SECOND, 1)
     refused = [event for event in told if isinstance(event, Refused)]
-    assert [(one.who, one.what, one.why) for one in refused] == [("A", "tell of events", "more than 10,000 a second")]
+    assert [(one.who, one.what, one.why) for one in refused] == [("A", "report events", "more than 10,000 a second")]

@@ -58,7 +58,7 @@ def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
     now = members.register(RA, PROFILES[RA], "second")
     assert (now.incarnation, now.joined, now.away_since) == ("second", False, None)
     now.away_since = 13.5
-    assert "start it anew" in refused(members, RA, PROFILES[RA], "first")
+    assert "restart it" in refused(members, RA, PROFILES[RA], "first")
     members.closed = True
     assert "registered already" in refused(members, RA, PROFILES[RA], "third")
 
@@ -67,7 +67,7 @@ def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
     members = Members()
     join(members, RA)
     members.remove([RA, "nobody"])
-    assert "away for too long; start it anew" in refused(members, RA, PROFILES[RA], "first")
+    assert "absent for too long: restart it" in refused(members, RA, PROFILES[RA], "first")
     assert members.register(RA, PROFILES[RA], "second").incarnation == "second"
 
 
@@ -79,7 +79,7 @@ def test_a_certificate_is_for_one_file() -> None:
 
 
 def test_strangers_are_not_taken_where_robots_are_expected() -> None:
-    assert refused(Members([RA, RB]), RC, PROFILES[RC]) == "it is not one of the team"
+    assert refused(Members([RA, RB]), RC, PROFILES[RC]) == "it is not a member of the team"
 
 
 def test_nobody_is_taken_once_the_team_is_closed() -> None:
@@ -92,7 +92,7 @@ def test_nobody_is_taken_once_the_team_is_closed() -> None:
 def test_absurd_profiles_and_contradictions_are_not_taken() -> None:
     members = Members()
     join(members, RA)
-    assert "no name" in refused(members, RB, msgspec.structs.replace(PROFILES[RB], children=("?",)))
+    assert "not a valid name" in refused(members, RB, msgspec.structs.replace(PROFILES[RB], children=("?",)))
     stranger = msgspec.structs.replace(PROFILES[RB], parents=())
     assert "does not list it as a parent" in refused(members, RB, stranger)
     join(members, RB)
@@ -192,7 +192,7 @@ def test_who_is_no_child_is_not_asked_to_show_anything() -> None:
     members = Members()
     members.register("B", looked_at()["B"], "first")
     spy = Profile("S", ProblemKind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
-    assert "looks at variables of B, which is no child" in refused(members, "S", spy)
+    assert "refers to variables of B, which is not a child" in refused(members, "S", spy)
     assert members.unseen() == {}
 
 
@@ -213,11 +213,11 @@ def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_
     members.register("B", robot("B", parents=("A",), shown="Y", wants=("X",)), "first")
     assert members.unseen() == {"A": ("X",)}
     assert (
-        members.show("A", {"X": ((1, 3),), "Secret": ((1, 1),)}) == "it has shown variables that it was not asked for"
+        members.show("A", {"X": ((1, 3),), "Secret": ((1, 1),)}) == "it has disclosed variables that were not requested"
     )
     assert members.show("A", {"X": ((1, 3),)}) == ""
     assert not members.unseen()
-    assert not list(members.strangers())
+    assert not list(members.invalid_scopes())
     assert members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["B"].interfaces == {"A": ("X",), "B": ("Y",)}
 
 
@@ -238,11 +238,11 @@ def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:
     assert members.unseen() == {"A": ("V9",)}
     assert members.show("A", {}) == ""
     assert not members.unseen()
-    assert list(members.strangers()) == ["B holds a constraint over V9, which is a variable of none of its neighbours"]
+    assert list(members.invalid_scopes()) == ["B has a constraint over V9, which is not a variable of a neighbour"]
 
 
 def test_who_may_only_ask_does_not_take_part() -> None:
-    with pytest.raises(RegistrationRefusedError, match="enrolled to observe"):
+    with pytest.raises(RegistrationRefusedError, match="enrolled as an observer"):
         Members().register("A", robot("A"), "first", admitted=False)
 
 

@@ -63,7 +63,7 @@ def turned_away(run: NetworkRun, identity: Identity, why: str) -> None:
     """This identity does not get in, however often it tries, and that is reported."""
 
     def is_reported() -> bool:
-        with pytest.raises(CannotConnectError, match=f"does not let {identity.name} in"):
+        with pytest.raises(CannotConnectError, match=f"does not admit {identity.name}"):
             Transport(run.endpoint, identity, patience_s=SOON_S)
         return ("somebody", "connect", why) in {(one.who, one.what, one.why) for one in run.refusals}
 
@@ -86,9 +86,9 @@ def test_a_robot_that_is_not_of_the_team(run: NetworkRun) -> None:
 
 def test_a_certificate_of_another_authority(run: NetworkRun) -> None:
     other = InMemoryAuthority(CHAIN.order).identity("RX0")
-    turned_away(run, other, "it does not believe the master, whom its own Authority has not certified")
+    turned_away(run, other, "it does not trust the master, which its Authority has not certified")
     unconcerned = replace(other, ca=run.household.identity("RX0").ca)  # it does not mind whom it talks to
-    turned_away(run, unconcerned, "its certificate is not of this Authority")
+    turned_away(run, unconcerned, "its certificate was not issued by this Authority")
 
 
 def test_a_certificate_that_has_expired(run: NetworkRun) -> None:
@@ -110,7 +110,7 @@ def test_no_certificate(run: NetworkRun) -> None:
     with shaken(run.endpoint) as raw, suppress(OSError), context.wrap_socket(raw) as connection:
         connection.sendall(b"anything")
         connection.recv(1)
-    run.wait_for_refusal("somebody", "connect", "has shown no certificate")
+    run.wait_for_refusal("somebody", "connect", "has sent no certificate")
     run.wait_for_progress()
 
 
@@ -130,7 +130,7 @@ def test_many_connections_that_say_nothing(run: NetworkRun) -> None:
         mute[0].sendall(b"\x16\x03")
         with run.transport("RX3"):
             run.wait_for_progress()
-    run.wait_for_refusal("somebody", "connect", r"hung up in the middle of the handshake \(10 times so far\)")
+    run.wait_for_refusal("somebody", "connect", r"closed the connection during the handshake \(10 times so far\)")
     run.wait_for_progress()
 
 
@@ -222,7 +222,7 @@ def test_a_frame_that_comes_twice(run: NetworkRun) -> None:
             if isinstance(item, FrameArrived) and item.sender == "RX1"
         )
         writer.send("RX0", recorded)
-        run.wait_for_refusal("RX1", "frame to RX0", r"replay: frame \d+ has come before")
+        run.wait_for_refusal("RX1", "frame to RX0", r"replay: frame \d+ has already arrived")
     run.wait_for_progress()
 
 
@@ -270,7 +270,7 @@ def test_a_peer_that_speaks_no_protocol(run: NetworkRun) -> None:
     with run.transport("RX2") as transport:
         for content, why in NO_MESSAGES.items():
             transport.send("RX1", frame(run, "RX2", "RX1", ProtocolMessage(1, 0, content)))
-            run.wait_for_refusal("RX2", "frame to RX1", f"(?i)no message of the protocol: .*{why}")
+            run.wait_for_refusal("RX2", "frame to RX1", f"(?i)not a message of the protocol: .*{why}")
     run.wait_for_progress()
 
 
@@ -304,7 +304,7 @@ def test_a_robot_of_a_name_that_is_there_already(run: NetworkRun) -> None:
         robot = NetworkRobot(CompiledRobot(CHAIN["RX2"]), run.household.identity("RX2"), transport, protocol_named)
         ending = robot.run()
     assert ending.failed
-    assert ending.why == "the master does not take RX2: a robot called RX2 is registered already"
+    assert ending.why == "the master does not admit RX2: a robot called RX2 is registered already"
     run.wait_for_refusal("RX2", "register", "a robot called RX2 is registered already")
     run.wait_for_progress()
     assert run.master.members.robots["RX2"].away_since is None, "the first one is there as before"

@@ -290,7 +290,7 @@ def test_a_master_that_is_killed_and_started_anew(tmp_path: Path) -> None:
     with socket.create_server((host, int(port))):
         pass
     with robots.master():
-        assert robots.wait("RX0", "RX1") == {"the master was started anew; start this robot anew as well"}
+        assert robots.wait("RX0", "RX1") == {"the master was restarted: restart this robot as well"}
 
 
 # The parent of a team on this machine

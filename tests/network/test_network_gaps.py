@@ -87,7 +87,7 @@ def test_a_gap_between_robots_that_is_none_is_told_and_ends_nothing(tmp_path: Pa
     with watched(tmp_path) as run:
         with run.transport("RX3") as transport:
             put_with_a_gap(transport, "RX2", b"anything")
-            run.wait_for_refusal("RX3", "a frame to RX2", r"4,997 frames of it to RX2 were lost .*RX2 says so")
+            run.wait_for_refusal("RX3", "a frame to RX2", r"4,997 frames of it to RX2 were lost .*reported by RX2")
         run.wait_for_progress()
         assert run.let_go().verdict is Verdict.SOLUTION
     assert not run.losses
@@ -100,7 +100,7 @@ def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> No
         with run.transport("RX3") as transport:
             put_with_a_gap(transport, "RX2", frame(run, "RX3", "RX2", ProtocolMessage(0, 0, b"")))
             run.wait_for_refusal("RX3", "a frame to RX2", "lost for good")
-        with pytest.raises(RobotsLostError, match=r"RX3 was lost: .*RX2 says so"):
+        with pytest.raises(RobotsLostError, match=r"RX3 was lost: .*reported by RX2"):
             run.let_go()
 
 

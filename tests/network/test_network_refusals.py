@@ -76,7 +76,7 @@ def test_refusals_are_told_in_powers_of_ten_and_remembered_up_to_a_number() -> N
     for number in range(1000):
         refusals.note("A", f"put {number}", "no")
     assert len(told) < KINDS + 5
-    assert told[-1].what == "other things"
+    assert told[-1].what == "other requests"
     assert "(100 times so far)" in told[-1].why
     told.clear()
     for number in range(2 * WHO):

@@ -129,7 +129,7 @@ def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
     ending, transport = played(answering((Joined, [word]), (Objection, [LEAVE])))
     assert not ending.failed
     assert transport.heard_of(Objection) == [
-        Objection(MASTER, "a frame to RB", f"{type(word).__name__} is nothing to be told now")
+        Objection(MASTER, "a frame to RB", f"{type(word).__name__} is not expected now")
     ]
 
 
@@ -160,7 +160,7 @@ def packed(word: ControlMessage, number: int = 1) -> bytes:
         (Framing("RA", "another").write("RB", ProtocolMessage(1, 0, ok(1))), "another run"),
         (packed(ProtocolMessage(1, 0, ok(1)), 2), "frame 1 is missing"),
         (packed(ProtocolMessage(1, 0, ok(1)), 0), "replay"),
-        (packed(ProtocolMessage(1, 0, b"no message")), "no message of the protocol"),
+        (packed(ProtocolMessage(1, 0, b"no message")), "not a message of the protocol"),
     ],
 )
 def test_frames_that_are_refused_are_objected_to_and_change_nothing(content: bytes, why: str) -> None:
@@ -184,7 +184,7 @@ def test_who_takes_no_part_is_not_heard() -> None:
     said = ProtocolMessage(1, 0, ok(1))
     ending, transport = played(searching(From("R9", said), From("RA", said)))
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert transport.heard_of(Objection) == [Objection("R9", "a frame to RB", "R9 takes no part in this search")]
+    assert transport.heard_of(Objection) == [Objection("R9", "a frame to RB", "R9 does not take part in this search")]
 
 
 def test_objections_are_limited() -> None:

@@ -69,7 +69,7 @@ def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: py
     said = [From(name, ProtocolMessage(1, 0, ok(1))) for name in ("RA", "RA", "RA", "RA", "RC")]
     _, transport = played(answering((Joined, [*said, task()]), (Ready, [LEAVE])))
     first, second = transport.heard_of(Objection)
-    assert first == Objection("RA", "a frame to RB", "it is more than is kept of RA for epoch 1")
+    assert first == Objection("RA", "a frame to RB", "too many frames of RA are stored for epoch 1")
     assert second == Objection("RA", "a frame to RB", "frame 3 is missing before frame 4")
 
 
@@ -97,10 +97,10 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
         ([copies("RC", copy(body="ne(X,"))], "the definition 'p'"),
         ([copies("RC", copy(body="(" * 9000))], "the definition 'p'"),
         ([copies("RC", copy(scope=("B", "B", "C")))], "3 arguments where 2"),
-        ([copies("RC", copy(scope=("B", "Z")))], "RC holds 'C' over variables that it cannot"),
-        ([copies("RC", copy(scope=("A", "C")))], "RC holds 'C' over variables that it cannot"),
-        ([copies("RC", copy(scope=("A", "B")))], "RC holds 'C' over variables that it cannot"),
-        ([copies("RA", copy(scope=("A", "B"))), copies("RC", copy())], "RA holds 'C' over variables that it cannot"),
+        ([copies("RC", copy(scope=("B", "Z")))], "RC has sent 'C', whose scope is not allowed"),
+        ([copies("RC", copy(scope=("A", "C")))], "RC has sent 'C', whose scope is not allowed"),
+        ([copies("RC", copy(scope=("A", "B")))], "RC has sent 'C', whose scope is not allowed"),
+        ([copies("RA", copy(scope=("A", "B"))), copies("RC", copy())], "RA has sent 'C', whose scope is not allowed"),
     ],
 )
 def test_copies_that_cannot_be_are_told(told: list[FrameArrived], why: str) -> None:
@@ -144,7 +144,7 @@ def test_who_is_denied_ends() -> None:
         CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", transport), lambda _name: ABT
     ).run()
     assert ending == Ending(
-        "the master does not take RB: a robot called RB is registered already", failed=True, assignment={}
+        "the master does not admit RB: a robot called RB is registered already", failed=True, assignment={}
     )
 
 
@@ -157,7 +157,7 @@ def test_another_master_ends_the_run_the_same_one_does_not() -> None:
                 yield Welcome(incarnation, run, (), observed=False, private=False)
 
     ending, transport = played(script)
-    assert ending == Ending("the master was started anew; start this robot anew as well", failed=True, assignment={})
+    assert ending == Ending("the master was restarted: restart this robot as well", failed=True, assignment={})
     assert len(transport.heard_of(Joined)) == 2, "one for each welcome of the same run"
 
 

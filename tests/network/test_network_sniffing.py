@@ -186,7 +186,7 @@ def test_who_may_has_all_of_it_whenever_it_comes_and_who_may_not_nothing(
         publication.write(each)
     run.wait_until(lambda: early.content == whole, "it has not got all")
     spy = sniffing("Spy").ended()
-    assert re.search(r"does not let Spy sniff: .* say: robochoc authority enrol Spy --may sniff", str(spy)), spy
+    assert re.search(r"does not let Spy sniff: .* by robochoc authority enrol Spy --may sniff", str(spy)), spy
     run.wait_for_refusal("Spy", "sniff", "it has no right to")
 
     run.household.enrol("Late", sniffs=True)  # after a hundred blocks

@@ -73,7 +73,7 @@ LIES: dict[str, Callable[[Profile], Profile]] = {
     "its file is 'RX0''s, and its certificate RX3's": lambda p: changed(p, name="RX0"),
     "X3 has 1,000,000,000,000,000,001 values": lambda p: changed(p, variables={"X3": ((0, 10**18),)}),
     "the ranges of X3 are not ascending": lambda p: changed(p, variables={"X3": ((5, 1),)}),
-    "is no name": lambda p: changed(p, variables={"../x": ((0, 1),)}),
+    "is not a valid name": lambda p: changed(p, variables={"../x": ((0, 1),)}),
     "it names itself": lambda p: changed(p, children=("RX3",)),
     "too many neighbours": lambda p: changed(p, children=tuple(f"N{i}" for i in range(20_000))),
     "a team is one or the other": lambda p: changed(p, kind=ProblemKind.DISWCSP),
@@ -177,6 +177,6 @@ def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path, monkeypatc
         with run.transport("RX2") as transport:
             transport.send("RX3", frame(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
             transport.send("RX3", frame(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
-            run.wait_for_refusal("RX2", "frame to RX3", "frame 1 has come before")
+            run.wait_for_refusal("RX2", "frame to RX3", "frame 1 has already arrived")
         with pytest.raises(RobotsLostError, match="MASTER was lost: 1 messages between robots were lost for good"):
             run.let_go()

@@ -102,7 +102,7 @@ def test_processes_are_held_to_the_same() -> None:
 
 def test_a_verdict_before_the_search(lied: Callable[..., InMemoryNetwork]) -> None:
     office = lied(traitors.LIES["too early"])
-    assert office.state.lost == {"RB": "it has concluded something before the search began"}
+    assert office.state.lost == {"RB": "it has concluded a verdict before the start of the search"}
 
 
 def test_no_solution_rests_on_its_word(lied: Callable[..., InMemoryNetwork]) -> None:
@@ -238,8 +238,8 @@ def test_on_this_machine_a_witness_is_no_more_than_that() -> None:
 @looped(
     ("lie", "why"),
     [
-        (traitors.LIES["a strange name"], "it has reported a variable whose name is none"),
-        (traitors.valued(**{"X" * 300: 1}), "it has reported a variable whose name is none"),
+        (traitors.LIES["a strange name"], "it has reported a variable with an invalid name"),
+        (traitors.valued(**{"X" * 300: 1}), "it has reported a variable with an invalid name"),
         (traitors.LIES["another's variable"], "it has reported a value of A, which is RA's"),
         (traitors.valued(B=3), "it has reported values that it cannot have"),
         (traitors.valued(**{f"Z{n}": 1 for n in range(10_001)}), "it has reported more than 10,000 variables"),

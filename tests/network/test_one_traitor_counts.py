@@ -23,38 +23,38 @@ from tests.support.traitors import Lie, changed
 @looped(
     ("lie", "why"),
     [
-        (traitors.counting(lambda _: -1), "it has counted -1 messages sent"),
-        (traitors.counting(lambda sent: sent, lambda _: -5), "-5 taken in, which cannot be"),
-        (traitors.counting(lambda _: 2**53 + 1), "which cannot be"),
+        (traitors.counting(lambda _: -1), "it has reported -1 messages sent"),
+        (traitors.counting(lambda sent: sent, lambda _: -5), "-5 received, which is impossible"),
+        (traitors.counting(lambda _: 2**53 + 1), "which is impossible"),
         (traitors.LIES["falling"], "its counters have fallen, from "),
         (traitors.counting(lambda sent: sent + 1, lambda received: received + 1), "its counters have fallen"),
         (traitors.LIES["costs"], "it has reported 9,007,199,254,740,992 constraint checks in 0.0 s"),
-        (traitors.spending(ncccs=2**40), "its clock is at 1,099,511,627,776, and neither its own"),
+        (traitors.spending(ncccs=2**40), "its clock is at 1,099,511,627,776, more than its"),
         (traitors.spending(bytes=0), "bytes together, the largest of"),
         (traitors.spending(bytes=2**50), "bytes together, the largest of"),
-        (traitors.spending(largest=2**50), "the largest of 1,125,899,906,842,624, which cannot be"),
+        (traitors.spending(largest=2**50), "the largest of 1,125,899,906,842,624, which is impossible"),
         (traitors.spending(largest=-1), "counts that cannot be"),
         (traitors.spending(bytes=-1), "it has reported counts that cannot be"),
         (traitors.spending(memory=2**52), "it has reported costs that are not its own"),
         (traitors.spending(wall_s=1e300), "it has reported costs that are not its own"),
         (traitors.spending(simulated_s=float("nan")), "it has reported costs that are not its own"),
-        (traitors.spending(messages={"Ok": 0}, bytes=0, largest=0), "are not as many as those"),
-        (traitors.spending(messages={"\x1b[2J": 1}), "it has reported messages of kinds that are none"),
-        (traitors.spending(messages={f"K{n}": 0 for n in range(101)} | {"Ok": 1}), "of kinds that are none"),
+        (traitors.spending(messages={"Ok": 0}, bytes=0, largest=0), "differs from the sum of those"),
+        (traitors.spending(messages={"\x1b[2J": 1}), "it has reported messages of invalid types"),
+        (traitors.spending(messages={f"K{n}": 0 for n in range(101)} | {"Ok": 1}), "of invalid types"),
         (
             traitors.reporting(lambda one: changed(one, exchanged={"R9": Exchanged(1)})),
-            "somebody who is not of the team",
+            "a robot that is not in the team",
         ),
         (traitors.reporting(lambda one: changed(one, exchanged={"RA": Exchanged(1, -1)})), "counts that cannot be"),
-        (traitors.finding(Findings(bound=float("-inf"))), "it tells of costs that cannot be"),
-        (traitors.finding(Findings(bound=float("nan"))), "it tells of costs that cannot be"),
-        (traitors.finding(Findings(best=Incumbent(-1.0, {}))), "it tells of costs that cannot be"),
+        (traitors.finding(Findings(bound=float("-inf"))), "it has reported impossible costs"),
+        (traitors.finding(Findings(bound=float("nan"))), "it has reported impossible costs"),
+        (traitors.finding(Findings(best=Incumbent(-1.0, {}))), "it has reported impossible costs"),
         (
             traitors.finding(Findings(best=Incumbent(1, {"\x1b[2J": (1,)}))),
-            "it tells of a robot that is not of the team",
+            "it has reported a robot that is not in the team",
         ),
-        (traitors.finding(Findings(place=PseudoTreeNode("R9"))), "it tells of a robot that is not of the team"),
-        (traitors.finding(Findings(trail=Trail([(0, -1)], 0))), "it tells of cycles that cannot be"),
+        (traitors.finding(Findings(place=PseudoTreeNode("R9"))), "it has reported a robot that is not in the team"),
+        (traitors.finding(Findings(trail=Trail([(0, -1)], 0))), "it has reported impossible cycles"),
     ],
 )
 def test_counts_that_cannot_be(lied: Callable[..., InMemoryNetwork], lie: Lie, why: str) -> None:
@@ -150,7 +150,7 @@ def test_whom_it_stirs_after_all_were_quiet_is_not_blamed() -> None:
         for name, counts in heard.items():
             state.handle(name, Counters(1, wave, *counts))
     assert not state.handle("RA", accounts["RA"]), "it has answered what it was told"
-    assert state.handle("RB", accounts["RB"]) == "it has sent messages after all were quiet, in answer to none"
+    assert state.handle("RB", accounts["RB"]) == "it has sent messages after quiescence, without receiving one"
     assert not state.handle("RC", accounts["RC"])
 
 

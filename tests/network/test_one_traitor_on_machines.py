@@ -61,8 +61,8 @@ def test_that_is_what_people_read(site: Deployment) -> None:
     ("lie", "why"),
     [
         ("optimal", "RB was lost: it has concluded optimal, and a robot of this protocol concludes no-solution alone"),
-        ("too early", "RB was lost: it has concluded something before the search began"),
-        ("a strange name", "RB was lost: it has reported a variable whose name is none"),
+        ("too early", "RB was lost: it has concluded a verdict before the start of the search"),
+        ("a strange name", "RB was lost: it has reported a variable with an invalid name"),
         ("another's variable", "RB was lost: it has reported a value of A, which is RA's"),
         ("falling", "RB was lost: its counters have fallen, from "),
         ("costs", "RB was lost: it has reported 9,007,199,254,740,992 constraint checks in "),

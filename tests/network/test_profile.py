@@ -21,13 +21,13 @@ from robochoc.communication.network.profile import (
     MOST_VARIABLES,
     Profile,
     ProfileError,
-    among,
     domain_of,
     missing,
     possible_neighbours,
     profile_contradictions,
     profile_of,
     ranges_of,
+    restrict_to_team,
     visible_robot,
 )
 from robochoc.formats import read_team
@@ -89,7 +89,7 @@ def part_of(robot: Robot, task: Task) -> AgentProblem:
     """What a robot knows across machines."""
     parameters = RunParameters(task.seed, task.settings, task.aside)
     domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
-    own = CompiledRobot(among(robot, task.interfaces), nothing_of)
+    own = CompiledRobot(restrict_to_team(robot, task.interfaces), nothing_of)
     everyone = TeamKnowledge(tuple(task.order), task.interfaces, domains, task.links)
     return AgentProblem(own, everyone, (), task.secretive, parameters)
 
@@ -209,16 +209,16 @@ def test_a_visible_robot_shows_what_is_in_the_profile() -> None:
 @looped(
     ("profile", "why"),
     [
-        (changed(name="1R"), "'1R' is no name"),
-        (changed(name=""), "'' is no name"),
-        (changed(parents=("R0/R9",)), "'R0/R9' is no name"),
-        (changed(children=("*",), looks_at={}), r"'\*' is no name"),
-        (changed(parents=("R" * (LONGEST_NAME + 1),)), "is no name"),
-        (changed(variables={"X Y": ((1, 1),)}), "'X Y' is no name"),
-        (changed(looks_at={"R2": ("Z\n",)}), "is no name"),
-        (changed(looks_at={"R0": ("Z",)}), "looks at variables of R0, which is no child"),
-        (changed(looks_at={"R7": ("Z",)}), "looks at variables of R7, which is no child"),
-        (changed(looks_at={"*": ()}), "no child"),
+        (changed(name="1R"), "'1R' is not a valid name"),
+        (changed(name=""), "'' is not a valid name"),
+        (changed(parents=("R0/R9",)), "'R0/R9' is not a valid name"),
+        (changed(children=("*",), looks_at={}), r"'\*' is not a valid name"),
+        (changed(parents=("R" * (LONGEST_NAME + 1),)), "is not a valid name"),
+        (changed(variables={"X Y": ((1, 1),)}), "'X Y' is not a valid name"),
+        (changed(looks_at={"R2": ("Z\n",)}), "is not a valid name"),
+        (changed(looks_at={"R0": ("Z",)}), "refers to variables of R0, which is not a child"),
+        (changed(looks_at={"R7": ("Z",)}), "refers to variables of R7, which is not a child"),
+        (changed(looks_at={"*": ()}), "not a child"),
         (changed(parents=("R1",)), "names itself"),
         (changed(parents=("R2",)), "a neighbour twice"),
         (changed(children=("R2", "R2")), "a neighbour twice"),
@@ -246,7 +246,7 @@ def test_absurd_profiles_are_refused(profile: Profile, why: str) -> None:
 def test_what_is_shown_later_is_looked_at_as_well() -> None:
     with pytest.raises(ProfileError, match="Y has 0 values"):
         visible_robot(GOOD, {"Y": ()})
-    with pytest.raises(ProfileError, match="is no name"):
+    with pytest.raises(ProfileError, match="is not a valid name"):
         visible_robot(GOOD, {"": ((1, 1),)})
 
 
@@ -336,8 +336,8 @@ def test_a_profile_names_the_symbols_of_what_others_see() -> None:
     ("symbols", "why"),
     [
         (("red", "red"), "one of them twice"),
-        (("red", "\x1b[31m"), "is no symbol"),
-        (("red",), "stands for no symbol"),
+        (("red", "\x1b[31m"), "is not a valid symbol"),
+        (("red",), "is not the code of a symbol"),
     ],
 )
 def test_symbols_that_no_file_can_have(symbols: tuple[str, ...], why: str) -> None:

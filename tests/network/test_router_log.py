@@ -52,9 +52,9 @@ TOLD = [
     Refusal("A", "declare subscriber rc/msg/B/*", NO_RULE),
     Refusal("A", "query rc/msg/B/MASTER/@adv/**", NO_RULE),
     Refusal("somebody", "connect", "it does not speak TLS"),
-    Refusal("somebody", "connect", "it does not believe the master, whom its own Authority has not certified"),
-    Refusal("somebody", "connect", "its certificate is not of this Authority"),
-    Refusal("somebody", "connect", "it has shown no certificate"),
+    Refusal("somebody", "connect", "it does not trust the master, which its Authority has not certified"),
+    Refusal("somebody", "connect", "its certificate was not issued by this Authority"),
+    Refusal("somebody", "connect", "it has sent no certificate"),
 ]
 ALONE = dict(zip(range(14, 18), TOLD[3:], strict=True))
 """What lines tell that need no other."""

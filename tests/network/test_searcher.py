@@ -195,7 +195,7 @@ def test_what_waits_for_the_start_is_bounded_for_each_sender() -> None:
     much = bytes(100 * MIB)
     for _ in range(2):
         assert not one.admit(Envelope("RA", "RB", much, 0))
-    with pytest.raises(BadMessageError, match="RA says too much before the search has begun"):
+    with pytest.raises(BadMessageError, match="RA has sent too many messages before the start of the search"):
         one.admit(Envelope("RA", "RB", much, 0))
     assert not one.admit(Envelope("RC", "RB", much, 0))
 

@@ -208,7 +208,7 @@ def test_a_router_that_may_not_look_for_others_does_not_wait_for_them() -> None:
 
 @looped("name", ["*", "**", "A*", "A/B", "$*", "@adv", "A#", "A?b", "", "MASTER"])
 def test_what_is_no_part_of_a_key_is_no_name(name: str) -> None:
-    with pytest.raises(ValueError, match="is no name of a robot on a network"):
+    with pytest.raises(ValueError, match="is not a valid name of a robot on a network"):
         access_control({"A": (), name: ()})
 
 
@@ -217,5 +217,5 @@ def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
     bad = type(profile)(
         profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.max_cost, ()
     )
-    with pytest.raises(RegistrationRefusedError, match=r"'\*' is no name"):
+    with pytest.raises(RegistrationRefusedError, match=r"'\*' is not a valid name"):
         Members().register(profile.name, bad, "incarnation")

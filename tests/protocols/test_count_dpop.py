@@ -177,5 +177,5 @@ def test_counting_is_refused_where_nobody_counts(options: Options, why: str) -> 
 
 def test_a_number_that_is_none_is_a_lie() -> None:
     for told in ("", "-1", "x", "1 "):
-        assert fault_of_findings(Findings(count=told), ()) == "it tells of a number that is none"
+        assert fault_of_findings(Findings(count=told), ()) == "it has reported an invalid number"
     assert not fault_of_findings(Findings(count="1f"), ())

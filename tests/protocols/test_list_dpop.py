@@ -252,5 +252,5 @@ def test_each_listed_optimum_is_checked(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_place_that_is_none_is_a_lie() -> None:
-    assert fault_of_findings(Findings(listing=Listing([-1], 1)), ()) == "it tells of optima that cannot be"
+    assert fault_of_findings(Findings(listing=Listing([-1], 1)), ()) == "it has reported impossible optima"
     assert not fault_of_findings(Findings(listing=Listing([0], 1)), ())

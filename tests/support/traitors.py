@@ -159,9 +159,9 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
     ) -> None:
         def say(word: ToMaster) -> None:
             for one in lie(me, word):
-                context.say(one)
+                context.send_to_master(one)
 
-        begin(me, own, task, protocol, replace(context, say=say) if own.robot.name == name else context)
+        begin(me, own, task, protocol, replace(context, send_to_master=say) if own.robot.name == name else context)
 
     judge = Searcher.check_constraints
 

@@ -1,11 +1,11 @@
 """Access control for writing and reading: zenoh's rules, default deny, bound to the name in a certificate.
 
-The key of a frame is `rc/msg/RECEIVER/SENDER`. A robot may put on keys that end with its own name only, and read those
-that begin with it, so that nobody writes in another's name or reads another's frames. Of the keys that end with its
-name it may use those to the master, and once the team is closed those to the robots it has to do with. Recovery
-(zenoh's advanced publishers) asks for what was missed under `@adv` below the same keys, and has the same rules.
+The key of a frame is `rc/msg/RECEIVER/SENDER`. A robot may write only to keys that end with its name, and read only
+those that begin with it, so that nobody writes in another's name or reads another's frames. Of the keys that end with
+its name it may use those to the master, and after the team is closed those to its receivers. Recovery (zenoh's advanced
+publishers) requests missed frames under `@adv` below the same keys, and has the same rules.
 
-The journal is asked for on `rc/journal/NAME`: by NAME only, if it may sniff; the master answers.
+The journal is requested on `rc/journal/NAME`: only by NAME, if it may sniff; the master answers.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ALL = "*"
 
 
 def frame_key(receiver: str, sender: str) -> str:
-    """Return where frames from `sender` to `receiver` go."""
+    """Return the key of frames from `sender` to `receiver`."""
     return f"rc/msg/{receiver}/{sender}"
 
 
@@ -31,7 +31,7 @@ def life_key(name: str) -> str:
 
 
 def journal_key(name: str) -> str:
-    """Return where `name` asks for the run's journal."""
+    """Return the key on which `name` requests the run's journal."""
     return f"rc/journal/{name}"
 
 
@@ -41,14 +41,16 @@ def name_in(key: str) -> str:
 
 
 def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> dict[str, Any]:
-    """Zenoh's `access_control`: those in `reach` may take part, and each may write to the master and whom it lists.
+    """Return zenoh's `access_control`: each name in `reach` may write to the master and its receivers.
 
-    Those of them who are `sniffers` may ask the master for the journal (None: it answers nobody).
-    Raises `ValueError` for names that would be more than names in a key: `*` writes in everybody's name.
+    The `sniffers` among them may request the journal from the master (None: nobody may).
+    Raises `ValueError` for names with a special meaning in keys: `*` would write in everybody's name.
     """
     strange = next((name for name in reach if not is_name(name) or name == MASTER), None)
     if strange is not None:
-        raise ValueError(f"{strange!r} is no name of a robot on a network: a letter, then letters, digits, '.' and '_'")
+        raise ValueError(
+            f"{strange!r} is not a valid name of a robot on a network: use a letter, then letters, digits, '.' and '_'"
+        )
     rules: list[dict[str, Any]] = []
     policies = []
     for name, others in {**reach, MASTER: [ALL]}.items():
@@ -71,9 +73,9 @@ def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str]
 
 
 def journal_qos() -> dict[str, Any]:
-    """Zenoh's `qos` for the journal: it yields to frames, and what a slow sniffer does not take is dropped.
+    """Return zenoh's `qos` for the journal: lower priority than frames, and pieces are dropped if a sniffer is slow.
 
-    Answers are sent as the question is, and a sniffer might ask for one that is waited for, and stop to read.
+    Answers have the priority of the question, and a sniffer might request a blocking answer and stop to read.
     """
     return {
         "id": "the journal yields",
@@ -101,7 +103,7 @@ def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _sniffing(name: str, key: str, *, asks: str, answers: str) -> list[dict[str, Any]]:
-    """Rules for questions on `key`, which go one way, and their answers, which go the other."""
+    """Return the rules for questions on `key` in one direction, and their answers in the other."""
     return [
         _rule(f"{name} sniffs: questions", asks, ["query"], [key]),
         _rule(f"{name} sniffs: answers", answers, ["reply", "declare_queryable"], [key]),

@@ -1,4 +1,4 @@
-"""The search state of a master that cannot trust its robots: their messages are held against each other. Pure."""
+"""The search state of a master that does not trust its robots: it compares their messages. Pure."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from robochoc.communication.network.plausibility import (
     doubts_about_checks,
     doubts_about_messages,
     doubts_about_values,
-    fault_of_account,
     fault_of_check,
     fault_of_counters,
+    fault_of_report,
     fault_of_snapshot,
     objections,
     thoroughness,
@@ -34,12 +34,12 @@ _MOST_NAMED = 3
 
 
 class AuditedSearchState(SearchState):
-    """The state of a search whose robots are not trusted: what they say is checked for plausibility.
+    """The state of a search whose robots are not trusted: their messages are checked for plausibility.
 
     Attributes:
-        stuck: Why the search can never end; empty if it can.
+        stuck: The reason why the search can never end; empty if it can.
         drops: Whether robots are to drop messages.
-        duration_s: How long the search took, once `note_end` was called.
+        duration_s: The duration of the search, after the call of `note_end`.
     """
 
     def __init__(
@@ -66,13 +66,13 @@ class AuditedSearchState(SearchState):
         self._asked = 0
 
     def handle(self, name: str, message: EpochMessage) -> str:
-        """See `SearchState.handle`. Robots also report what their constraints charge."""
+        """See `SearchState.handle`. Robots also report the costs of their constraints."""
         if isinstance(message, CheckResult) and message.epoch == self.epoch and name in self._present:
             return self._take_check(name, message)
         return super().handle(name, message)
 
     def _count(self, name: str, wave: int, counts: Counts) -> str:
-        """Take in counters. In one wave robots have received no more than all have sent by the next one."""
+        """Record counters. The messages received in one wave cannot exceed those sent by the next wave."""
         if fault := fault_of_counters(counts, self.counters.latest(name)):
             return fault
         was_waving = self.counters.is_wave_open
@@ -80,17 +80,19 @@ class AuditedSearchState(SearchState):
         total = self.counters.total
         if was_waving and not self.counters.is_wave_open and total is not None:
             if self._received_before is not None and self._received_before > total.sent:
-                self.stuck = f"robots have counted {self._received_before:,} messages taken in, and {total.sent:,} sent"
+                self.stuck = (
+                    f"robots have reported {self._received_before:,} messages received, but only {total.sent:,} sent"
+                )
             self._received_before = total.received
         return ""
 
     def _conclude(self, name: str, verdict: str) -> str:
-        """Take in a verdict that the robot `name` concluded alone. The first one stands, whatever others conclude."""
+        """Record a verdict that the robot `name` concluded alone. Only the first one counts."""
         if not self.ordered:
-            return "it has concluded something before the search began"
+            return "it has concluded a verdict before the start of the search"
         if fault := super()._conclude(name, verdict):
             return fault
-        if self.verdict == verdict or self.witness is None:  # after quiescence the answer is checked, so none matters
+        if self.verdict == verdict or self.witness is None:  # after quiescence the answer is checked anyway
             return ""
         if self.witness == name:
             return f"it has concluded {verdict}, and {self.verdict} before"
@@ -100,10 +102,10 @@ class AuditedSearchState(SearchState):
 
     def _take_report(self, name: str, report: Report) -> str:
         if not isinstance(report, DetailedReport):
-            return "it is none for the master"
+            return "its message is not for the master"
         counts = self.counters.latest(name) or Counts(0, 0)
         course = FinishedSearch(self.order, counts, self.duration_s, self.by_quiescence, self.drops)
-        fault = fault_of_account(name, report, self._declared, course)
+        fault = fault_of_report(name, report, self._declared, course)
         if not fault:
             self._accounts[name] = report
             super()._take_report(name, report)
@@ -116,18 +118,18 @@ class AuditedSearchState(SearchState):
         fault = fault_of_check(name, check, self._declared, self.order)
         checks = self._snapshot_checks if check.snapshot else self._checks
         if check.snapshot and (check.snapshot != self._snapshot_checked or name in checks):
-            fault = fault or "it was not asked to check that"
+            fault = fault or "it sent a check that was not requested"
         if not fault:
             checks[name] = check
         return fault
 
-    def begin_check(self, number: int) -> None:
-        """Expect that robots check the snapshot `number`."""
+    def start_check(self, number: int) -> None:
+        """Expect the robots' checks of the snapshot `number`."""
         self._snapshot_checked, self._snapshot_checks = number, {}
 
     @property
     def snapshot_checks(self) -> Mapping[str, CheckResult] | None:
-        """The findings of all robots on the snapshot that they were to check; None while some have not answered."""
+        """All robots' checks of the present snapshot; None while some have not answered."""
         return None if self._present - self._snapshot_checks.keys() else self._snapshot_checks
 
     def lose(self, name: str, why: str) -> None:
@@ -138,31 +140,31 @@ class AuditedSearchState(SearchState):
         self._snapshot_checks.pop(name, None)
 
     def note_end(self, duration_s: float, *, in_time: bool) -> None:
-        """Note that the search is over after `duration_s` seconds: `in_time`, or because the time was over."""
+        """Note the end of the search after `duration_s` seconds: `in_time`, or at the time limit."""
         self.duration_s = duration_s
         if not in_time:
             self._late = tuple(sorted(self._unready)) or self.counters.silent
 
     @property
     def broken_off(self) -> bool:
-        """Return whether the search must end without a verdict: see `SearchState.broken_off`, or it is stuck."""
+        """Whether the search must end without a verdict: see `SearchState.broken_off`, or it is stuck."""
         return bool(self.stuck) or super().broken_off
 
     @property
     def wave_due(self) -> bool:
-        """Return whether a wave is useful: see `SearchState.wave_due`, or messages are missing."""
+        """Whether a wave is useful: see `SearchState.wave_due`, or messages are missing."""
         return super().wave_due or (bool(self._asked) and not self.counters.is_wave_open)
 
     def missing(self, now: float, patience_s: float) -> int:
-        """Return how many messages were sent and are lost for good; 0 as long as that is not certain.
+        """Return the number of messages that are lost for good; 0 as long as that is not certain.
 
-        It is certain when nothing has been sent or received for `patience_s` seconds, and all robots, asked twice after
-        that, say the same again: then nothing is under way either. While a robot has not said whether it goes on, no
-        wave asks them.
+        It is certain if no message was sent or received for `patience_s` seconds, and all robots report the same counts
+        in two later waves: then no message is in transit either. While a robot has not answered whether it continues,
+        there are no waves.
 
         Args:
             now: The time on the monotonic clock.
-            patience_s: How long a message may be under way.
+            patience_s: The longest transit of a message, in seconds.
         """
         total = self.counters.total
         if total is None or total != self._still or total.sent == total.received or self._undecided:
@@ -175,17 +177,17 @@ class AuditedSearchState(SearchState):
 
     @property
     def by_quiescence(self) -> bool:
-        """Return whether the search ended by quiescence, and not by one robot's conclusion."""
+        """Whether the search ended by quiescence, and not by one robot's conclusion."""
         return self.counters.quiescent and self.witness is None
 
     @property
     def unchecked(self) -> bool:
-        """Return whether a robot has not checked its constraints against the decision yet."""
+        """Whether a robot has not checked its constraints against the decision yet."""
         return bool(self._present - self._checks.keys())
 
     @property
     def held(self) -> bool:
-        """Return whether all robots have checked their constraints, and none is violated."""
+        """Whether all robots have checked their constraints, and none is violated."""
         return not self.unchecked and all(check.allowed for check in self._checks.values())
 
     @property
@@ -195,7 +197,7 @@ class AuditedSearchState(SearchState):
 
     @property
     def thoroughness(self) -> CheckCounts:
-        """Return the numbers of constraints that one robot has checked, and that several have."""
+        """The numbers of constraints that several robots have checked, and that only one has."""
         return thoroughness(self._checks)
 
     # Contradictions between robots
@@ -211,7 +213,7 @@ class AuditedSearchState(SearchState):
     def doubts_about_verdict(self) -> tuple[Doubt, ...]:
         """Pairs of robots that contradict each other on the verdict, the values, or a constraint that both know.
 
-        After quiescence the verdict is that of the counters; only the proof that a cost is optimal rests on it.
+        After quiescence the counters decide the verdict; only the proof that a cost is optimal depends on them.
         """
         proven = self._declared.traits.costs and self.by_quiescence
         values = {name: account.assignment for name, account in self._accounts.items()}
@@ -221,7 +223,7 @@ class AuditedSearchState(SearchState):
 
     @property
     def unfinished(self) -> str:
-        """Return a text on the robots that had not finished at the time limit. Empty if they are unknown."""
+        """A text on the robots that had not finished at the time limit; empty if they are unknown."""
         names = ", ".join(self._late[:_MOST_NAMED]) + ", ..." * (len(self._late) > _MOST_NAMED)
         waited = f"{names} {'has' if len(self._late) == 1 else 'have'} not answered the master"
         doubts = [doubt.why for doubt in self.doubts_about_counts]
@@ -229,10 +231,10 @@ class AuditedSearchState(SearchState):
 
     @property
     def cost(self) -> float:
-        """Return the total cost of all constraints that were checked."""
+        """The total cost of all checked constraints."""
         return sum(check.cost for check in self._checks.values())
 
     @property
     def assigned(self) -> Mapping[str, bool]:
-        """Return for each robot that has reported whether it has values."""
+        """For each robot that has reported, whether it has values."""
         return {name: account.assigned for name, account in self._accounts.items()}

@@ -1,8 +1,8 @@
-"""Snapshots of a search whose files only the robots have: all robots check each one before it counts.
+"""Snapshots of a search whose constraints only the robots know: all robots check each snapshot before it counts.
 
-A round: the robots tell what they have. If they know of something better (the cheapest assignment of all that one of
-them has heard of; a cycle that all have completed), each is asked what that means for it. Then all robots check what
-they have told. The search goes on meanwhile.
+A round: the robots report their values. If their findings contain a better assignment (the cheapest one that a robot
+knows; a cycle that all have completed), each robot is asked for its values in it. Then all robots check the reported
+values. The search continues meanwhile.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from robochoc.protocols.findings import Incumbent
 
 
 class _Part(NamedTuple):
-    """The values that a robot is asked for: those of now, of a `cycle`, or those with a `value`."""
+    """The requested values of a robot: the present ones, those of a `cycle`, or those behind a `value`."""
 
     cycle: int | None = None
     value: Value | None = None
 
 
 class CheckedSnapshots:
-    """The snapshots of the search that `state` is of, by the robots of `members`. `send` sends to a robot.
+    """The snapshots of the search of `state`, by the robots of `members`. `send` sends a message to a robot.
 
     Attributes:
-        number: The number of the snapshot that was checked last.
-        checks: What the robots have found of it, by their names.
+        number: The number of the latest checked snapshot.
+        checks: The robots' checks of it, by name.
     """
 
     def __init__(self, state: AuditedSearchState, members: Members, send: Callable[[str, ToRobot], None]) -> None:
@@ -42,20 +42,20 @@ class CheckedSnapshots:
         self._send = send
         self._asked = 0
         self._first: RunResult | None = None
-        """The values that robots have told, while they are asked for better ones."""
+        """The robots' first values, while better ones are requested."""
         self._unchecked: RunResult | None = None
         self._checked: RunResult | None = None
         self._tried: set[tuple[float, frozenset[tuple[str, Value]]]] = set()
 
     def ask(self, number: int) -> None:
-        """Ask all robots what they have, as snapshot `number`."""
+        """Request the snapshot `number` from all robots."""
         self._ask(number, dict.fromkeys(self._state.order, _Part()))
 
     def advance(self) -> RunResult | None:
-        """Do what is next in the round. Return its snapshot once all robots have checked it; None before."""
+        """Do the next step of the round. Return its snapshot once all robots have checked it; None before."""
         told = self._state.completed_snapshot() if self._unchecked is None else None
         if told is not None:
-            self._go_on(told)
+            self._continue_round(told)
         checks = self._state.snapshot_checks if self._unchecked is not None else None
         if checks is None:
             return None
@@ -63,8 +63,8 @@ class CheckedSnapshots:
         self.number, self.checks = self._asked, checks
         return self._checked
 
-    def _go_on(self, told: RunResult) -> None:
-        """Ask for something better than what robots have `told`, or have it checked."""
+    def _continue_round(self, told: RunResult) -> None:
+        """Request better values than `told`, or have `told` checked."""
         if self._first is not None:
             first, self._first = self._first, None
             self._have_checked(replace(told, findings=first.findings))
@@ -75,15 +75,15 @@ class CheckedSnapshots:
         if number is not None:
             self._first = told
             self._ask(number, parts)
-        elif bests and self._checked is not None:  # nothing new; what robots try meanwhile is no answer
+        elif bests and self._checked is not None:  # nothing new; the robots' present trials are no answer
             self._have_checked(replace(told, assignments=self._checked.assignments))
         else:
             self._have_checked(told)
 
     def _parts_of_best(self, bests: list[Incumbent]) -> dict[str, _Part]:
-        """Return what each robot has in the cheapest assignment that was not checked before; empty: there is none.
+        """Return each robot's value in the cheapest assignment that was not tried before; empty if there is none.
 
-        One that does not hold keeps nobody from the next one.
+        An assignment that violates a constraint is not tried again, so that the next one is.
         """
         order = self._state.order
         for best in sorted((one for one in bests if one.values.keys() == set(order)), key=lambda one: one.cost):
@@ -94,19 +94,19 @@ class CheckedSnapshots:
         return {}
 
     def _parts_of_cycle(self, told: RunResult) -> dict[str, _Part]:
-        """Ask for the last cycle that all robots have completed; empty: there is none."""
+        """Return the requests for the last cycle that all robots have completed; empty if there is none."""
         order = self._state.order
         cycles = [found.trail.cycle for found in told.findings.values() if found.trail is not None]
         known = len(cycles) == len(order) and min(cycles, default=-1) >= 0
         return dict.fromkeys(order, _Part(cycle=min(cycles))) if known else {}
 
     def _have_checked(self, told: RunResult) -> None:
-        """Have all robots check what they have `told`, unless that was checked before."""
+        """Have all robots check the values in `told`, unless they were checked before."""
         self._unchecked = told
         if self._checked is not None and told.assignments == self._checked.assignments:
             self._asked = self.number
             return
-        self._state.begin_check(self._asked)
+        self._state.start_check(self._asked)
         for name in self._state.order:
             values = self._members.neighbourhood(name, told.assignments)
             self._send(name, CheckRequest(self._state.epoch, values, self._asked))

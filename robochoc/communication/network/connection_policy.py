@@ -1,4 +1,4 @@
-"""The connection policy: the members that may connect, and their receivers. It follows the Authority's registry."""
+"""The connection policy: the members that may connect, and their receivers, according to the Authority's registry."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from robochoc.communication.network.router import RefusalObserver, Router
 from robochoc.communication.network.settings import PATIENCE_S
 
 Reach = Mapping[str, tuple[str, ...]]
-"""The members that may take part, each with those to which it may write besides the master."""
+"""The admitted members, each with its allowed receivers besides the master."""
 
 
 class ConnectionPolicy:
     """The router at `endpoint`, with rules that follow `admission`. Its opener closes it.
 
-    `ways` are the team's, if it is known before anybody comes: then the router need not be opened anew for it.
+    `ways` are the team's receivers, if they are known in advance: then the router need not be restarted for them.
     """
 
     def __init__(
@@ -41,23 +41,23 @@ class ConnectionPolicy:
         self.admitted: tuple[str, ...] = ()
         """The names that may connect by the router's present rules."""
         self.sniffable = False
-        """True if sniffers may have the journal of this run."""
+        """Whether sniffers may receive the journal of this run."""
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
-        """Admit all names that the Authority has certified or invited. They may write to the master and by the ways."""
+        """Admit all names that the Authority has certified or invited, to write to the master and their receivers."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:
-        """Let robots write to the members that `ways` names for them."""
+        """Let robots write to their receivers in `ways`."""
         self._ways = ways
         self.follow()
 
     def follow(self) -> None:
         """Admit newly enrolled names, and exclude revoked ones. Raises `RouterError`.
 
-        There are rules for those who were invited, too: nobody has a certificate in their names, and the router need
-        not be opened anew when they get theirs.
+        Invited names have rules, too: nobody has a certificate in their names yet, and the router need not be restarted
+        when they receive one.
         """
         names = partial(self._admission.names, invited=True)
         there = [*names(Role.ROBOT), *names(Role.OBSERVER)]
@@ -70,32 +70,32 @@ class ConnectionPolicy:
             self._router.open(*rules)
 
     def may_sniff(self, name: str) -> bool:
-        """Return whether this run's journal is given out, and `name` has the right to it."""
+        """Return whether this run's journal is public, and `name` has the right to receive it."""
         return self.sniffable and name in self._admission.names(right=Right.SNIFF)
 
     def is_revoked(self, name: str) -> bool:
-        """Return whether `name` is refused."""
+        """Return whether the certificate of `name` was revoked."""
         return self._admission.is_revoked(name)
 
     def admits(self, name: str) -> bool:
-        """Return whether `name` has a certificate in force now, even if the router does not know it yet."""
+        """Return whether `name` has a valid certificate, even if the router does not know it yet."""
         return name in self._admission.names()
 
     def is_robot(self, name: str) -> bool:
-        """Return whether `name` may take part, and not only ask."""
+        """Return whether `name` is enrolled as a robot, and not only as an observer."""
         return name in self._admission.names(Role.ROBOT)
 
     def share_of(self, name: str) -> Share:
-        """Return what `name` may send to the master."""
+        """Return the quota of `name` at the master."""
         return ROBOT_SHARE if self.is_robot(name) else OBSERVER_SHARE
 
     def revoked(self, names: Collection[str]) -> list[str]:
-        """Return those of `names` that are refused now."""
+        """Return the revoked ones of `names`."""
         return [name for name in names if self.is_revoked(name)]
 
     @property
     def failure(self) -> str:
-        """Return why the router has failed; empty if it works."""
+        """The reason why the router has failed; empty if it works."""
         return self._router.failure
 
     def close(self) -> None:

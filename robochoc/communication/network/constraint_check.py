@@ -1,6 +1,6 @@
-"""A robot checks its constraints, and its copies of others' constraints, against what the team has decided. Pure.
+"""The check of a robot's constraints, and of its copies of others' constraints, against the team's decision. Pure.
 
-It uses the problem itself, not the compiled constraints that the protocol works with.
+It uses the problem itself, not the compiled constraints of the protocol.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ def check_constraints(
     values: Mapping[str, int],
     learnt: Mapping[str, Sequence[Constraint]],
 ) -> CheckResult:
-    """Return what the constraints charge that `robot` knows.
+    """Return the costs of the constraints that `robot` knows.
 
     Args:
         epoch: The epoch of the search.
-        robot: The robot that checks.
-        values: The decided values of all variables that it knows. Withdrawn robots have none, and constraints over
-            their variables are restated for the others or left out (`model/absence.py`).
-        learnt: Constraints that it has learnt from others, by the robots that hold them.
+        robot: The robot.
+        values: The decided values of all variables it knows. Withdrawn robots have none, and constraints over
+            their variables are restated for the others or dropped (`model/absence.py`).
+        learnt: Constraints that it has received from others, by their holders.
     """
     parts = [part for child in robot.children for part in child.constraints]
     known_to_it = (_in_force(one, values) for one in (*robot.private, *robot.shared, *parts))
@@ -36,7 +36,7 @@ def check_constraints(
     shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model != ConstraintModel.PKC], values))
     known = [*((child.name, child.copies) for child in robot.children), *learnt.items()]
     charges = (one for holder, theirs in known for one in _charges(holder, theirs, values))
-    copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have told any number
+    copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have sent any number
     allowed = cost < INFINITE
     return CheckResult(epoch, allowed, cost if allowed else 0, len(held), shared, copies)
 
@@ -53,5 +53,5 @@ def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str
 
 
 def _in_force(constraint: Constraint, values: Mapping[str, int]) -> Constraint | None:
-    """Return `constraint` as restated when robots without values are absent; None: it is dropped."""
+    """Return `constraint` as restated without the robots that have no values; None if it is dropped."""
     return restated(constraint, {name for name in constraint.variables if name not in values})

@@ -1,6 +1,6 @@
-"""Constraints on the wire: some protocols have every robot of a constraint's scope know it, not only the lowest.
+"""Constraints on the wire, for protocols in which every robot of a constraint's scope knows it, not only the lowest.
 
-They travel as data, predicates as the functional expressions of files, and are parsed and type-checked as those are.
+They are sent as data, with predicates as functional expressions, and are parsed and type-checked like files.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint
 
 MOST_TERMS = 1000
-"""In a scope, or of parameters: few enough to look names up among them."""
+"""The most terms of a scope or a list of parameters."""
 
 
 class SharedConstraintError(ValueError):
-    """A constraint from elsewhere that cannot be."""
+    """A constraint from another robot is invalid."""
 
 
 class RelationRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -48,7 +48,7 @@ class RelationRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
 
 
 class PredicateRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
-    """A predicate; `body` is a functional expression. Of a global constraint it has the `form` instead."""
+    """A predicate; `body` is a functional expression. A global constraint has a `form` instead."""
 
     name: str
     parameters: tuple[str, ...]
@@ -81,7 +81,7 @@ class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
 
 
 def record_of(known: KeyedConstraint) -> SharedRecord:
-    """`known` as it travels."""
+    """Return the record of `known` for the wire."""
     one = known.constraint
     defined = _defined(one.definition)
     return SharedRecord(known.key, one.name, defined, one.scope, one.parameters, one.model, one.cost, one.when_absent)
@@ -93,7 +93,7 @@ def known_of(record: SharedRecord) -> KeyedConstraint:
         raise SharedConstraintError(f"{shortened(record.name)!r} has more than {MOST_TERMS} terms")
     variables = [term for term in record.scope if isinstance(term, str)]
     if not variables or not all(map(is_name, variables)) or not set(record.parameters) <= set(record.scope):
-        raise SharedConstraintError(f"the scope of {shortened(record.name)!r} is none")
+        raise SharedConstraintError(f"the scope of {shortened(record.name)!r} is invalid")
     definition = _definition(record.definition)
     arity = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
     if arity != len(record.parameters) or not record.cost >= 0:
@@ -135,9 +135,9 @@ def _definition(record: Record) -> Definition:
     if not isinstance(record, RelationRecord):
         return _in_intension(record)
     if any(len(values) != record.arity for values in record.tuples):
-        raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} has not {record.arity} values")
+        raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} does not have {record.arity} values")
     if len(set(record.tuples)) < len(record.tuples):
-        raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} stands twice")
+        raise SharedConstraintError(f"duplicate tuple in {shortened(record.name)!r}")
     costs = len(record.tuples) if record.semantics == Semantics.SOFT else 0
     if len(record.costs) != costs or not all(cost >= 0 for cost in (*record.costs, record.default_cost)):
         raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are none")

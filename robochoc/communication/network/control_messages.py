@@ -1,9 +1,8 @@
 """The control messages between the master and robots across machines. Frames (`framing.py`) carry them.
 
-The master is the paper's: it registers robots, waits until all are there, orders the start, finds out when all is
-quiet, and stops all (Figure 3). Of robots' files it knows what their profiles say. Protocol messages
-(`ProtocolMessage`) go from robot to robot, and it never sees them. Messages that the runtime of processes has as well
-are in `communication/control.py`.
+The master is the paper's: it registers robots, waits until all are present, orders the start, detects quiescence, and
+stops all (Figure 3). It knows only the profiles of robots' files. Protocol messages (`ProtocolMessage`) go from robot
+to robot, and never to the master. Messages shared with the runtime of processes are in `communication/control.py`.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from robochoc.model.message import Value
 from robochoc.solver.encoding import Cost
 
 LATEST = 2**53
-"""The largest clock of constraint checks. A robot reports its own, and must not overflow another's."""
+"""The largest clock of constraint checks. A robot reports its clock, which must not overflow another robot's."""
 
 
 class _Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -46,7 +45,7 @@ class _Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
 class Register(_Message, frozen=True):
     """Registers the robot of `profile`.
 
-    `incarnation` names this process of the robot: one that is started again has another.
+    `incarnation` names this process of the robot: a restarted robot has another one.
     """
 
     profile: Profile
@@ -56,7 +55,7 @@ class Register(_Message, frozen=True):
 class Joined(_Message, frozen=True):
     """Confirms the welcome of an incarnation; sent for each welcome, as an answer may get lost.
 
-    `card` holds the robot's keys of this run (`KeyCard`; empty: no filter needs any).
+    `card` contains the robot's keys of this run (`KeyCard`; empty: no filter needs keys).
     """
 
     incarnation: str
@@ -64,13 +63,13 @@ class Joined(_Message, frozen=True):
 
 
 class DomainAnswer(_Message, frozen=True):
-    """The domains that the master asked for."""
+    """The domains that the master has requested."""
 
     variables: dict[str, Ranges]
 
 
 class Exchanged(NamedTuple):
-    """Protocol messages with one other robot: `sent` to it, `received` from it, and the latest `clock` these had."""
+    """Protocol messages with one other robot: `sent` to it, `received` from it, and the latest `clock` of these."""
 
     sent: int = 0
     received: int = 0
@@ -78,10 +77,10 @@ class Exchanged(NamedTuple):
 
 
 class DetailedReport(Report, frozen=True):
-    """A report with what the master needs to check it. In private runs `assignment` and findings stay empty.
+    """A report with data for its check by the master. In private runs `assignment` and findings are empty.
 
-    `assigned` says whether the robot has values. `exchanged` counts the messages with each other robot, so that what
-    one robot says is held against what another says.
+    `assigned`: the robot has values. `exchanged` counts the messages with each other robot, so that the master can
+    compare the reports of two robots.
     """
 
     assigned: bool
@@ -89,7 +88,7 @@ class DetailedReport(Report, frozen=True):
 
 
 class Charge(NamedTuple):
-    """The total cost of `holder`'s totally known constraints over the same `variables`."""
+    """The total cost of the totally known constraints of `holder` over the same `variables`."""
 
     holder: str
     variables: tuple[str, ...]
@@ -100,8 +99,8 @@ class Charge(NamedTuple):
 class CheckResult(EpochMessage, frozen=True):
     """The cost of the robot's constraints for the decided values. `allowed`: none is violated.
 
-    `held` is their number. Of these, `shared` are those that others may know too; `copies` are constraints of others
-    that the robot knows. `snapshot` is the number of the snapshot that was checked; 0: what was reported at the end.
+    `held` is their number. `shared` are those of them that others may also know; `copies` are constraints of others
+    that the robot knows. `snapshot` is the number of the checked snapshot; 0: the final reports.
     """
 
     allowed: bool
@@ -113,7 +112,7 @@ class CheckResult(EpochMessage, frozen=True):
 
 
 class Objection(_Message, frozen=True):
-    """A report that the robot has refused `what` of `who`."""
+    """A report that the robot has refused `what` from `who`."""
 
     who: str
     what: str
@@ -169,13 +168,13 @@ class RegistrationDenied(_Message, frozen=True):
 
 
 class DomainRequest(_Message, frozen=True):
-    """Asks for the domains of variables that parts of partially known constraints look at."""
+    """Requests the domains of variables that occur in parts of partially known constraints."""
 
     variables: tuple[str, ...]
 
 
 class Task(EpochMessage, frozen=True):
-    """A search: what all robots know of each other (see `solver/agent_problem.py`), and how they search."""
+    """A search: the robots' common knowledge (see `solver/agent_problem.py`), the protocol, and its parameters."""
 
     protocol: str
     order: tuple[str, ...]
@@ -191,14 +190,14 @@ class Task(EpochMessage, frozen=True):
 
 
 class StartSearch(EpochMessage, frozen=True):
-    """The order to begin, as all robots are ready."""
+    """The order to start, as all robots are ready."""
 
 
 class Recall(EpochMessage, frozen=True):
-    """Asks for a `Snapshot` of this `number`: what the robot has now.
+    """Requests a `Snapshot` with this `number`: the robot's present values.
 
-    With a `cycle`: what it had in that cycle of its protocol. With a `value`: what is behind that value, as others see
-    it.
+    With a `cycle`: its values in that cycle of its protocol. With a `value`: the values of its variables behind this
+    value, which others see.
     """
 
     number: int
@@ -207,9 +206,9 @@ class Recall(EpochMessage, frozen=True):
 
 
 class CheckRequest(EpochMessage, frozen=True):
-    """The decided values of those that share constraints with the robot: it checks them, with its own.
+    """The order to check the decided values of robots that share constraints with the robot, together with its own.
 
-    `snapshot`: they are those of that snapshot (0: those that were reported at the end).
+    `snapshot`: the number of the snapshot that contains them (0: the final reports).
     """
 
     values: Mapping[str, int]
@@ -217,9 +216,9 @@ class CheckRequest(EpochMessage, frozen=True):
 
 
 class Adopt(EpochMessage, frozen=True):
-    """The order to keep what the robot had at the snapshot `number`, the best so far (0: what it reported at the end).
+    """The order to keep the values of the snapshot `number`, the best so far (0: those of the final report).
 
-    With a `why`, it is the robot's decision until it hears otherwise: the verdict, in a few words.
+    With a `why`, the verdict in a few words, they are the robot's decision until a further order.
     """
 
     number: int
@@ -249,7 +248,7 @@ class JournalAnswer(_Message, frozen=True):
 
 
 class Leave(_Message, frozen=True):
-    """The run is over. `failed`: it could not be completed, because of `why`; otherwise that is the verdict."""
+    """The run is over. `failed`: it could not be completed, because of `why`; otherwise `why` is the verdict."""
 
     why: str
     failed: bool
@@ -259,16 +258,16 @@ class Leave(_Message, frozen=True):
 
 
 class ProtocolMessage(EpochMessage, frozen=True):
-    """A protocol's message, as the filters have sealed it, with the sender's NCCC clock."""
+    """A protocol's message, sealed by the filters, with the sender's NCCC clock."""
 
     clock: Annotated[int, msgspec.Meta(ge=0, le=LATEST)]
     content: bytes
 
 
 class Copies(EpochMessage, frozen=True):
-    """The totally known constraints of the sender whose scopes the receiver is in, for protocols with shared scopes.
+    """The sender's totally known constraints over the receiver's variables, for protocols with shared scopes.
 
-    `content` holds `SharedRecord`s, as the filters have sealed it.
+    `content` contains `SharedRecord`s, sealed by the filters.
     """
 
     content: bytes

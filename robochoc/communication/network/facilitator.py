@@ -1,4 +1,4 @@
-"""The master's Directory Facilitator: robots are entered when they register, and all participants may ask."""
+"""The master's Directory Facilitator: robots are added when they register, and all participants may query it."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from robochoc.services.facilitator import handle, notification, subscribe
 from robochoc.services.sl import df_on
 
 MAX_REQUESTS_PER_S = 20
-"""Requests that a participant may make in a second."""
+"""The most requests of a participant in a second."""
 
 
 class TooManyRequestsError(ValueError):
-    """A participant asks too often."""
+    """A participant sends too many requests."""
 
 
 class DirectoryFacilitator:
-    """The directory of the platform at `endpoint`, whose robots speak `protocol`."""
+    """The directory of the platform at `endpoint`, whose robots use `protocol`."""
 
     def __init__(self, endpoint: str, protocol: str) -> None:
         self._endpoint = endpoint
@@ -38,12 +38,12 @@ class DirectoryFacilitator:
         self._df = df_on(f"{endpoint}/robochoc")
         self._asked: dict[str, list[float]] = {}
         self._numbers: dict[str, int] = {}
-        """The number under which each subscriber has asked last."""
+        """The number of each subscriber's last request."""
 
     def enter(self, profile: Profile) -> str:
-        """Return the robot of `profile` can be found: by its protocol, its variables, its topics.
+        """Add the robot of `profile` to the directory, with its protocol, variables and topics as far as they fit.
 
-        By as many of them as a description holds. Returns why it cannot be found, if so; it takes part all the same.
+        Return why it cannot be added, or an empty text; it takes part in any case.
         """
         services = (
             *(ServiceDescription(name=topic, type="topic") for topic in profile.topics),
@@ -70,7 +70,7 @@ class DirectoryFacilitator:
         self._directory.expire(time.time())
 
     def count(self, requester: str) -> None:
-        """`requester` asks for something, of the directory or of the master. Raises `TooManyRequestsError`."""
+        """Count a request of `requester` to the directory or the master. Raises `TooManyRequestsError`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
         if len(recent) >= MAX_REQUESTS_PER_S:
@@ -78,7 +78,7 @@ class DirectoryFacilitator:
         self._asked[requester] = [*recent, now]
 
     def answer(self, requester: str, ask: DirectoryRequest) -> DirectoryAnswer:
-        """Return the answer to what `requester` asks in SL0; `notices` has what it subscribes to."""
+        """Return the answer to a request of `requester` in SL0; `notices` yields the results of subscriptions."""
         now = time.time()
         aid = self._aid(requester)
         if not ask.subscribe:
@@ -101,7 +101,7 @@ class DirectoryFacilitator:
 
 
 class RequestHandler:
-    """Answers requests, up to a rate for each member: `send` sends answers, and `refuse` reports refusals."""
+    """Answers requests up to a rate for each member. `send` sends answers, and `refuse` reports refusals."""
 
     def __init__(
         self,

@@ -1,8 +1,8 @@
-"""Clean-up in the fork server when its parent has ended: remove the parent's temporary folder, and end in silence.
+"""Clean-up in the fork server when its parent has ended: removes the parent's temporary folder, and ends silently.
 
-Only in the fork server this module does something. A parent that was killed cannot remove the folder. The router
-removes it too, but not every run has a router. A parent that was killed in the middle of a request leaves a connection
-without what it was to bring, which `multiprocessing` does not expect.
+A module of its own, as its import has these effects, and only in the fork server. A killed parent cannot remove the
+folder. The router removes it too, but not every run has a router. A parent that is killed during a request leaves an
+incomplete request, which `multiprocessing` does not expect.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import sys
 from types import TracebackType
 
 SCRATCH = "ROBOCHOC_SCRATCH"
-"""The environment's variable by which the parent says which folder that is."""
+"""The environment variable with the path of the folder."""
 
 
 def _without_a_parent(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Say nothing of a request whose rest does not come, in the fork server and in the process that it has forked.
+    """Ignore the error of an incomplete request, in the fork server and in the process that it has forked.
 
-    What goes wrong in a robot is told by the process itself (`Process._bootstrap`), and does not come here.
+    Errors of a robot are printed by its process (`Process._bootstrap`), and do not reach this hook.
     """
     truncated = kind.__name__ == "UnpicklingError" and "truncated" in str(error)
     if not (truncated or issubclass(kind, EOFError)):

@@ -1,8 +1,8 @@
-"""Frames that are lost for good. Their sender is then lost, never another robot.
+"""Frames that are lost for good. Their sender then counts as lost, never another robot.
 
-A robot whose frames to the master are lost is lost. An observer only loses its request. The loss of frames between two
-robots is reported by one of them, and may be a number that the other has made up. So it counts only once messages are
-missing, which the counters of all robots show.
+A robot whose frames to the master are lost counts as lost. An observer only loses its request. The loss of frames
+between two robots is reported by one of them, and may be caused by wrong frame numbers of the other. So it counts only
+when messages are missing according to the counters of all robots.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ class LossTracker:
         self._refuse = refuse
         self._lose = lose
         self._said: dict[str, str] = {}
-        """Reports of this search: whose frames are lost, and why."""
+        """The reported losses of this search: the reason, by sender."""
 
     def start_search(self) -> None:
-        """Begin a search: what robots reported in another one no longer counts."""
+        """Start a search: discard the reports of previous searches."""
         self._said.clear()
 
     @property
     def is_reported(self) -> bool:
-        """Return whether a robot has reported in this search that frames of another one are lost."""
+        """Whether a robot has reported lost frames of another robot in this search."""
         return bool(self._said)
 
     def note_at_master(self, missed: FramesLost) -> None:
-        """Note that frames to the master are lost, and with them their sender, if it takes part.
+        """Report lost frames to the master, and mark their sender as lost if it takes part.
 
         Raises `RobotsLostError`.
         """
         name, many = missed.sender, f"{missed.frames:,} frames"
-        why = f"{many} of it were more than it may send" if missed.dropped else f"{many} of it were lost for good"
+        why = f"{many} of it exceeded its quota" if missed.dropped else f"{many} of it were lost for good"
         self._refuse(name, TO_MASTER, why)
         member = self._members.robots.get(name)
         if member and member.joined:
@@ -54,13 +54,13 @@ class LossTracker:
 
     def note_between(self, name: str, gap: LostFrames) -> None:
         """Note that the robot `name` reports the loss of frames to it."""
-        why = f"{gap.frames:,} frames of it to {name} were lost for good ({name} says so)"
+        why = f"{gap.frames:,} frames of it to {name} were lost for good (reported by {name})"
         self._refuse(gap.who, f"a frame to {name}", why)
         if gap.who in self._members.robots:
             self._said.setdefault(gap.who, why)
 
     def explain_missing(self) -> bool:
-        """Lose the robots whose frames are lost, as protocol messages are missing; return whether there are any.
+        """Mark the senders of lost frames as lost, as protocol messages are missing; return whether there are any.
 
         Raises `RobotsLostError`.
         """

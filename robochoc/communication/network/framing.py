@@ -1,8 +1,8 @@
-"""Frames around messages, so that no message is taken twice, out of order, or from another run. Pure.
+"""Frames around messages, so that no message is accepted twice, out of order, or from another run. Pure.
 
-The router proves who has sent a frame (`access.py`); its run and its number identify it. Within a run the frames of an
+The router proves the sender of a frame (`access.py`); its run and its number identify it. Within a run the frames of an
 ordered pair are numbered from 1, and arrive in that order or not at all. Messages before a run (from `Register` to
-`Joined`, and requests of observers) carry no run and no number: repeating them changes nothing.
+`Joined`, and requests of observers) have no run and no number: their repetition has no effect.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from robochoc.solver.encoding import UnsupportedError
 MASTER = "MASTER"
 """The master's name, as in Figure 3. No robot can have it."""
 LARGEST_FRAME = 8 * 2**20
-"""Bytes. zenoh drops larger content silently, so it is refused before, with a message."""
+"""Bytes. zenoh drops larger content without an error, so larger frames are refused with a message."""
 
 _OUTSIDE = (
     Register
@@ -49,11 +49,11 @@ class MessageTooLargeError(UnsupportedError):
 
 
 class FrameRefusedError(ValueError):
-    """A frame that is not accepted; the message says why."""
+    """A frame is not accepted, for the reason in the message."""
 
 
 class Frame(msgspec.Struct, frozen=True, array_like=True):
-    """`message` on its way in the run `run`, as frame `number` from its sender to its receiver."""
+    """`message` in the run `run`, as frame `number` from its sender to its receiver."""
 
     run: str
     number: int
@@ -73,7 +73,7 @@ class _ToPeer(Frame, frozen=True, array_like=True):
 
 
 class Opened(NamedTuple):
-    """A frame that can be accepted: its number (0: it has none), and the message in it."""
+    """The content of a valid frame: its number (0: it has none), and its message."""
 
     number: int
     message: ControlMessage
@@ -92,13 +92,13 @@ class Framing:
         self._of_robot = msgspec.msgpack.Decoder(_ToMaster if name == MASTER else _ToPeer)
 
     def start_run(self, run: str) -> None:
-        """Begin a run: numbers start anew."""
+        """Start a run, with numbers from 1."""
         self.run = run
         self._written.clear()
         self._read.clear()
 
     def forget(self, other: str) -> None:
-        """Number frames from and to `other` anew: the robot was started again."""
+        """Number frames from and to `other` from 1 again, as the robot was restarted."""
         self._written.pop(other, None)
         self._read.pop(other, None)
 
@@ -120,7 +120,7 @@ class Framing:
         return content
 
     def read(self, sender: str, content: bytes) -> Opened:
-        """Return the message in a frame of `sender`; it may come again until it is accepted by `take`.
+        """Return the message in a frame of `sender`; the frame may arrive again until `accept` is called.
 
         Raises `FrameRefusedError`.
         """
@@ -137,12 +137,12 @@ class Framing:
             raise FrameRefusedError("it is a replay: it was written in another run")
         expected = self._read.get(sender, 0) + 1
         if frame.number < expected:
-            raise FrameRefusedError(f"it is a replay: frame {frame.number} has come before")
+            raise FrameRefusedError(f"it is a replay: frame {frame.number} has already arrived")
         if frame.number > expected:
             raise FrameRefusedError(f"frame {expected} is missing before frame {frame.number}")
         return Opened(frame.number, frame.message)
 
     def accept(self, sender: str, number: int) -> None:
-        """Accept the frame `number` of `sender`: the next one is expected now."""
+        """Accept the frame `number` of `sender`, and expect the next one."""
         if number:
             self._read[sender] = max(number, self._read.get(sender, 0))

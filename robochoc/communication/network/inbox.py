@@ -1,7 +1,7 @@
-"""The inbox: items that have come and wait to be read, bounded for each sender, so that no flood fills the memory.
+"""The inbox: a queue of arrived items, bounded for each sender, so that no flood fills the memory.
 
-Frames beyond a sender's share (`quotas.py`) are dropped before anybody looks at them, and counted: `FramesLost` stands
-in the queue where the first of them was. That is a loss of that sender's, and of nobody else. Threads may share it.
+Frames beyond a sender's quota (`quotas.py`) are dropped unread, and counted: `FramesLost` takes the place of the first
+of them in the queue. The loss affects only this sender. Thread-safe.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class FrameArrived(NamedTuple):
 
 
 class FramesLost(NamedTuple):
-    """The number of `frames` of `sender` that are lost for good. A hostile sender can fake losses by its numbers.
+    """A number of `frames` of `sender` are lost for good. A hostile sender can fake losses by its frame numbers.
 
-    `dropped`: they were more than its share, and were dropped here.
+    `dropped`: they exceeded the sender's quota, and were dropped here.
     """
 
     sender: str
@@ -35,21 +35,21 @@ class FramesLost(NamedTuple):
 
 
 class PresenceChanged(NamedTuple):
-    """`name` is there, or is not any more as far as the router knows."""
+    """The router reports that `name` has become present, or absent."""
 
     name: str
     there: bool
 
 
 class WakeUp(NamedTuple):
-    """A wake-up from this process: there is something new."""
+    """A wake-up from this process."""
 
 
 Item = FrameArrived | FramesLost | PresenceChanged | WakeUp
 
 
 class Inbox:
-    """A queue of items, first in, first out. `share_of` says what a sender may have; it is asked once for each."""
+    """A FIFO queue of items. `share_of` returns a sender's quota; it is called once for each sender."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class Inbox:
         self._changed = threading.Condition()
 
     def put(self, item: Item) -> None:
-        """Append `item`, or drop a frame, or news of a gap, that is beyond its sender's share."""
+        """Append `item`, or drop a frame or a report of a gap beyond its sender's quota."""
         with self._changed:
             if isinstance(item, FrameArrived | FramesLost):
                 usage = self._usage_of(item.sender)
@@ -76,10 +76,7 @@ class Inbox:
             self._changed.notify()
 
     def get(self, timeout: float | None = None) -> Item:
-        """Return the oldest item, as soon as there is one.
-
-        Raises `Empty` when there is none within `timeout` seconds.
-        """
+        """Return the oldest item. Raises `Empty` if there is none within `timeout` seconds."""
         with self._changed:
             if not self._changed.wait_for(lambda: self._items, timeout):
                 raise Empty
@@ -93,7 +90,7 @@ class Inbox:
             return self._taken()
 
     def empty(self) -> bool:
-        """Return whether nothing waits."""
+        """Return whether there are no items."""
         return not self._items
 
     def _usage_of(self, sender: str) -> Usage:
@@ -117,5 +114,5 @@ class Inbox:
 
 
 def _size(item: FrameArrived | FramesLost) -> int:
-    """Bytes. A report of missing frames counts as an empty frame, as a hostile sender may cause any number of them."""
+    """Return the size of an item in bytes; a report of lost frames counts as an empty frame, as it can be forged."""
     return len(item.content) if isinstance(item, FrameArrived) else 0

@@ -1,8 +1,8 @@
-"""The run's journal, which the master offers while it grows to participants with the right to sniff.
+"""The run's journal, which the master publishes during the run to participants with the right to sniff.
 
-A follower asks for the bytes from `start` on, and gets a piece of bounded size; the rest waits in the journal's file.
-So a follower may come late, be slow, or stop: nothing is kept for it, nothing waits for it, and neither the master nor
-a robot is slowed. The router proves who asks (`access.py`). Threads may share it.
+A follower requests the bytes from `start` on, and receives a piece of bounded size; the rest stays in the journal's
+file. So a follower may start late, be slow, or stop: nothing is stored for it, and neither the master nor a robot is
+slowed. The router proves the name of the follower (`access.py`). Thread-safe.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
 
 SNIFF = "sniff"
-"""The right that is granted or refused."""
+"""The name of the right."""
 PIECE_BYTES = 60_000
 """The largest piece of the journal: with its framing it fits into one batch of zenoh."""
 MAX_ANSWERS_PER_S = 200
-"""The largest number of answers to one follower in a second. It repeats questions without an answer."""
+"""The most answers to one follower in a second. The follower repeats unanswered questions."""
 PRESENT_S = 5.0
-"""Seconds after its last request for which a follower is waited for at the end of the run.
+"""Seconds after its last request for which the end of the run waits for a follower.
 
-It must be more than what a follower takes to ask again when a request or answer was lost (`sniffer/remote.py`: 2 s)."""
+More than the time after which a follower repeats a request (`sniffer/remote.py`: 2 s)."""
 LARGEST = 2**53
-"""Bytes: no journal is as long."""
+"""A bound on the bytes of any journal."""
 _LARGEST_QUESTION = 200
 
 
 class Question(msgspec.Struct, frozen=True, array_like=True):
-    """The journal of `run` from byte `start` on, please."""
+    """A request for the journal of `run` from byte `start` on."""
 
     run: str
     start: Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
@@ -51,19 +51,19 @@ class Piece(msgspec.Struct, frozen=True, array_like=True):
 
 
 class NotAnsweredError(Exception):
-    """A question without an answer. The message is the reason, for the master's observer. Empty: not reported."""
+    """A question has no answer. The message is the reason, for the master's observer. Empty: not reported."""
 
 
 class Publication:
-    """The journal of one run, written to the file `descriptor` (for reading and writing), and given out from it.
+    """The journal of one run, written to the file `descriptor` (for reading and writing), and published from it.
 
-    It is a sink for blocks (`write`). `fresh` is called when somebody has asked for all that there is: it may write
-    what has not been written yet. Whoever opens the file closes it, after `close`.
+    It is a sink for blocks (`write`). `fresh` is called when a follower has received the whole file: it may write
+    pending blocks. The opener of the file closes it, after `close`.
     """
 
     def __init__(self, descriptor: int, fresh: Callable[[], None] = lambda: None) -> None:
         self.run = ""
-        """The run whose journal it is, as frames name it; the master sets it."""
+        """The name of the run, as in frames; set by the master."""
         self.fresh = fresh
         self.trouble = ""
         """The reason why the journal is no longer written and published. Empty: there is none."""
@@ -76,34 +76,34 @@ class Publication:
         self._lock = threading.Lock()
 
     def write(self, block: bytes) -> None:
-        """Append a block. Where that fails, the run goes on, and followers learn of it (`trouble`)."""
+        """Append a block. On failure the run continues, and followers receive the reason (`trouble`)."""
         done = 0
         try:
             while done < len(block) and not self.trouble:
                 done += os.pwrite(self._descriptor, memoryview(block)[done:], self._size + done)
         except OSError as error:
-            self.trouble = f"the journal cannot be kept any more: {error.strerror}"
+            self.trouble = f"the journal cannot be written any more: {error.strerror}"
         else:
             self._size += done
 
     def end(self) -> None:
-        """Note that all has been written."""
+        """Note that the journal is complete."""
         self._over = True
 
     def close(self) -> None:
-        """Answer no questions any more."""
+        """Stop answering questions."""
         with self._lock:
             self._closed = True
 
     @property
     def lagging(self) -> bool:
-        """Return whether a follower of the run has not received its end yet."""
+        """Whether a follower of the run has not received its end yet."""
         now = time.monotonic()
         with self._lock:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
 
     def answer(self, name: str, content: bytes) -> bytes:
-        """Return the answer to the question `content` of `name`, who has the right to ask.
+        """Return the answer to the question `content` of `name`, which has the right to sniff.
 
         Raises `NotAnsweredError`.
         """
@@ -111,10 +111,10 @@ class Publication:
         question = _question(content)
         if question.run == self.run and question.start >= self._size and not self._over:
             self.fresh()
-        over = self._over  # before the size is looked at: nothing is written after it
+        over = self._over  # read before the size, as nothing is written afterwards
         size = self._size
         if question.start > size:
-            raise NotAnsweredError(f"the journal has {size:,} bytes, and byte {question.start:,} was asked for")
+            raise NotAnsweredError(f"the journal has {size:,} bytes, but byte {question.start:,} was requested")
         with self._lock:
             if self._closed:
                 raise NotAnsweredError
@@ -147,12 +147,12 @@ def piece_in(content: bytes) -> Piece:
     try:
         return msgspec.msgpack.decode(content, type=Piece)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise JournalError(f"no piece of one: {error}") from None
+        raise JournalError(f"not a valid piece of a journal: {error}") from None
 
 
 def _question(content: bytes) -> Question:
     if len(content) > _LARGEST_QUESTION:
-        raise NotAnsweredError(f"a question of {len(content):,} bytes")
+        raise NotAnsweredError(f"the question has {len(content):,} bytes, more than {_LARGEST_QUESTION}")
     try:
         return msgspec.msgpack.decode(content, type=Question)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -160,9 +160,9 @@ def _question(content: bytes) -> Question:
 
 
 class JournalServer:
-    """The master's server for the journal of its `run`. A frame checks the right to it; then pieces are requested.
+    """The master's server for the journal of its `run`: a `JournalRequest` checks the right, then pieces are requested.
 
-    `publication` is None where it gives none out. `may` says who has the right now.
+    `publication` is None if the journal is not published. `may` returns whether a name has the right now.
     """
 
     def __init__(self, run: str, may: Callable[[str], bool], events: MasterEvents) -> None:
@@ -174,11 +174,11 @@ class JournalServer:
 
     @property
     def lagging(self) -> bool:
-        """Return whether a follower has not received the end of the journal yet."""
+        """Whether a follower has not received the end of the journal yet."""
         return self.publication is not None and self.publication.lagging
 
     def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:
-        """Return the answer to `name`, which wants to sniff."""
+        """Return the answer to a request of `name` to sniff."""
         why = self._why_not(name)
         if why:
             self._events.refuse(name, SNIFF, why)
@@ -188,7 +188,7 @@ class JournalServer:
         return JournalAnswer(sniff.number, self._run, why)
 
     def answer(self, name: str, content: bytes) -> bytes | None:
-        """Return the answer to a question of `name`, as the router says it is; None: there is none."""
+        """Return the answer to a question of `name`, which the router has proven; None: there is none."""
         why = self._why_not(name)
         if not why and self.publication:
             try:
@@ -201,7 +201,7 @@ class JournalServer:
 
     def _why_not(self, name: str) -> str:
         if self.publication is None:
-            return "this master gives its journal to nobody; it needs --sniffable"
+            return "this master does not publish its journal: start it with --sniffable"
         if not self._may(name):
-            return f"it has no right to; say: robochoc authority enrol {name} --may sniff"
+            return f"it does not have the right: grant it by robochoc authority enrol {name} --may sniff"
         return self.publication.trouble

@@ -1,7 +1,7 @@
-"""All of it on this machine: `--runtime network`. One process per robot, a master, a router, mutual TLS on loopback.
+"""The network runtime on one machine: `--runtime network`. A process for each robot, a master, a router, mutual TLS.
 
-For trying out, and for tests. Robots' processes come from a fork server, as a forked child of a process that has used
-zenoh hangs. Certificates are made for this one run, and are nowhere but in memory.
+For trials and tests. Robots' processes are started by a fork server, as a forked child of a process that has used zenoh
+hangs. Certificates are created for this run only, and exist only in memory.
 """
 
 from __future__ import annotations
@@ -47,20 +47,20 @@ LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
 """Seconds for which the end of the run is announced. Stopped robots do not confirm it and are then killed."""
 GRACE_S = 2.0
-"""The time that robots have to end by themselves once they have confirmed the end of the run, in seconds."""
+"""Seconds in which robots may end by themselves after they have confirmed the end of the run."""
 _ATTEMPTS = 5
 _DESCRIPTORS, _DESCRIPTORS_PER_ROBOT = 32, 2
 """Open files: of the master's session, the router's pipes and the fork server, and of each robot's process."""
 _PRELOAD = (fork_server.__name__, "__main__", "robochoc.communication.network.robot_process")
 """The modules that the fork server imports once for all robots, with the program's own file (`__main__`)."""
 _OURS = "robochoc."
-"""Modules that are sure to be importable there."""
+"""The prefix of modules that the fork server can import."""
 
 
 class LocalNetwork(Session):
-    """One team on this machine, each robot in a process of its own, joined by zenoh. See `Session`, `ProcessesRun`.
+    """One team on this machine, each robot in its own process, connected by zenoh. See `Session`, `ProcessesRun`.
 
-    Robots compile nothing: they come compiled, and when others are lost they still show what they showed before.
+    Robots are already compiled, and when others are lost they still disclose the same variables.
     """
 
     starts_fresh = True
@@ -112,10 +112,7 @@ class LocalNetwork(Session):
 
     @staticmethod
     def _open_master(make: Callable[[str], Master]) -> Master:
-        """Return the master, open at a free port of loopback.
-
-        Another program may take that port first: then at another.
-        """
+        """Return the master, open at a free port of loopback; try others if another program takes the port first."""
         for attempt in range(_ATTEMPTS):
             with socket.create_server((LOOPBACK, 0)) as trial:
                 port = trial.getsockname()[1]
@@ -138,7 +135,7 @@ class LocalNetwork(Session):
 
     @property
     def lossless(self) -> bool:
-        """See `Session.lossless`: every search begins anew, so that there is none before."""
+        """See `Session.lossless`: every search is independent of the previous one."""
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -161,7 +158,7 @@ class LocalNetwork(Session):
         return keep_interfaces(team, self.compiled.team)
 
     def change(self, epoch: Epoch) -> None:
-        """Go on without the robots that were lost: no other change can happen here."""
+        """Continue without the lost robots, the only possible change."""
         self.compiled = epoch.compiled
         gone = [name for name in self._master.members.robots if name not in epoch.team]
         self._master.members.remove(gone)
@@ -186,7 +183,7 @@ class LocalNetwork(Session):
             self._processes[name].kill()
 
     def _launch(self) -> None:
-        """Start the robots' processes, and a thread that watches for their ends."""
+        """Start the robots' processes, and a thread that watches them."""
         unstarted, self._unstarted = self._unstarted, []
         if not unstarted:
             return
@@ -196,13 +193,13 @@ class LocalNetwork(Session):
             limits = (self._settings.patience_s, self._settings.lease_ms)
             given = NetworkRobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=network_robot_process, name=name, args=(given,), daemon=True)
-            with signals_held():  # half begun, it would wait for the rest for ever, and the end of the program for it
+            with signals_held():  # a half-started process would wait for ever, and block the end of the program
                 process.start()
                 self._processes[name] = process
         threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
 
     def _watch(self, processes: dict[str, BaseProcess]) -> None:
-        """Tell the master of processes that end, which it would notice later by itself."""
+        """Report ended processes to the master, which would notice them later by itself."""
         names = {process.sentinel: name for name, process in processes.items()}
         while names and not self._is_closed:
             for sentinel in wait(list(names), 0.2):
@@ -225,10 +222,10 @@ class LocalNetwork(Session):
 
 
 def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
-    """Start the fork server, if it does not run yet: while it imports, the router is opened.
+    """Start the fork server, if it does not run yet. It imports modules while the router is opened.
 
-    Signals wait meanwhile: half done, its folder would be left. The fork server inherits that, so it does not hear what
-    reaches the whole group while it imports; it ends with this process.
+    Signals are held during the start, so that no folder is left behind. The fork server inherits this, and ignores
+    signals to the whole group while it imports; it ends with this process.
     """
     context = multiprocessing.get_context("forkserver")
     own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
@@ -241,5 +238,5 @@ def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
             finally:
                 del os.environ[fork_server.SCRATCH]
     except OSError as error:  # such as a temporary folder whose path is too long for a socket
-        raise UnsupportedError(f"robots' processes cannot be started: {error} (see TMPDIR)") from error
+        raise UnsupportedError(f"robots' processes cannot be started: {error}: check the folder TMPDIR") from error
     return context

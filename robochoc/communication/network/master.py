@@ -1,8 +1,8 @@
 """The master across machines: Figure 3's, which "launches its communication interface listening on the network".
 
-It runs the router and is a participant like others. It registers robots (never seeing their files), closes the team
-when all are there, gives each its task, orders the start, detects quiescence by four counters, collects what was
-decided, has every robot check its own constraints against it, and ends the run.
+It runs the router and is a participant like others. It registers robots (without access to their files), closes the
+team when all are present, sends each its task, orders the start, detects quiescence by four counters, collects the
+decision, has every robot check its constraints against it, and ends the run.
 
 A robot whose liveliness token has been gone for longer than the patience is lost.
 """
@@ -62,11 +62,11 @@ REGISTRY_S = 0.5
 """The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
 HELD_S = 15.0
-"""The longest time that a frame is held back where no link is down, in seconds.
+"""The longest delay of a frame while no link is down, in seconds.
 
-zenoh finds out that the last frame of a sender is missing after `transport.HEARTBEAT_S` (5 s), asks for it, and waits
-10 s for a busy machine that does not answer. So the master waits longer for reports where there is a verdict, and
-before it believes that messages are lost.
+zenoh detects after `transport.HEARTBEAT_S` (5 s) that the last frame of a sender is missing, requests it, waits 10 s
+for a busy machine that does not answer. So the master waits longer for reports after a verdict, and before it decides
+that messages are lost.
 """
 
 
@@ -76,11 +76,11 @@ class Master(MasterLoop):
     Args:
         admission: Which robots are admitted.
         identity: Its certificate and key.
-        endpoint: Where robots reach it.
-        members: Which robots are expected; then it holds those that have come.
-        settings: What the run is like.
-        observer: Receives all events, refusals among them (those in threads of their own).
-        watched: It receives the robots' events as well.
+        endpoint: The address at which robots reach it.
+        members: The expected robots; later also the registered ones.
+        settings: The settings of the run.
+        observer: Receives all events, including refusals (these from other threads).
+        watched: Whether the observer receives the robots' events as well.
         progress: Receives the count of messages now and then.
     """
 
@@ -114,7 +114,7 @@ class Master(MasterLoop):
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
         self.snapshots: CheckedSnapshots | None = None
-        """The snapshots of the search that goes on, if robots are to check them."""
+        """The snapshots of the present search, if robots are to check them."""
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
 
     def __enter__(self) -> Self:
@@ -127,19 +127,19 @@ class Master(MasterLoop):
 
     @property
     def is_private(self) -> bool:
-        """Return whether robots keep their values to themselves."""
+        """Whether robots do not disclose their values."""
         return self._settings.private
 
     def publish(self, publication: Publication) -> None:
-        """Offer `publication`, this run's journal, to those who may sniff. To be called before the master listens."""
+        """Offer `publication`, this run's journal, to authorized sniffers. To be called before the master listens."""
         self._connection.publish(publication)
 
     # The course of a run
 
     def gather(self, deadline: float | None = None) -> bool:
-        """Wait until all robots are registered; return False when the deadline (on the monotonic clock) came first.
+        """Wait until all robots are registered; return False if the deadline (on the monotonic clock) comes first.
 
-        Raises `UnsupportedError` when a constraint is over variables of none of its robot's neighbours.
+        Raises `UnsupportedError` for a constraint over a variable that no neighbour of its robot has.
         """
         self._serve_until(lambda: self.members.complete, deadline)
         unseen = self.members.unseen()
@@ -149,9 +149,9 @@ class Master(MasterLoop):
             self._serve_until(lambda before=unseen: self.members.unseen() != before, deadline)  # type: ignore[misc]
             unseen = self.members.unseen()
         self.members.closed = self.members.complete and not unseen
-        stranger = next(self.members.strangers(), None) if self.members.closed else None
-        if stranger:
-            raise UnsupportedError(stranger)
+        invalid = next(self.members.invalid_scopes(), None) if self.members.closed else None
+        if invalid:
+            raise UnsupportedError(invalid)
         return self.members.closed
 
     def search(
@@ -164,14 +164,14 @@ class Master(MasterLoop):
         *,
         checked: bool = False,
     ) -> RunResult:
-        """Have all registered robots search by `protocol`, from the beginning, for at most `timeout` seconds.
+        """Have all registered robots start a search by `protocol`, for at most `timeout` seconds.
 
-        If there is a `watch`, it gets snapshots. If they are to be `checked`, these are the ones that all robots have
-        checked (`snapshots`).
+        If there is a `watch`, it receives snapshots; if `checked`, only those that all robots have checked
+        (`snapshots`).
 
         Raises:
-            RobotsLostError: when robots are lost and the run does not survive that, or messages are lost for good.
-            UnsupportedError: when a robot's problem is too large, or not one for this protocol.
+            RobotsLostError: if robots are lost and the run does not survive that, or messages are lost for good.
+            UnsupportedError: if a robot's problem is too large, or not supported by this protocol.
         """
         began = time.monotonic()
         self.events.start_search()
@@ -187,7 +187,7 @@ class Master(MasterLoop):
             self._send(name, task)
         self._search_until(deadline)
         if self.snapshots and self.watch and not state.lost:
-            self.watch.wants_snapshot(time.monotonic())  # what is due now does not wait for the reports
+            self.watch.wants_snapshot(time.monotonic())  # due work does not wait for the reports
         state.note_end(time.monotonic() - began, in_time=not (is_past(deadline) or self.is_to_stop))
         self._collect()
         return state.result(state.duration_s)
@@ -202,7 +202,7 @@ class Master(MasterLoop):
         return self.snapshots.advance() if self.snapshots else super()._snapshot()
 
     def adopt(self, number: int, why: str = "") -> None:
-        """Tell all robots to keep what they had at a snapshot, or (with a `why`) to decide on it. See `Adopt`."""
+        """Order all robots to keep their values of a snapshot, or (with a `why`) to decide on them. See `Adopt`."""
         self._send_all(Adopt(self.state.epoch, number, why))
 
     def _order_start(self) -> None:
@@ -210,7 +210,7 @@ class Master(MasterLoop):
         self.events.start_search()
 
     def _collect(self) -> None:
-        """End the search, and collect all reports. Raises `RobotsLostError` when it was stuck."""
+        """End the search, and collect all reports. Raises `RobotsLostError` if the search was stuck."""
         state = self.state
         self._send_all(Pause())
         patience_s = REPORTS_S if state.verdict is None else REPORTS_S + HELD_S
@@ -225,10 +225,10 @@ class Master(MasterLoop):
         """Have every robot check its constraints against `assignments`. Not for private runs.
 
         Returns:
-            Whether all constraints hold, and the sum of their costs.
+            Whether all constraints are satisfied, and the sum of their costs.
 
         Raises:
-            RobotsLostError: when robots are lost, or do not check in time.
+            RobotsLostError: if robots are lost, or do not check in time.
         """
         state = self.state
         for name in self.members.order:
@@ -240,11 +240,11 @@ class Master(MasterLoop):
         return state.held, state.cost
 
     def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
-        """Announce the end of the run until all robots confirm it: some may have joined, or come back, just now."""
+        """Announce the end of the run until all robots confirm it, even those that have just joined or returned."""
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):
-            # A run may be over before the directory was looked at again.
+            # A run may end before the next check of the directory.
             self._notify_subscribers()
             self._send_all(leave)
             while staying() and not is_past(until):
@@ -253,13 +253,13 @@ class Master(MasterLoop):
             self._serve_until(lambda: not self._journal_server.lagging, time.monotonic() + FAREWELL_S)
 
     def lose(self, name: str, why: str) -> None:
-        """Note that the robot's process has ended, as the caller has seen. May be called from any thread."""
+        """Note that the robot's process has ended. May be called from any thread."""
         self._dead[name] = why
         self._connection.wake()
 
     # The loop
 
-    def _serve(self, patience_s: float, deadline: float | None) -> None:  # noqa: ARG002 - it never takes long
+    def _serve(self, patience_s: float, deadline: float | None) -> None:  # noqa: ARG002 - it is always short
         until = time.monotonic() + TICK_S
         item = self._connection.receive(max(patience_s, 0.001))
         while item is not None:
@@ -281,7 +281,7 @@ class Master(MasterLoop):
                 pass
 
     def _check_robots(self, now: float) -> None:
-        """Find robots that have been away for too long, and those that may take part no more."""
+        """Find robots that have been absent for too long, and revoked ones."""
         if failure := self._policy.failure:
             raise RobotsLostError({MASTER: f"the router's process {failure}"})
         away_s = self._settings.patience_s
@@ -295,12 +295,12 @@ class Master(MasterLoop):
             self._follow_registry()
 
     def _notify_subscribers(self) -> None:
-        """Send the directory's notices about robots that have come, gone or changed."""
+        """Send the directory's notices about new, removed or changed robots."""
         for subscriber, answer in self._facilitator.notices():
             self._send(subscriber, answer)
 
     def _follow_registry(self) -> None:
-        """Admit newly enrolled robots, and exclude revoked ones. Both need a router with other rules."""
+        """Admit newly enrolled robots, and exclude revoked ones. Both require a router with new rules."""
         for name in self._policy.revoked(self.members.robots):
             if name not in self.state.lost:
                 self.events.refuse(name, "take part", "its certificate was revoked")
@@ -310,9 +310,9 @@ class Master(MasterLoop):
         self._connection.follow_registry()
 
     def _detect_end(self, now: float) -> None:
-        """See `MasterLoop._detect_end`. The search also ends when messages are missing without a reported loss.
+        """See `MasterLoop._detect_end`. The search also ends if messages are missing without a reported loss.
 
-        Such messages may still be on their way, held back by zenoh: they get more time.
+        Such messages may still be delayed by zenoh, so the master waits longer for them.
         """
         held_s = 0 if self._frame_loss.is_reported else HELD_S
         missing = self.state.missing(now, self._settings.patience_s + held_s)
@@ -360,7 +360,7 @@ class Master(MasterLoop):
             case Objection() | LostFrames() if not self.events.may_report_others(name):
                 pass
             case Objection(who, what, why):
-                self.events.refuse(who, what, f"{why} ({name} says so)")
+                self.events.refuse(who, what, f"{why} (reported by {name})")
             case LostFrames():
                 self._frame_loss.note_between(name, message)
             case Bye():
@@ -377,9 +377,9 @@ class Master(MasterLoop):
             self._lose(name, why, for_good=True)
 
     def _lose(self, name: str, why: str, *, for_good: bool = False) -> None:
-        """Note that the robot is lost. Before the search it may come back, unless `for_good`; in it that ends the run.
+        """Note that the robot is lost. Before the search it may return, unless `for_good`; in a search it may not.
 
-        Raises `RobotsLostError` unless the run survives that.
+        Raises `RobotsLostError` unless the run survives the loss.
         """
         member = self.members.robots.get(name)
         if name in self.state.lost or (member.left if member else not for_good or self.members.closed):

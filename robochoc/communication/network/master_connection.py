@@ -1,4 +1,4 @@
-"""The master's connection to the network: its router, its transport, its frames, and the journal that it offers."""
+"""The master's connection to the network: its router, its transport, its frames, and its journal server."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ class MasterConnection:
     """The connection of the master of the run `run`.
 
     Attributes:
-        policy: Who may connect, and write to whom.
+        policy: The rights to connect and to write.
         framing: The master's frames.
-        journal_server: Offers the run's journal to those who may sniff.
+        journal_server: Serves the run's journal to authorized sniffers.
 
     Args:
         run: The name of the run.
         identity: The master's certificate and key.
-        admission: Which identities are admitted.
-        endpoint: Where robots reach the master (`HOST:PORT`).
-        ways: To whom robots may write, if that is known before they come.
-        settings: What the run is like.
-        events: Receives what is granted and refused.
+        admission: The admitted identities.
+        endpoint: The address at which robots reach the master (`HOST:PORT`).
+        ways: The allowed receivers of each robot, if they are known in advance.
+        settings: The settings of the run.
+        events: Receives grants and refusals.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class MasterConnection:
             self.policy.close()
 
     def publish(self, publication: Publication) -> None:
-        """Offer `publication`, this run's journal, to those who may sniff. To be called before `open`."""
+        """Offer `publication`, this run's journal, to authorized sniffers. To be called before `open`."""
         publication.run = self.framing.run
         self.journal_server.publication = publication
         self.policy.sniffable = True
@@ -89,14 +89,14 @@ class MasterConnection:
         self._transport.send(name, self.framing.write(name, message))
 
     def receive(self, patience_s: float) -> Item | None:
-        """Return the oldest item of the inbox; None when nothing comes within `patience_s` seconds."""
+        """Return the oldest item of the inbox; None if none arrives within `patience_s` seconds."""
         try:
             return self._transport.inbox.get(timeout=patience_s)
         except Empty:
             return None
 
     def read(self, sender: str, content: bytes) -> Opened | None:
-        """Return what is in a frame; None if it was refused, which is reported."""
+        """Return the content of a frame; None if it was refused, which is reported."""
         try:
             opened = self.framing.read(sender, content)
         except FrameRefusedError as refused:
@@ -110,11 +110,11 @@ class MasterConnection:
         self._transport.wake()
 
     def follow_registry(self) -> None:
-        """Let in identities that were enrolled since, and exclude revoked ones."""
+        """Admit newly enrolled identities, and exclude revoked ones."""
         self.policy.follow()
         self._transport.subscribe(self.policy.admitted)
 
     def _note_refusal(self, refusal: Refusal) -> None:
-        """Report what the router has refused, except to identities that were admitted since, and will try again."""
+        """Report a refusal by the router, unless the identity has been admitted since and will try again."""
         if refusal.what != "connect" or not self.policy.admits(refusal.who):
             self._events.refuse(*refusal)

@@ -1,4 +1,4 @@
-"""The master's events: registrations, losses, what is granted and refused, and the events of robots."""
+"""The master's events: registrations, losses, grants, refusals, and the events of robots."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class MasterEvents:
         self._began = time.monotonic()
         self._allowances: dict[tuple[str, float], Allowance] = {}
         self.refuse = Refusals(self._refused).note
-        """Reports a refusal: who, what, and why."""
+        """Reports a refusal, with who, what and why."""
 
     @property
     def observed(self) -> bool:
-        """Return whether there is an observer."""
+        """Whether there is an observer."""
         return self._observer is not None
 
     def start_search(self) -> None:
-        """Begin a search: from now on times are counted from here, as those of its robots are."""
+        """Start a search: from now on, times are relative to this moment, like those of its robots."""
         self._began = time.monotonic()
 
     def registered(self, robot: str) -> None:
@@ -37,7 +37,7 @@ class MasterEvents:
         self._report(Registered(t=self._now, robot=robot))
 
     def dropped_out(self, robot: str, why: str) -> None:
-        """Report that a registered `robot` is gone, and waited for again."""
+        """Report that a registered `robot` is gone, and awaited again."""
         self._report(DroppedOut(t=self._now, robot=robot, why=why))
 
     def lost(self, robot: str, why: str) -> None:
@@ -49,22 +49,22 @@ class MasterEvents:
         self._report(Granted(t=self._now, who=who, what=what))
 
     def relay(self, event: Granted | Refused) -> None:
-        """Report an event of the Authority, whose time is another."""
+        """Report an event of the Authority, with the time of this run."""
         self._report(msgspec.structs.replace(event, t=self._now))
 
     def relay_from(self, name: str, events: Sequence[AnyEvent]) -> None:
-        """Report a robot's events. Events that are not about itself are refused."""
+        """Report a robot's events. Events about other robots are refused."""
         if not self._is_within_quota(name, len(events), EVENTS_A_SECOND):
-            self.refuse(name, "tell of events", f"more than {EVENTS_A_SECOND:,} a second")
+            self.refuse(name, "report events", f"more than {EVENTS_A_SECOND:,} a second")
             return
         for event in events:
             if actor(event) == name:
                 self._report(event)
             else:
-                self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
+                self.refuse(name, f"report {type(event).__name__}", "it is about another robot")
 
     def may_report_others(self, name: str) -> bool:
-        """Return whether `name` may report another refusal or loss; record a refusal if it reports too many."""
+        """Return whether `name` may report a further refusal or loss; report a refusal if it has reported too many."""
         is_allowed = self._is_within_quota(name, 1, REPORTS_A_SECOND)
         if not is_allowed:
             self.refuse(name, "report others", f"more than {REPORTS_A_SECOND} times a second")

@@ -1,4 +1,4 @@
-"""The robots that have registered with the master: profiles, incarnations, and what all robots know of them. Pure."""
+"""The robots that have registered with the master: profiles, incarnations, and common knowledge about them. Pure."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) ->
 
 
 class RegistrationRefusedError(ValueError):
-    """A robot cannot be registered; the message says why."""
+    """A robot cannot be registered, for the reason in the message."""
 
 
 @dataclass
@@ -43,14 +43,14 @@ class Member:
     """A registered robot.
 
     Attributes:
-        profile: What it has declared of its file.
-        incarnation: The process of it that is registered.
-        shown_later: Variables that it has shown since, as it was asked for them.
+        profile: Its declarations about its file.
+        incarnation: The name of its registered process.
+        shown_later: Variables that it has disclosed later, on request.
         card: Its key card of this run.
         joined: It has confirmed the welcome.
-        away_since: Since when it is away, on the monotonic clock; None while it is there.
-        unconfirmed: It was away since its last message, and may have been started again since.
-        asked: Variables that it was asked for.
+        away_since: The start of its absence, on the monotonic clock; None while it is present.
+        unconfirmed: It was absent since its last message, and may have been restarted.
+        asked: Variables that were requested from it.
         left: It has confirmed that the run is over.
     """
 
@@ -66,34 +66,30 @@ class Member:
 
     @property
     def robot(self) -> Robot:
-        """The robot as others see it."""
+        """The part of the robot that others see."""
         return visible_robot(self.profile, self.shown_later)
 
     def join(self, incarnation: str, card: bytes) -> None:
-        """Note that it has read the welcome. Messages of another incarnation change nothing."""
+        """Note that it has received the welcome. Messages of another incarnation are ignored."""
         if incarnation == self.incarnation:
             self.card, self.joined, self.unconfirmed = card, True, False
 
     def note_presence(self, *, there: bool) -> None:
-        """Note whether it is there, as far as the router knows."""
+        """Note whether the router reports it as present."""
         self.away_since = None if there else self.away_since or time.monotonic()
         self.unconfirmed = self.unconfirmed or not there
 
     def is_away(self, for_s: float) -> bool:
-        """Return whether it has been away for longer than that.
-
-        For a moment all are, behind a router that is opened anew.
-        """
+        """Return whether it has been absent for longer than that. All are, for a moment, when the router restarts."""
         return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
 class Members:
     """All registered robots, by name.
 
-    `expected` names the only robots that may come (None: all that the Authority admits), `number` says how many do.
-    Without either the team is complete when every neighbour that a robot names is there. `order` is the priority order,
-    where it is known before; parents come before their children in it. `ways` are those that it will have (`reach`),
-    likewise.
+    `expected` are the only allowed robots (None: all that the Authority admits), `number` is the size of the team.
+    Without either, the team is complete when all neighbours that robots name are present. `order` is the priority
+    order, if known in advance; parents come before their children in it. `ways` are its receivers (`reach`), likewise.
     """
 
     def __init__(
@@ -112,9 +108,9 @@ class Members:
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._dropped: set[str] = set()
-        """Robots that were registered, are gone, and have not come back."""
+        """Formerly registered robots that have dropped out and have not returned."""
         self._over: set[str] = set()
-        """Incarnations that have ended. If one goes on after all, its frames have unexpected numbers."""
+        """Incarnations that have ended. If one of them continues nevertheless, its frames have unexpected numbers."""
 
     @property
     def profiles(self) -> dict[str, Profile]:
@@ -122,10 +118,10 @@ class Members:
         return {name: member.profile for name, member in self.robots.items()}
 
     def register(self, sender: str, profile: Profile, incarnation: str, *, admitted: bool = True) -> Member:
-        """Register `sender`, or return its registration if it is there in the same incarnation.
+        """Register `sender`, or return its registration if it is already registered in the same incarnation.
 
         Raises:
-            RegistrationRefusedError: when it is not `admitted`, or its profile does not fit.
+            RegistrationRefusedError: if it is not `admitted`, or its profile is invalid.
         """
         known = self.robots.get(sender)
         if known and known.incarnation == incarnation:
@@ -133,7 +129,7 @@ class Members:
             return known
         if not admitted:
             raise RegistrationRefusedError(
-                "it is enrolled to observe, not to take part; say: robochoc authority enrol NAME"
+                "it is enrolled as an observer, not as a robot: enrol it by robochoc authority enrol NAME"
             )
         if fault := self._fault_of_incarnation(sender, incarnation) or self._fault_of_profile(sender, profile):
             raise RegistrationRefusedError(fault)
@@ -147,15 +143,15 @@ class Members:
         """Return why this incarnation of `sender` cannot be registered now; empty if it can."""
         known = self.robots.get(sender)
         if incarnation in self._over:
-            return "it was away for too long; start it anew"
+            return "it was absent for too long: restart it"
         if known and (self.closed or not (known.unconfirmed or known.away_since)):
             return f"a robot called {sender} is registered already"
         if self.closed:
             return "the team is complete without it"
-        return "" if self.expected is None or sender in self.expected else "it is not one of the team"
+        return "" if self.expected is None or sender in self.expected else "it is not a member of the team"
 
     def _fault_of_profile(self, sender: str, profile: Profile) -> str:
-        """Return why `profile` is none of `sender`, or contradicts those of others; empty if it fits."""
+        """Return why `profile` is not valid for `sender`, or contradicts other profiles; empty if it is valid."""
         if profile.name != sender:
             return f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s"
         try:
@@ -167,12 +163,12 @@ class Members:
 
     @property
     def awaited(self) -> set[str]:
-        """The robots that have to register yet, as far as they are known by name."""
+        """The known names of robots that have not registered yet."""
         return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
 
     @property
     def waited_for(self) -> list[str]:
-        """The robots without which the team is not complete, in words: those that are not there, or not for certain."""
+        """Descriptions of the robots for which the team waits: absent ones, and unconfirmed ones."""
         absent = sorted((self.awaited | self._dropped) - self.robots.keys())
         unsure = sorted(name for name, m in self.robots.items() if not m.joined or m.unconfirmed)
         more = 0 if self.number is None else self.number - len(self.robots) - len(absent)
@@ -184,14 +180,14 @@ class Members:
 
     @property
     def complete(self) -> bool:
-        """Return whether the team is complete: all requested robots and all named neighbours are present."""
+        """Whether the team is complete: all requested robots and all named neighbours are present."""
         enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
         return enough and not self.awaited and all(m.joined and not m.unconfirmed for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
-        """Variables that neighbours' constraints look at, by those who have not shown them and may own them.
+        """Return undisclosed variables in neighbours' constraints, by the robots that may own them.
 
-        A parent need not say which of its variables a child has to know: the child's constraints do.
+        A parent's file need not list the variables that a child must know: the child's constraints name them.
         """
         owners = self._owners()
         wanted: dict[str, dict[str, None]] = {}
@@ -211,7 +207,7 @@ class Members:
         return {name: variables for name, variables in unseen.items() if variables}
 
     def show(self, name: str, variables: Mapping[str, Ranges]) -> str:
-        """Take in the answer of the robot `name` on the `unseen` variables. Return what is wrong with it."""
+        """Record the robot's answer about its `unseen` variables; return why it is invalid, or an empty text."""
         member = self.robots[name]
         wanted = self.unseen().get(name, ())
         owners = self._owners()
@@ -219,7 +215,7 @@ class Members:
             if owners.get(variable, name) != name:
                 return f"the variable {variable} is {owners[variable]}'s, and {name}'s too"
         if not variables.keys() <= {*wanted, *member.asked}:
-            return "it has shown variables that it was not asked for"
+            return "it has disclosed variables that were not requested"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
         try:
             visible_robot(member.profile, {**member.shown_later, **shown})
@@ -229,17 +225,17 @@ class Members:
         member.shown_later.update(shown)
         return ""
 
-    def strangers(self) -> Iterator[str]:
-        """Yield constraints over variables that no neighbour has, in words; once nothing is `unseen` any more."""
+    def invalid_scopes(self) -> Iterator[str]:
+        """Yield descriptions of constraints over variables that no neighbour has, once no variable is `unseen`."""
         owners = self._owners()
         for name, member in self.robots.items():
             looked_at = [one for names in member.profile.looks_at.values() for one in names]
             for variable in (*member.profile.wants, *looked_at):
                 if owners.get(variable) not in {name, *member.profile.neighbours}:
-                    yield f"{name} holds a constraint over {variable}, which is a variable of none of its neighbours"
+                    yield f"{name} has a constraint over {variable}, which is not a variable of a neighbour"
 
     def _owners(self) -> dict[str, str]:
-        """Return the owners of the variables that are shown."""
+        """Return the owners of the disclosed variables."""
         return {
             variable: name
             for name, member in self.robots.items()
@@ -249,7 +245,7 @@ class Members:
     def remove(self, names: Collection[str]) -> None:
         """Remove robots for good, also as neighbours of others.
 
-        Once the team is complete, those who are left keep their places in the order, as they do in every runtime.
+        After the team is complete, the remaining robots keep their relative order, as in every runtime.
         """
         if self.closed:
             self._order = self.order
@@ -264,9 +260,9 @@ class Members:
         self._dropped.add(name)
 
     def to_welcome(self) -> dict[str, str]:
-        """Return the incarnations of robots that are there and have not answered a welcome, while the team is open.
+        """Return the incarnations of present robots that have not answered a welcome, while the team is open.
 
-        Their answer may have been lost; and of two incarnations only the one that is still there answers.
+        Their answer may have been lost; and of two incarnations only the running one answers.
         """
         waiting = {
             name: m.incarnation
@@ -277,17 +273,17 @@ class Members:
 
     @property
     def listening(self) -> list[str]:
-        """The robots that have joined, and not left. Others do not know this run yet."""
+        """The robots that have joined and not left. Others do not know this run yet."""
         return [name for name, member in self.robots.items() if member.joined and not member.left]
 
     def staying(self, away_s: float, besides: Collection[str]) -> list[str]:
-        """Return the robots, `besides` those, that have neither left nor been away for longer than `away_s` seconds."""
+        """Return robots, except `besides`, that have neither left nor been absent for more than `away_s` seconds."""
         stay = (name for name, member in self.robots.items() if not (member.left or member.is_away(away_s)))
         return [name for name in stay if name not in besides]
 
     @property
     def order(self) -> tuple[str, ...]:
-        """The total priority order of those that are there."""
+        """The total priority order of the registered robots."""
         if self._order is not None:
             return tuple(name for name in self._order if name in self.robots)
         return tuple(in_priority_order(self.profiles))
@@ -324,7 +320,7 @@ class Members:
         }
 
     def declared(self, traits: Traits) -> Declarations:
-        """Return the declarations that robots' reports in a search are checked against."""
+        """Return the declarations against which robots' reports are checked."""
         shown = {
             name: {variable.name: variable.domain for variable in member.robot.variables}
             for name, member in self.robots.items()
@@ -333,7 +329,7 @@ class Members:
         return Declarations(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-        """Return those of the decided `values` that robots show which `name` may share a constraint with."""
+        """Return the disclosed ones among `values` of the robots with which `name` may share a constraint."""
         found: dict[str, int] = {}
         for other in self._met()[name]:
             if other in self.robots:
@@ -342,7 +338,7 @@ class Members:
         return found
 
     def _met(self) -> dict[str, tuple[str, ...]]:
-        """See `possible_neighbours`; worked out once for all who are there."""
+        """Return `possible_neighbours`, cached for the present robots."""
         there = frozenset((name, member.incarnation) for name, member in self.robots.items())
         if self._known != there:
             self._known, self._acquainted = there, possible_neighbours(self.profiles)

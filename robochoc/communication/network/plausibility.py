@@ -1,8 +1,8 @@
 """Plausibility of robots' reports: finds a robot that lies, or two of which one lies. Pure.
 
-The master has seen no file. It knows what robots have declared (profiles), what each protocol's robots may conclude
-(traits), and that whatever one robot says it has sent another, that one has had, or will not have had. So a lie is held
-against the liar's earlier words, or against a neighbour's. `docs/guides/security.md` says what that leaves.
+The master has no files. It knows the robots' declarations (profiles), the allowed conclusions of each protocol
+(traits), and that the messages that one robot reports as sent to another must match the other's report. So a report is
+compared with earlier reports of the same robot, and with reports of others. Remaining risks: docs/guides/security.md.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from robochoc.protocols.traits import Traits
 
 LARGEST_COUNT = 2**53
 CHECKS_PER_S = 10**12
-"""More constraint checks a second than any robot can do, even with tables that were made before."""
+"""More constraint checks a second than any robot can do, even with precomputed tables."""
 LARGEST_MEMORY = 2**50
 MOST_KINDS = 100
-"""Of messages: a protocol has fewer."""
+"""The most types of messages: a protocol has fewer."""
 MOST_CHARGES = 10_000
 NOTICEABLE = 100
-"""A gap of fewer messages may be under way when the time is over."""
+"""The number of messages that may be in transit at the time limit."""
 _ROUNDED = 1 + 2**-40
-"""Costs may be larger than floats are exact, and some travel as floats."""
+"""The tolerance for rounded costs, as some are sent as floats."""
 HEXADECIMAL = re.compile(r"[0-9a-f]+")
 _NOBODY = Exchanged(0, 0, 0)
 
 
 class Doubt(NamedTuple):
-    """A contradiction between the reports of two robots, in words. One of `between` has not told the truth."""
+    """A contradiction between the reports of two robots. One of `between` has sent a false report."""
 
     between: tuple[str, str]
     why: str
@@ -51,10 +51,10 @@ class Doubt(NamedTuple):
 
 @dataclass(frozen=True)
 class Declarations:
-    """The master's knowledge before a search: the robots' ways to end it, and their profiles' declarations.
+    """The master's knowledge before a search: the traits of the protocol, and the declarations of profiles.
 
-    `shown` are the robots' variables with their domains, `dearest` is the most that each one's constraints charge
-    together.
+    `shown` are the robots' variables with their domains, `dearest` is the largest total cost of each robot's
+    constraints.
     """
 
     traits: Traits = field(default_factory=Traits)
@@ -68,8 +68,8 @@ NOTHING_DECLARED = Declarations()
 class FinishedSearch(NamedTuple):
     """The master's knowledge of a finished search.
 
-    `order` names its robots, `counts` holds the last counters of one of them, `duration_s` is how many seconds it
-    took, `by_quiescence` whether it ended by quiescence, `lossy` whether robots were to drop messages.
+    `order` names its robots, `counts` are the last counters of one of them, `duration_s` is its duration in seconds.
+    `by_quiescence`: it ended by quiescence. `lossy`: robots were to drop messages.
     """
 
     order: Collection[str]
@@ -83,19 +83,19 @@ class FinishedSearch(NamedTuple):
 
 
 def fault_of_counters(counts: Counts, before: Counts | None) -> str:
-    """Return why a robot that reported `before` cannot have counted `counts`. Empty if it can."""
+    """Return why `counts` are invalid for a robot that had reported `before`; empty if they are valid."""
     if min(counts) < 0 or max(counts) > LARGEST_COUNT:
-        return f"it has counted {counts.sent:,} messages sent and {counts.received:,} taken in, which cannot be"
+        return f"it has reported {counts.sent:,} messages sent and {counts.received:,} received, which is impossible"
     if before is not None and (counts.sent < before.sent or counts.received < before.received):
         return (
-            f"its counters have fallen, from {before.sent:,} messages sent and {before.received:,} taken in"
+            f"its counters have fallen, from {before.sent:,} messages sent and {before.received:,} received"
             f" to {counts.sent:,} and {counts.received:,}"
         )
     return ""
 
 
-def fault_of_account(name: str, account: DetailedReport, declared: Declarations, course: FinishedSearch) -> str:
-    """Return why the robot `name` cannot report `account`; empty if it can."""
+def fault_of_report(name: str, account: DetailedReport, declared: Declarations, course: FinishedSearch) -> str:
+    """Return why the final report `account` of the robot `name` is invalid; empty if it is valid."""
     return (
         next(_faults_of_values(name, account.assignment, declared, assigned=account.assigned), "")
         or _fault_of_metrics(account, course.duration_s)
@@ -106,7 +106,7 @@ def fault_of_account(name: str, account: DetailedReport, declared: Declarations,
 
 
 def fault_of_snapshot(name: str, snapshot: Snapshot, declared: Declarations, order: Collection[str]) -> str:
-    """Return why the robot `name` cannot have what it says in `snapshot`; empty if it can."""
+    """Return why `snapshot` of the robot `name` is invalid; empty if it is valid."""
     if not 0 <= snapshot.lost <= LARGEST_COUNT:
         return "it has reported counts that cannot be"
     return next(_faults_of_values(name, snapshot.assignment, declared), "") or fault_of_findings(
@@ -126,7 +126,7 @@ def _faults_of_values(
         yield "it has reported values that it cannot have"
     for variable in values.keys() - own.keys():
         if not is_name(variable) or len(variable) > LONGEST_NAME:
-            yield "it has reported a variable whose name is none"
+            yield "it has reported a variable with an invalid name"
         other = next((robot for robot, theirs in declared.shown.items() if variable in theirs), None)
         if other is not None:
             yield f"it has reported a value of {variable}, which is {other}'s"
@@ -135,21 +135,21 @@ def _faults_of_values(
 def _fault_of_exchange(name: str, account: DetailedReport, course: FinishedSearch) -> str:
     exchanged = account.exchanged
     if name in exchanged or not exchanged.keys() <= set(course.order):
-        return "it has reported messages with somebody who is not of the team"
+        return "it has reported messages with a robot that is not in the team"
     if any(not 0 <= count <= LARGEST_COUNT for one in exchanged.values() for count in one):
         return "it has reported counts that cannot be"
     if sum(account.metrics.messages.values()) != sum(one.sent for one in exchanged.values()):
-        return "the messages that it says it has sent are not as many as those that it says it has sent to others"
+        return "its total of sent messages differs from the sum of those that it has reported for each receiver"
     total = total_of(account)
     if fault := fault_of_counters(total, course.counts):
         return fault
     if course.by_quiescence and total.sent > course.counts.sent and total.received == course.counts.received:
-        return "it has sent messages after all were quiet, in answer to none"
+        return "it has sent messages after quiescence, without receiving one"
     return ""
 
 
 def total_of(account: DetailedReport) -> Counts:
-    """Return all messages that a robot says it has sent and taken in."""
+    """Return the total counts of messages that a robot has reported."""
     exchanged = account.exchanged.values()
     return Counts(sum(one.sent for one in exchanged), sum(one.received for one in exchanged))
 
@@ -159,67 +159,65 @@ def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:
     if len(spent.messages) > MOST_KINDS or not all(
         is_name(kind) and len(kind) <= LONGEST_NAME for kind in spent.messages
     ):
-        return "it has reported messages of kinds that are none"
+        return "it has reported messages of invalid types"
     counts = (*spent.messages.values(), spent.bytes, spent.largest, spent.ncccs, spent.checks, spent.memory)
     if any(not 0 <= count <= LARGEST_COUNT for count in counts):
         return "it has reported counts that cannot be"
     sent = sum(spent.messages.values())
     if not (sent <= spent.bytes <= sent * LARGEST_FRAME and spent.largest <= spent.bytes <= sent * spent.largest):
         many = f"{sent:,} messages of {spent.bytes:,} bytes together, the largest of {spent.largest:,}"
-        return f"it has reported {many}, which cannot be"
+        return f"it has reported {many}, which is impossible"
     if spent.checks > CHECKS_PER_S * (duration_s + 1):
-        return f"it has reported {spent.checks:,} constraint checks in {duration_s:.1f} s, which cannot be"
+        return f"it has reported {spent.checks:,} constraint checks in {duration_s:.1f} s, which is impossible"
     heard = max((one.clock for one in account.exchanged.values()), default=0)
     if spent.ncccs > heard + spent.checks:
-        return (
-            f"its clock is at {spent.ncccs:,}, and neither its own {spent.checks:,} checks nor others' bring it there"
-        )
+        return f"its clock is at {spent.ncccs:,}, more than its {spent.checks:,} checks and received clocks explain"
     others = (spent.wall_s, spent.compile_s, spent.simulated_s)
     return "it has reported costs that are not its own" if any(others) or spent.memory > LARGEST_MEMORY else ""
 
 
 def _fault_of_drops(account: DetailedReport, course: FinishedSearch) -> str:
     most = total_of(account).received if course.lossy else 0
-    return "" if 0 <= account.metrics.lost_messages <= most else "it has dropped more than it was to"
+    return "" if 0 <= account.metrics.lost_messages <= most else "it has dropped more messages than it has received"
 
 
 def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
-    """Return why no robot in `order` can know `findings` of the whole. Empty if one can."""
+    """Return why `findings` are invalid for a robot in `order`; empty if they are valid."""
     names: list[str] = []
     if findings.place is not None:
         names += [*filter(None, [findings.place.parent]), *findings.place.pseudo_parents]
     if findings.best is not None:
         names += findings.best.values
     if not set(names) <= set(order):
-        return "it tells of a robot that is not of the team"
+        return "it has reported a robot that is not in the team"
     costs = (findings.bound or 0, findings.best.cost if findings.best is not None else 0)
     if not all(0 <= cost <= INFINITE for cost in costs):
-        return "it tells of costs that cannot be"
+        return "it has reported impossible costs"
     if findings.count is not None and not HEXADECIMAL.fullmatch(findings.count):
-        return "it tells of a number that is none"
+        return "it has reported an invalid number"
     if findings.listing is not None and min(findings.listing.places, default=0) < 0:
-        return "it tells of optima that cannot be"
+        return "it has reported impossible optima"
     entries = findings.trail.entries if findings.trail is not None else []
-    return "it tells of cycles that cannot be" if any(place < 0 for place in chain.from_iterable(entries)) else ""
+    return "it has reported impossible cycles" if any(place < 0 for place in chain.from_iterable(entries)) else ""
 
 
 def fault_of_check(name: str, check: CheckResult, declared: Declarations, order: Collection[str]) -> str:
-    """Return why the robot `name` cannot have checked its constraints so; empty if it can."""
+    """Return why `check` of the robot `name` is invalid; empty if it is valid."""
     judged = (*check.shared, *check.copies)
     if not 0 <= check.cost <= declared.dearest.get(name, LARGEST_COUNT) * _ROUNDED < INFINITE:
-        return "its constraints charge more than it has declared"
+        return "its constraints cost more than it has declared"
     if not (
         len(judged) <= MOST_CHARGES and 0 <= sum(one.constraints for one in check.shared) <= check.held <= LARGEST_COUNT
     ):
-        return "it has checked constraints in a number that cannot be"
+        return "it has reported an impossible number of checked constraints"
     if any(one.constraints < 1 or not one.price >= 0 or not all(map(is_name, one.variables)) for one in judged):
-        return "it has checked constraints that cannot be"
+        return "it has reported checks of invalid constraints"
     if any(one.holder != name for one in check.shared) or any(
         one.holder == name or one.holder not in order for one in check.copies
     ):
-        return "it has checked constraints in another's name"
+        return "it has reported checks in another robot's name"
     if check.allowed and sum(one.price for one in check.shared) > check.cost * _ROUNDED:
-        return "it has said what its constraints charge, and that together they charge less"
+        return "its constraints cost more, one by one, than the total that it has reported"
     return ""
 
 
@@ -227,17 +225,17 @@ def fault_of_check(name: str, check: CheckResult, declared: Declarations, order:
 
 
 def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool) -> Iterator[Doubt]:
-    """Yield what two robots say of the messages between them that cannot both be so.
+    """Yield contradictory reports of two robots about the messages between them.
 
-    Nobody speaks after its account, so a message that was taken in was sent; and where all were `quiet`, and nobody has
-    stirred since, each that was sent was taken in.
+    No robot sends after its final report, so a received message was sent; and if all were `quiet`, and no robot has
+    sent or received since, each sent message was received.
     """
     for name, account in accounts.items():
         for other, mine in account.exchanged.items():
             theirs = accounts[other].exchanged.get(name, _NOBODY) if other in accounts else None
             if theirs is None:
                 continue
-            # Each pair is met twice if both have something to say of it, and once if one says that there was nothing.
+            # Each pair occurs twice if both report messages, and once if only one of them does.
             sent, had = mine.sent, theirs.received
             if had > sent or (quiet and had < sent):
                 yield Doubt((name, other), _gap(name, sent, other, had))
@@ -249,7 +247,7 @@ def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool
 
 
 def widest_gap(accounts: Mapping[str, DetailedReport]) -> str:
-    """Return, in words, between which two robots by far too many messages are under way; empty if there are none."""
+    """Return a text on the two robots with by far too many messages in transit; empty if there are none."""
     widest, found = 0, ""
     for name, account in accounts.items():
         for other, mine in account.exchanged.items():
@@ -265,7 +263,7 @@ def _gap(name: str, sent: int, other: str, had: int) -> str:
 
 
 def doubts_about_values(assignments: Mapping[str, Mapping[str, int]]) -> Iterator[Doubt]:
-    """Yield which variables two robots call their own."""
+    """Yield variables that two robots have reported as theirs."""
     owners: dict[str, str] = {}
     for name, assignment in assignments.items():
         for variable in assignment:
@@ -275,9 +273,9 @@ def doubts_about_values(assignments: Mapping[str, Mapping[str, int]]) -> Iterato
 
 
 def thoroughness(checks: Mapping[str, CheckResult]) -> CheckCounts:
-    """Return how many constraints others than those who hold them have checked too, and how many nobody else has.
+    """Return the numbers of constraints that another robot than the holder has checked too, and of all others.
 
-    Where two say that they are differently many over the same variables, those count that both say there are.
+    If two robots report different numbers of constraints over the same variables, the smaller number counts.
     """
     held = sum(check.held for check in checks.values())
     seconded: dict[tuple[str, tuple[str, ...]], int] = {}
@@ -288,7 +286,7 @@ def thoroughness(checks: Mapping[str, CheckResult]) -> CheckCounts:
 
 
 def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
-    """Yield which constraints charge one thing by who holds them, and another by a robot that knows them as well."""
+    """Yield constraints with different costs in the reports of their holder and of another robot that knows them."""
     prices = {_key(one): one.price for check in checks.values() for one in check.shared}
     for name, check in checks.items():
         for one in check.copies:
@@ -302,7 +300,7 @@ def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
 
 
 def objections(checks: Mapping[str, CheckResult]) -> Iterator[str]:
-    """Yield texts on the violated constraints, by the robots that report them."""
+    """Yield texts on violated constraints, with the robots that report them."""
     for name, check in checks.items():
         broken = [shortened(" ".join(one.variables)) for one in check.shared if one.price == INFINITE]
         if broken:

@@ -1,7 +1,7 @@
-"""A robot's profile, which the master gets instead of its file: its neighbours, and the variables that they see.
+"""A robot's profile, which the master receives instead of its file: its neighbours, and the variables that they see.
 
-From profiles the master makes robots as others see them, without constraints and without hidden variables. With them it
-works out what all robots know anyway: the priority order, the interfaces, the declared domains.
+From profiles the master builds robots as others see them, without constraints and hidden variables. From these it
+computes the common knowledge of all robots: the priority order, the interfaces, the declared domains.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LONGEST_NAME = 255
 LARGEST_WEIGHT = 1_000_000
 """As in files."""
 LARGEST_DEAREST = 2.0**80
-"""More than the costs of any file. The cost of withdrawing all robots still fits into a number."""
+"""More than the costs of any file, such that the cost of withdrawing all robots is still finite."""
 
 
 LARGEST_CONSTANT = 2**62
@@ -43,15 +43,14 @@ class ProfileError(ValueError):
 
 
 class Profile(msgspec.Struct, frozen=True, array_like=True):
-    """The profile that the robot `name` declares of its file.
+    """The declarations of the robot `name` about its file.
 
-    `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
-    this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that
-    it holds towards its parents. `max_cost` is the most that the constraints it holds can
-    charge together, short of being broken. `topics` are where it publishes its decision. `told_in` are its cost units:
-    whether the sum is maximised, the decimal places, and a constant. `symbols` are the names of the
-    team's symbols, in the order of their codes; empty where it knows of none. `symbolic` are those of `variables` whose
-    values stand for symbols.
+    `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables in
+    this robot's parts of partially known constraints; `wants` are others' variables in the constraints that it has
+    with its parents. `max_cost` is the largest total cost of its constraints, violations aside. `topics` are the topics
+    of its decision. `cost_scale` are its cost units: whether the sum is maximised, the decimal places, and a constant.
+    `symbols` are the names of the team's symbols, in the order of their codes; empty if it knows none. `symbolic` are
+    those of `variables` whose values are codes of symbols.
     """
 
     name: str
@@ -64,14 +63,14 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     max_cost: Cost
     topics: tuple[str, ...]
     wants: tuple[str, ...] = ()
-    told_in: tuple[bool, int, int] = (False, 0, 0)
+    cost_scale: tuple[bool, int, int] = (False, 0, 0)
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
 
     @property
     def units(self) -> CostUnits:
-        """The units in which its costs are told to the user, with what was taken out of its constraints' costs."""
-        return CostUnits(*self.told_in)
+        """The user's units of its costs, with the constant that was removed from its constraints' costs."""
+        return CostUnits(*self.cost_scale)
 
     @property
     def neighbours(self) -> tuple[str, ...]:
@@ -102,19 +101,19 @@ def profile_of(robot: Robot) -> Profile:
         max_cost=sum(max_cost(constraint) for constraint in (*robot.private, *robot.shared, *parts)),
         topics=tuple(topic.name for topic in robot.topics),
         wants=tuple(dict.fromkeys(name for one in robot.shared for name in one.variables if name not in own)),
-        told_in=(units.maximize, units.places, units.constant),
+        cost_scale=(units.maximize, units.places, units.constant),
         symbols=robot.symbol_table,
         symbolic=tuple(v.name for v in robot.variables if v.name in shown and v.domain.symbols),
     )
 
 
 def ranges_of(domain: Domain) -> Ranges:
-    """`domain` as it travels."""
+    """Return the ranges of `domain`, for the wire."""
     return tuple((part[0], part[-1]) for part in domain.ranges)
 
 
 def domain_of(name: str, ranges: Ranges) -> Domain:
-    """Return the domain of the variable `name`. Raises `ProfileError`; nothing is made of absurd ones."""
+    """Return the domain of the variable `name`. Raises `ProfileError` for invalid or too large ranges."""
     last: int | None = None
     size = 0
     for low, high in ranges:
@@ -122,17 +121,17 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
             raise ProfileError(f"the ranges of {name} are not ascending")
         last, size = high, size + high - low + 1
     if not 0 < size <= MAX_VALUES:
-        raise ProfileError(f"{name} has {size:,} values; there are 1 to {MAX_VALUES:,}")
+        raise ProfileError(f"{name} has {size:,} values; 1 to {MAX_VALUES:,} are allowed")
     return Domain(name, tuple(range(low, high + 1) for low, high in ranges))
 
 
 def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
-    """Return the robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
+    """Return the robot as others see it; `also` are variables that it has disclosed later. Raises `ProfileError`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
     names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
     if bad is not None:
-        raise ProfileError(f"{bad[:LONGEST_NAME]!r} is no name")
+        raise ProfileError(f"{bad[:LONGEST_NAME]!r} is not a valid name")
     if (
         len(profile.neighbours) > MOST_NEIGHBOURS
         or max(map(len, (profile.variables, looked_at, profile.wants))) > MOST_VARIABLES
@@ -140,10 +139,10 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
         raise ProfileError("it has too many neighbours or variables")
     if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
         raise ProfileError("it names itself, or a neighbour twice")
-    strangers = profile.looks_at.keys() - set(profile.children)
-    if strangers:  # the master would make them show variables to a robot that is not their neighbour
-        raise ProfileError(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
-    if not (0 <= profile.told_in[1] <= MAX_PLACES and abs(profile.told_in[2]) <= LARGEST_CONSTANT):
+    unknown = profile.looks_at.keys() - set(profile.children)
+    if unknown:  # the master would make them disclose variables to a robot that is not their neighbour
+        raise ProfileError(f"it refers to variables of {min(unknown)[:LONGEST_NAME]}, which is not a child of it")
+    if not (0 <= profile.cost_scale[1] <= MAX_PLACES and abs(profile.cost_scale[2]) <= LARGEST_CONSTANT):
         raise ProfileError("its cost units are out of range")
     if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
         raise ProfileError(f"costs of {profile.max_cost:g} or a weight of {profile.weight} are out of range")
@@ -161,23 +160,23 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
 
 
 def _check_symbols(profile: Profile) -> None:
-    """Raise `ProfileError` unless a file can have the symbols of `profile`."""
+    """Raise `ProfileError` if the symbols of `profile` are invalid."""
     if len(profile.symbols) > MAX_VALUES or len(set(profile.symbols)) < len(profile.symbols):
         raise ProfileError("it has too many symbols, or one of them twice")
     for name in profile.symbols:
         try:
             check_symbol(name)
         except MistakeError:
-            raise ProfileError(f"{name[:LONGEST_NAME]!r} is no symbol") from None
+            raise ProfileError(f"{name[:LONGEST_NAME]!r} is not a valid symbol") from None
 
 
 def _domain_in(profile: Profile, name: str, ranges: Ranges) -> Domain:
-    """Return the domain of the variable `name` of `profile`, symbolic if it is so. Raises `ProfileError`."""
+    """Return the domain of the variable `name` of `profile`, with its symbols if any. Raises `ProfileError`."""
     domain = domain_of(name, ranges)
     if name not in profile.symbolic:
         return domain
     if not 0 <= domain.ranges[0][0] <= domain.ranges[-1][-1] < len(profile.symbols):
-        raise ProfileError(f"a value of {name} stands for no symbol")
+        raise ProfileError(f"a value of {name} is not the code of a symbol")
     return replace(domain, symbols=profile.symbols)
 
 
@@ -207,7 +206,7 @@ def profile_contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
 
 
 def _differing_units(profiles: Mapping[str, Profile]) -> Iterator[str]:
-    units = {profile.told_in[:2]: profile.name for profile in profiles.values()}
+    units = {profile.cost_scale[:2]: profile.name for profile in profiles.values()}
     if len(units) > 1:
         yield f"the costs of {' and '.join(units.values())} differ in objective or scale: write both into every file"
 
@@ -228,9 +227,9 @@ def missing(profiles: Mapping[str, Profile]) -> set[str]:
 
 
 def possible_neighbours(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
-    """For each robot the others that it may share a constraint with: its neighbours, and other parents of a child.
+    """Return, for each robot, those that may share a constraint with it: its neighbours, and other parents of a child.
 
-    A constraint over more than two robots stands with its lowest robot, and the others are parents of that one.
+    The lowest robot of a scope holds the constraint, and the others are its parents.
     """
     found: dict[str, dict[str, None]] = {name: dict.fromkeys(one.neighbours) for name, one in profiles.items()}
     for profile in profiles.values():
@@ -244,14 +243,14 @@ def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
     return priority_order({profile.name: profile.parents for profile in profiles.values()})
 
 
-def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
-    """Return `robot` in a team of those in `interfaces`, which are in priority order.
+def restrict_to_team(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
+    """Return `robot` restricted to the team of `interfaces`, which are in priority order.
 
-    Neighbours that have left are left out. Constraints that the robot holds and that mention them are restated for the
-    others, or dropped (`model/absence.py`); one that is left with variables of this robot alone is private.
+    Neighbours that have left are removed. Constraints of the robot that mention them are restated for the others, or
+    dropped (`model/absence.py`); a remaining constraint over variables of this robot alone becomes private.
 
-    It shows the variables that stand there for it, whoever looks at them, and in the order that they have there: so
-    others read its values. They do not stand as in its file where it had to show more than its file says.
+    The robot discloses exactly its variables in `interfaces`, in that order, as others read its values by it. The order
+    may differ from its file if it had to disclose more variables than the file lists.
     """
     shown = tuple(interfaces[robot.name])
     place = {name: number for number, name in enumerate(shown)}
@@ -262,7 +261,7 @@ def among(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
     rank = {name: number for number, name in enumerate(interfaces)}
 
     def lowest(constraint: Constraint) -> str | None:
-        """Return the lowest of the other robots in the scope; None: there is no other."""
+        """Return the lowest of the other robots in the scope; None if there is no other."""
         others = {owners[name] for name in constraint.variables if name not in own}
         return max(others, key=rank.__getitem__, default=None)
 

@@ -1,4 +1,4 @@
-"""Quotas of a sender at a receiver: frames and bytes that wait, and frames, bytes and events a second. Pure.
+"""Quotas of a sender at a receiver: waiting frames and bytes, and frames, bytes and events a second. Pure.
 
 The limits are far beyond what honest robots need: docs/guides/security.md has the measurement.
 """
@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 MIB = 2**20
 BURST_S = 60.0
-"""Seconds for which unused quota is kept. It can be used at once: after an outage, messages come together."""
+"""Seconds for which unused quota is available. It can be used at once: after an outage, messages arrive together."""
 EVENTS_A_SECOND = 10_000
-"""The events that a robot may report to the master, in the long run."""
+"""The long-run rate at which a robot may report events to the master."""
 REPORTS_A_SECOND = 10
 """The rate at which a robot may report refusals and losses of other robots to the master."""
 NO_LIMIT = 1e15
 
 
 class Share(NamedTuple):
-    """The quota of one sender: frames and bytes that wait, and frames and bytes a second in the long run."""
+    """The quota of one sender: waiting frames and bytes, and frames and bytes a second in the long run."""
 
     frames: int
     size: int
@@ -27,11 +27,11 @@ class Share(NamedTuple):
 
 
 NEIGHBOUR_SHARE = Share(200_000, 256 * MIB)
-"""At a robot, wherever frames wait: how fast neighbours talk is the protocol's affair, and what waits is memory."""
+"""At a robot: the rate of neighbours depends on the protocol, but waiting frames use memory."""
 ROBOT_SHARE = Share(50_000, 64 * MIB, 2_000, 16 * MIB)
 """At the master."""
 OBSERVER_SHARE = Share(1_000, 16 * MIB, 50, MIB)
-"""At the master: an observer asks, and waits for the answer."""
+"""At the master: an observer sends a request, and waits for the answer."""
 
 
 class Allowance:
@@ -49,7 +49,7 @@ class Allowance:
         return amount <= self._left
 
     def use(self, amount: float) -> None:
-        """Use `amount` of it."""
+        """Use up `amount`."""
         self._left -= amount
 
 
@@ -58,14 +58,14 @@ class Usage:
 
     def __init__(self, share: Share, now: float) -> None:
         self.dropped = 0
-        """Frames that were too many, and that were not reported yet."""
+        """Dropped frames that were not reported yet."""
         self._share = share
         self._framing = self._size = 0
         self._often = Allowance(share.frames_a_second, now)
         self._much = Allowance(share.size_a_second, now)
 
     def accept(self, size: int, now: float) -> bool:
-        """Return whether a frame of `size` bytes is within the share; if so, it waits from now on."""
+        """Return whether a frame of `size` bytes is within the quota; if so, count it as waiting."""
         if self._framing >= self._share.frames or self._size + size > self._share.size:
             return False
         if not (self._often.has(1, now) and self._much.has(size, now)):
@@ -77,22 +77,22 @@ class Usage:
         return True
 
     def release(self, size: int) -> None:
-        """Note that a frame of `size` bytes waits no more."""
+        """Note that a frame of `size` bytes no longer waits."""
         self._framing -= 1
         self._size -= size
 
 
 class Backlog:
-    """Frames of each sender that are kept for later, within its share; how fast they come does not matter."""
+    """The stored frames of each sender, within its quota, regardless of its rate."""
 
     def __init__(self, share: Share = NEIGHBOUR_SHARE) -> None:
         self._share = share._replace(frames_a_second=NO_LIMIT, size_a_second=NO_LIMIT)
         self._usage: dict[str, Usage] = {}
 
     def accept(self, sender: str, size: int) -> bool:
-        """Return whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
+        """Return whether `size` more bytes of `sender` may be stored; if so, count them as stored."""
         return self._usage.setdefault(sender, Usage(self._share, 0.0)).accept(size, 0.0)
 
     def clear(self) -> None:
-        """Forget all usage."""
+        """Reset all usage."""
         self._usage.clear()

@@ -1,7 +1,7 @@
-"""Refusals, as they are reported: each kind is reported, and a flood of them costs next to nothing.
+"""The reporting of refusals: each kind is reported, but a flood of refusals causes few reports.
 
-A participant that is refused may try again for ever, under ever new names. So each kind is reported at its 1st, 10th,
-100th, ... time, with the count so far; kinds and participants are remembered up to a number.
+A refused participant may try again without end, under new names. So each kind is reported at its 1st, 10th, 100th, ...
+time, with the count so far, and the numbers of kinds and participants are limited.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ KINDS = 50
 WHO = 1000
 """The largest number of refused members that are distinguished."""
 LONGEST = 200
-"""Characters. What is refused may be of any length."""
+"""The most characters of a text; refused data may have any length."""
 _OTHERS = "others"
-_ELSE = ("other things", "see what was refused before")
+_ELSE = ("other requests", "see the previous refusals")
 
 
 class Refusals:
-    """A counter of refusals. It calls `report` (who, what, why) for those that are reported. Thread-safe."""
+    """A counter of refusals. It calls `report` with who, what and why. Thread-safe."""
 
     def __init__(self, report: Callable[[str, str, str], None]) -> None:
         self._report = report

@@ -1,4 +1,4 @@
-"""The master's registration of robots: it checks profiles, welcomes robots, and enters them in the directory."""
+"""The master's registration of robots: checks profiles, welcomes robots, and adds them to the directory."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class Registrar:
     """Registers robots as `members`.
 
     Args:
-        members: Robots that are registered.
-        connection: The master's connection; frames of a new incarnation are numbered anew.
-        facilitator: The directory that robots are entered in.
+        members: The registered robots.
+        connection: The master's connection; frames of a new incarnation are numbered from 1.
+        facilitator: The directory of robots.
         events: Receives registrations and refusals.
-        settings: What a welcome tells the robot of the run.
-        watched: The robots' events are wanted.
+        settings: The settings of the run, part of which a welcome contains.
+        watched: Whether robots are to report their events.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class Registrar:
         facilitator: DirectoryFacilitator,
         events: MasterEvents,
         settings: NetworkSettings,
-        watched: bool,  # noqa: FBT001 - the master passes all of it on
+        watched: bool,  # noqa: FBT001 - passed on by the master
     ) -> None:
         self._members = members
         self._connection = connection
@@ -40,7 +40,7 @@ class Registrar:
         self._watched = watched
 
     def register(self, name: str, profile: Profile, incarnation: str) -> bool:
-        """Register a robot and welcome it, or refuse it; return whether it was not registered before."""
+        """Register a robot and welcome it, or refuse it; return whether it is new."""
         known = self._members.robots.get(name)
         try:
             member = self._members.register(name, profile, incarnation, admitted=self._connection.policy.is_robot(name))
@@ -57,7 +57,7 @@ class Registrar:
         return member is not known
 
     def welcome_again(self) -> None:
-        """Welcome robots that have not answered a welcome since they came, or came back."""
+        """Welcome robots that have not answered a welcome since they registered or returned."""
         for name, incarnation in self._members.to_welcome().items():
             self._welcome(name, incarnation)
 

@@ -15,7 +15,7 @@ _INCARNATION_BYTES = 8
 
 
 class RunOverError(TransferableError):
-    """The run is over for this robot; `failed` says whether it could not be completed."""
+    """The run is over for this robot; `failed`: it could not be completed."""
 
     def __init__(self, why: str, *, failed: bool) -> None:
         super().__init__(why)
@@ -27,13 +27,13 @@ class Registration:
     """The registration of the robot `name`.
 
     Attributes:
-        incarnation: A name for this process of the robot. One that was started anew has another.
-        welcome: The master's answer; None before it has come.
+        incarnation: The name of this process of the robot; a restarted robot has another one.
+        welcome: The master's answer; None before it arrives.
 
     Args:
         name: The robot's name.
         transport: Its connection to the router.
-        patience_s: How long the master may be gone, or not answer.
+        patience_s: Seconds for which the master may be absent or silent.
         register: Sends a registration for an incarnation.
     """
 
@@ -59,20 +59,20 @@ class Registration:
     def accept(self, welcome: Welcome) -> bool:
         """Note the master's answer; return whether it is the first one.
 
-        Raises `RunOverError` when it comes from another run.
+        Raises `RunOverError` if the answer comes from another run.
         """
         self._unanswered_since = None
         if self.welcome is None:
             self.welcome = welcome
             return True
         if welcome.run != self.welcome.run:
-            raise RunOverError("the master was started anew; start this robot anew as well", failed=True)
+            raise RunOverError("the master was restarted: restart this robot as well", failed=True)
         return False
 
     def check_link(self) -> None:
-        """Register again where that is needed: behind a new router, and while no answer comes.
+        """Register again if necessary: after a restart of the router, and while no answer arrives.
 
-        Raises `RunOverError` when the master is gone, or does not answer, for longer than the patience.
+        Raises `RunOverError` if the master is absent or silent for longer than the patience.
         """
         now = time.monotonic()
         router = self._transport.router

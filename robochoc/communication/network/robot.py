@@ -1,8 +1,8 @@
-"""A robot in a run across machines: it registers with the master, and searches when that orders the start.
+"""A robot in a run across machines: it registers with the master, and searches when the master orders the start.
 
-It knows its own file; what else it has to know (names, order, interfaces) is in the master's `Task`. The search itself
-is in `searcher.py`; this is the loop around it. All frames that wait when it looks into its inbox are one packet. It
-ends when the master says so, and by itself once the master is gone for longer than its patience.
+It knows only its own file; names, order and interfaces of the team are in the master's `Task`. This module contains the
+loop around the search, which is in `searcher.py`. All frames that wait in the inbox are one packet. The robot ends when
+the master orders it, and by itself if the master is absent for longer than its patience.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Opened
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
-from robochoc.communication.network.profile import among, profile_of, ranges_of
+from robochoc.communication.network.profile import profile_of, ranges_of, restrict_to_team
 from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.registration import Registration, RunOverError
@@ -62,7 +62,7 @@ from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 CHECK_S = 0.25
-"""The interval at which a robot that waits checks the link, in seconds."""
+"""The interval at which a waiting robot checks the link, in seconds."""
 AT_ONCE = 10_000
 """The largest number of frames in one packet."""
 _UNUSABLE = (FrameRefusedError, NotGenuineError, UnknownPeerError, BadMessageError)
@@ -72,7 +72,7 @@ class Ending(NamedTuple):
     """The end of the run for this robot.
 
     Attributes:
-        why: The reason that the master gave, or why the robot ended by itself.
+        why: The reason from the master, or the reason why the robot ended by itself.
         failed: The run could not be completed.
         assignment: The values that the robot has decided on.
     """
@@ -89,8 +89,8 @@ class NetworkRobot:
         own: The robot, compiled.
         identity: Its certificate and key.
         transport: Its connection to the router.
-        protocol_named: Finds the protocol that the master asks for; raises `LookupError`.
-        settings: How its owner wants it to take part.
+        protocol_named: Finds the protocol that the master requests; raises `LookupError`.
+        settings: The owner's settings of the robot.
     """
 
     def __init__(
@@ -110,10 +110,10 @@ class NetworkRobot:
         self._registration = Registration(own.robot.name, transport, settings.patience_s, self._register)
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
-        """Frames of an epoch that the master has not announced to this robot yet."""
+        """Frames of an epoch whose task this robot has not received yet."""
         self._kept = Backlog()
         self._lost_frames: set[tuple[int, str]] = set()
-        """Epochs and senders whose frame losses were reported. Each pair is reported once."""
+        """Epochs and senders with a reported frame loss. Each pair is reported once."""
         self._refusals = Refusals(lambda who, what, why: self._send_to_master(Objection(who, what, why)))
 
     def run(self) -> Ending:
@@ -130,7 +130,7 @@ class NetworkRobot:
             why = on_one_line(str(refusal), LONGEST_REASON)
             self._fail(Failed(why, unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
             return Ending(why, failed=True, assignment={})
-        except Exception as error:  # noqa: BLE001 - whatever it was, the master has to know
+        except Exception as error:  # noqa: BLE001 - the master has to know of any error
             where = traceback.extract_tb(error.__traceback__)[-1]
             why = on_one_line(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})", LONGEST_REASON)
             self._fail(Failed(why))
@@ -139,7 +139,7 @@ class NetworkRobot:
     # The loop
 
     def _items(self) -> list[Item]:
-        """Return all frames that have arrived. Empty if none has arrived for a while."""
+        """Wait for frames for a short time, and return all that have arrived."""
         restless = self._searcher is not None and self._searcher.is_restless
         items = []
         with suppress(Empty):
@@ -170,7 +170,7 @@ class NetworkRobot:
             self._registration.check_link()
 
     def _report_lost_frames(self, sender: str, frames: int) -> None:
-        """Tell the master, once for each search: it finds out whether the run can do without these frames."""
+        """Report lost frames to the master, once for each search; it decides whether the run can continue."""
         loss = (self._searcher.epoch if self._searcher else 0, sender)
         if loss not in self._lost_frames:
             self._lost_frames.add(loss)
@@ -193,15 +193,15 @@ class NetworkRobot:
             self._object(sender, str(refused))
 
     def _handle(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
-        """Handle what belongs to this epoch. What belongs to the next one waits, for its key cards have not come yet.
+        """Handle a frame of this epoch. A frame of the next epoch is stored, as its key cards have not arrived yet.
 
-        A frame is taken only if it can be used, so that an unusable one does not take the place of another.
+        A frame is accepted only if it can be used, so that an unusable one does not use up the number of another.
 
         Raises:
-            BadMessageError: when it holds no message of the protocol, or one that nobody may send now.
-            FrameRefusedError: when it is of an epoch that is far away, or is more than is kept for the next one.
-            NotGenuineError: when the filters find that it was changed.
-            UnknownPeerError: when the sender's key card is not known.
+            BadMessageError: if it contains no message of the protocol, or a message that is not allowed now.
+            FrameRefusedError: if its epoch is not the next one, or too many frames are stored for the next one.
+            NotGenuineError: if the filters find that it was changed.
+            UnknownPeerError: if the sender's key card is not known.
         """
         message, epoch = opened.message, self._searcher.epoch if self._searcher else 0
         if not isinstance(message, ToPeer):
@@ -217,11 +217,11 @@ class NetworkRobot:
             self._handle_message(sender, message, packet)
 
     def _keep(self, sender: str, opened: Opened, message: ToPeer, epoch: int) -> None:
-        """Keep a frame for the next epoch. Raises `FrameRefusedError`."""
+        """Store a frame for the next epoch. Raises `FrameRefusedError`."""
         if message.epoch > epoch + 1:
-            raise FrameRefusedError(f"it is of epoch {message.epoch}, and this is {epoch}")
+            raise FrameRefusedError(f"it is of epoch {message.epoch}, but the present epoch is {epoch}")
         if not self._kept.accept(sender, len(message.content)):
-            raise FrameRefusedError(f"it is more than is kept of {sender} for epoch {message.epoch}")
+            raise FrameRefusedError(f"too many frames of {sender} are stored for epoch {message.epoch}")
         self._channel.accept(sender, opened.number)
         self._ahead.append((sender, opened))
 
@@ -237,7 +237,7 @@ class NetworkRobot:
             packet.append(envelope)
 
     def _object(self, sender: str, why: str) -> None:
-        """Tell the master of a frame that was refused."""
+        """Report a refused frame to the master."""
         if self._registration.welcome is not None:
             self._refusals.note(sender, f"a frame to {self._robot.name}", why)
 
@@ -248,7 +248,7 @@ class NetworkRobot:
             case Welcome():
                 self._enter(order)
             case RegistrationDenied(incarnation, why) if incarnation == self._registration.incarnation:
-                raise RunOverError(f"the master does not take {self._robot.name}: {why}", failed=True)
+                raise RunOverError(f"the master does not admit {self._robot.name}: {why}", failed=True)
             case DomainRequest(variables):
                 domains = {variable.name: variable.domain for variable in self._robot.variables}
                 self._send_to_master(
@@ -284,7 +284,7 @@ class NetworkRobot:
                 self._refuse_order(order)
 
     def _obey_about_answers(self, order: ControlMessage, searcher: Searcher) -> None:
-        """Obey an order that is about what the robots have: at a moment of the search, or at its end."""
+        """Obey an order about the robots' values, at a snapshot or at the end of the search."""
         match order:
             case TakeSnapshot(number):
                 searcher.report_snapshot(number)
@@ -300,13 +300,13 @@ class NetworkRobot:
                 self._refuse_order(order)
 
     def _refuse_order(self, order: ControlMessage) -> None:
-        self._object(MASTER, f"{type(order).__name__} is nothing to be told now")
+        self._object(MASTER, f"{type(order).__name__} is not expected now")
 
     def _register(self, incarnation: str) -> None:
         self._send_to_master(Register(profile_of(self._robot), incarnation))
 
     def _enter(self, welcome: Welcome) -> None:
-        """Enter the run. A second welcome comes after an outage, and one of another run from another master."""
+        """Enter the run. Welcomes are repeated after an outage; a restarted master sends one of another run."""
         if welcome.incarnation != self._registration.incarnation:
             return
         if self._registration.accept(welcome):
@@ -325,9 +325,9 @@ class NetworkRobot:
             protocol = self._protocol_named(task.protocol)
         except LookupError as unknown:
             raise UnsupportedError(f"{self._robot.name}: {unknown}") from None
-        observed = (welcome.observed and not welcome.private) or self._settings.sniffed  # events have values in them
+        observed = (welcome.observed and not welcome.private) or self._settings.sniffed  # events contain values
         context = RobotContext(self._send_to_master, self._send, self._settings.set_rank, observed, welcome.private)
-        own = self._own.relinked(among(self._robot, task.interfaces), self._settings.compiled)
+        own = self._own.relinked(restrict_to_team(self._robot, task.interfaces), self._settings.compiled)
         self._searcher = Searcher(own, task, protocol, context)
         self._searcher.prepare()
         ahead, self._ahead = self._ahead, []
@@ -341,7 +341,7 @@ class NetworkRobot:
     # The end
 
     def _fail(self, message: Failed) -> None:
-        """Tell the master why this robot cannot continue, and wait a while for its leave."""
+        """Report to the master why this robot cannot continue, and wait for a `Leave` for a short time."""
         if self._registration.welcome is None:
             return
         self._send_to_master(message)

@@ -1,4 +1,4 @@
-"""A robot's process of `--runtime network`. The fork server imports this module, so it does without the master."""
+"""A robot's process of `--runtime network`. Apart from `local.py`, as the fork server imports it without the master."""
 
 from __future__ import annotations
 
@@ -62,21 +62,21 @@ def network_robot_process(given: NetworkRobotStart) -> None:
 
 
 def _end_with_the_fork_server() -> None:
-    """Have the kernel kill this process when the fork server ends, which does so when the parent is gone.
+    """Have the kernel kill this process when the fork server ends, which happens when the parent is gone.
 
-    It would wait for its children, which all hold an end of the pipe that tells it so, and never use it; and one that
-    is stopped (SIGSTOP) does not see that the parent is gone.
+    Otherwise the server would wait for its children, which all inherit an end of its pipe to the parent; and a stopped
+    server (SIGSTOP) does not notice that the parent is gone.
     """
     signal_when_orphaned(signal.SIGKILL)
     alive = getattr(multiprocessing.forkserver, "_forkserver", None)
     descriptor = getattr(alive, "_forkserver_alive_fd", None)
     if descriptor is not None:
         os.close(descriptor)
-        setattr(alive, "_forkserver_alive_fd", None)  # noqa: B010 - it is not ours, and types do not know it
+        setattr(alive, "_forkserver_alive_fd", None)  # noqa: B010 - a private attribute
 
 
 def _end_with_the_parent() -> None:
-    """End even while the fork server does not: it may be elsewhere held up."""
+    """End with the parent even if the fork server is blocked."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -18,12 +18,12 @@ class RobotSettings:
     """The settings of a robot.
 
     Attributes:
-        patience_s: How long the master may be gone.
-        sniffed: The master's observers receive all events of the robot, even if they do not ask for them.
+        patience_s: Seconds for which the master may be absent.
+        sniffed: The master's observers always receive all events of the robot.
         set_rank: Called before each search with the robot's place in the priority order, and the number of robots.
-        stage: Called with a short text on how far the robot is.
-        decided: Called with the verdict in words, and the robot's values, when the team has a decision and searches on.
-        compiled: Compiles the robot's domain again, should others have to see more of its variables than it knew.
+        stage: Called with a short text on the robot's progress.
+        decided: Called with the verdict in words and the robot's values when the team has a decision but continues.
+        compiled: Compiles the robot's domain again if it must disclose more variables than expected.
     """
 
     patience_s: float = 10.0

@@ -1,9 +1,9 @@
-"""The router: the one process that all connect to. It checks certificates and the rights to write.
+"""The router: the process to which all participants connect. It checks certificates and the rights to write.
 
-It is a process of its own (`router_process.py`) that holds no frames but those under way. zenoh's access control
-cannot be changed while it runs: to register or revoke somebody, the router is closed and opened anew with other rules,
-in a fraction of a second; what was sent meanwhile is recovered (`transport.py`). What it refuses it tells in its log
-only, so that is read (`Log`).
+It is a separate process (`router_process.py`) that stores only frames in transit. zenoh's access control cannot be
+changed while it runs: to register or revoke a participant, the router is restarted with other rules, in a fraction of a
+second; frames that were sent meanwhile are recovered (`transport.py`). Refusals appear only in its log, so the log is
+read (`Log`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from robochoc.communication.network.transport import encoded
 from robochoc.system.signals import signals_held
 
 START_S = 60.0
-"""The longest wait until the router listens, in seconds. To start Python takes seconds where all cores are busy."""
+"""The longest wait until the router listens, in seconds. If all cores are busy, Python needs seconds to start."""
 _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _RESPONDING = b"responding\n"
@@ -33,31 +33,31 @@ _CHECK_S = 0.5
 """The interval between checks that the router's process responds, in seconds."""
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
-"""With allowed actions as well, the log has several lines for each frame, which cost more than the frames."""
+"""A log that includes allowed actions has several lines for each frame, which cost more than the frames."""
 _CHUNK = 65536
 _DECISION = re.compile(
     rb"ThreadId\((\d+)\) zenoh::net::routing::interceptor(?:"
     rb"::access_control: [^\n]*?(?:CertCommonName\([^)\n]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to "
     rb"([A-Za-z/ ]+?) \((in|e)gress\) on (\S+)|: (Msg intercepted!))"
 )
-"""The two lines of a refusal: what a session may not do, and that this is why a message was stopped. Other threads of
-the router may write between them."""
+"""The two lines of a refusal: the forbidden action of a session, and the fact that it stopped a message. Other threads
+of the router may write between them."""
 _TELLING = re.compile(rb"unauthorized|intercepted|zenoh_link_tls")
 _KNOWN = re.compile(rb"CertCommonName\(([^)]*)\)\S*\+([0-9a-f]+) is unauthorized")
 _ACCEPTED = re.compile(rb"zenoh_link_tls::unicast: Accepted TLS connection [^\n]*Common Name: ([^\n]*)\.\n")
 _TLS = re.compile(rb"WARN [^\n]*zenoh_link_tls::unicast: ([^\n]*)")
 _HINT = re.compile(r"\. Hint: .*$")
 _MEANINGS = {
-    "invalid peer certificate: UnknownIssuer": "its certificate is not of this Authority",
+    "invalid peer certificate: UnknownIssuer": "its certificate was not issued by this Authority",
     "invalid peer certificate: certificate expired": "its certificate has expired",
     "invalid peer certificate: certificate not valid yet": "its certificate is not valid yet",
-    "invalid peer certificate": "its certificate is not good",
-    "peer sent no certificates": "it has shown no certificate",
+    "invalid peer certificate": "its certificate is invalid",
+    "peer sent no certificates": "it has sent no certificate",
     "received corrupt message": "it does not speak TLS",
-    "received fatal alert: UnknownCA": "it does not believe the master, whom its own Authority has not certified",
-    "tls handshake eof": "it has hung up in the middle of the handshake",
+    "received fatal alert: UnknownCA": "it does not trust the master, which its Authority has not certified",
+    "tls handshake eof": "it has closed the connection during the handshake",
 }
-"""The meanings of zenoh's texts for refused connections; the first that fits counts."""
+"""The meanings of zenoh's texts for refused connections; the first match counts."""
 _KEPT_SESSIONS = 10_000
 _KEPT_THREADS = 100
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
@@ -68,7 +68,7 @@ class RouterError(Exception):
 
 
 class Refusal(NamedTuple):
-    """The router has refused `who` (as its certificate says; `somebody`: it was not let in) to do `what`."""
+    """The router has refused `what` to `who` (the name in its certificate; `somebody`: it was not admitted)."""
 
     who: str
     what: str
@@ -81,9 +81,9 @@ RefusalObserver = Callable[[Refusal], None]
 class Router:
     """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
 
-    `refused` is told of refusals, from a thread of its own (None: nobody wants to know, which is much faster). Whoever
-    opens it closes it. `scratch` is removed by the router's process if this one dies (see `Conditions`). A process that
-    has not responded for `patience_s` seconds is killed: zenoh would wait much longer for one that is stopped.
+    `refused` receives refusals, from another thread (None: no refusals are reported, which is much faster). The opener
+    closes the router. The router's process removes `scratch` if this process dies (see `NetworkSettings`). A process
+    that has not responded for `patience_s` seconds is killed: zenoh would wait much longer for a stopped one.
     """
 
     def __init__(
@@ -110,11 +110,11 @@ class Router:
         self._is_silent = False
 
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
-        """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterError`."""
+        """Listen, with these rules (see `access_control`) in place of the previous ones. Raises `RouterError`."""
         self.close()
         with signals_held():
             self._process = process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
-                [sys.executable, "-P", "-m", _PROCESS],  # -P: not what stands in the working directory
+                [sys.executable, "-P", "-m", _PROCESS],  # -P: ignore modules in the working directory
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
@@ -122,7 +122,7 @@ class Router:
                 start_new_session=True,
             )
         if process.stdin is None or process.stdout is None:
-            raise RouterError("it has no standard streams")
+            raise RouterError("the router's process has no standard streams")
         process.stdin.write(f"{json.dumps(self._scratch)}\n{json.dumps(self._settings(reach, sniffers))}\n".encode())
         process.stdin.flush()
         said = self._wait_until_ready(process.stdout)
@@ -135,13 +135,13 @@ class Router:
 
     @property
     def failure(self) -> str:
-        """Return why the router has failed; empty if it works or was closed."""
+        """The reason why the router has failed; empty if it works or was closed."""
         if self._process is None or self._process.poll() is None:
             return ""
         return f"did not respond for {self._patience_s:g} s" if self._is_silent else "has ended"
 
     def _watch(self, process: subprocess.Popen[bytes], questions: IO[bytes]) -> None:
-        """Kill the process when it no longer responds.
+        """Kill the process if it no longer responds.
 
         Time is counted in steps of `_CHECK_S`, so that the router can still respond if this process was stopped.
         """
@@ -163,7 +163,7 @@ class Router:
         process.kill()
 
     def close(self) -> None:
-        """End all links. The router's process ends at once."""
+        """Close all links, and end the router's process at once."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -197,7 +197,7 @@ class Router:
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:
-        """Return the router's output until it was ready. Waiting peers connect before that."""
+        """Wait until the router is ready, and return its output so far. Waiting peers connect before that."""
         said: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
@@ -208,7 +208,7 @@ class Router:
                 said.append(line)
         finally:
             watch.cancel()
-        silence = f"it was not ready after {START_S:g} s" if self._was_late else "it ended without a word"
+        silence = f"it was not ready after {START_S:g} s" if self._was_late else "it ended without a message"
         why = b"; ".join(line.strip() for line in said[-2:]).decode(errors="replace") or silence
         raise RouterError(f"cannot listen on {self.endpoint}: {why}")
 
@@ -218,7 +218,7 @@ class Router:
             self._process.kill()
 
     def _read(self, output: IO[bytes], log: Log, said: bytes) -> None:
-        """Read the log to its end, and report refusals. In chunks: at full load there are 80,000 lines a second."""
+        """Read the log to its end in chunks (up to 80,000 lines a second), and report refusals."""
         rest = b""
         for refusal in log.refusals(said):
             if self._refused:
@@ -235,18 +235,17 @@ class Router:
 
 
 class Log:
-    """Makes refusals of what the router writes into its log; only those in `reach` have rules there."""
+    """Parses refusals from the router's log; only the names in `reach` have rules."""
 
     def __init__(self, reach: Collection[str]) -> None:
         self._reach = reach
         self._names: dict[bytes, str] = {}
-        """The name of each session. zenoh gives the name of a certificate's holder only when it looks a right up
-        anew."""
+        """The name of each session. zenoh logs the name in a certificate only when a right is not in its cache."""
         self._denied: dict[bytes, tuple[bytes, bytes, bytes] | None] = {}
-        """The action, with its session and key, that each thread has found not allowed last (None: going out)."""
+        """Each thread's latest forbidden action, with its session and key (None: an outgoing message)."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
-        """Yield the refusals in a part of the log, which ends with a whole line."""
+        """Yield the refusals in a part of the log, which consists of complete lines."""
         plain = _COLOURS.sub(b"", log)
         for name in _ACCEPTED.findall(plain):
             who = name.decode(errors="replace")
@@ -260,7 +259,7 @@ class Log:
             yield Refusal("somebody", "connect", _meaning(_HINT.sub("", why.decode(errors="replace"))))
 
     def _stopped(self, log: bytes) -> Iterator[Refusal]:
-        """Yield the messages that were stopped coming in, each because of what its thread found last."""
+        """Yield the stopped incoming messages, each with the latest forbidden action of its thread."""
         if len(self._denied) > _KEPT_THREADS:
             self._denied.clear()
         for thread, session, what, direction, where, intercepted in _DECISION.findall(log):

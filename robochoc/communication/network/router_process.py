@@ -23,8 +23,8 @@ RESPONDING = "responding"
 
 
 def main() -> None:
-    """Be the router until standard input ends."""
-    signal_when_orphaned(signal.SIGCONT)  # stopped, it would not see the end of standard input
+    """Run the router until standard input ends."""
+    signal_when_orphaned(signal.SIGCONT)  # a stopped process does not see the end of standard input
     leave_ctrl_c_to_the_parent()
     zenoh.init_log_from_env_or("error")
     scratch, settings = json.loads(sys.stdin.readline()), json.loads(sys.stdin.readline())
@@ -34,11 +34,11 @@ def main() -> None:
         while sys.stdin.readline():
             sys.stdout.write(f"{RESPONDING}\n")
             sys.stdout.flush()
-        if scratch:  # the master was killed, and could not
-            import shutil  # noqa: PLC0415 - nobody else waits for it
+        if scratch:  # the master was killed, and could not remove it
+            import shutil  # noqa: PLC0415 - seldom needed
 
             shutil.rmtree(scratch, ignore_errors=True)
-        os._exit(0)  # to take leave of clients that are gone as well would take seconds
+        os._exit(0)  # closing links to clients that are gone would take seconds
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""One epoch of a robot across machines: from the master's task to the report of what came of it.
+"""One epoch of a robot across machines: from the master's task to the final report.
 
-The connection around it is in `robot.py`. The course of a search is in `communication/robot_loop.py`.
+The connection to the run is in `robot.py`. The loop of a search is in `communication/robot_loop.py`.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ class RobotContext:
     """A searcher's interface to the robot's connection to the run.
 
     Attributes:
-        say: Sends a control message to the master.
+        send_to_master: Sends a control message to the master.
         send: Sends a message to another robot.
         set_rank: Called with the robot's place in the priority order, and the number of robots.
-        observed: The robot's events are wanted.
-        private: No robot tells its values in this run.
+        observed: Whether the robot reports its events.
+        private: Whether robots do not disclose their values in this run.
     """
 
-    say: Callable[[ToMaster], None]
+    send_to_master: Callable[[ToMaster], None]
     send: Callable[[str, ToPeer], None]
     set_rank: Callable[[int, int], None]
     observed: bool
@@ -73,13 +73,13 @@ class Searcher(RobotLoop):
     """The robot `own` in the epoch of `task`.
 
     Args:
-        own: The robot, linked to those that take part.
-        task: What the master has told it of the others.
+        own: The robot, linked to the participants.
+        task: The master's task, with the common knowledge of the team.
         protocol: The protocol that it runs.
         context: Its connection to the run.
 
     Raises:
-        UnsupportedError: when the task is one for another robot.
+        UnsupportedError: if the task is for another robot.
     """
 
     bundle_bytes = LARGEST_FRAME // 4
@@ -111,9 +111,9 @@ class Searcher(RobotLoop):
 
     @property
     def assignment(self) -> dict[str, int]:
-        """The values that the robot has decided on for its variables; empty while there are none.
+        """The decided values of the robot's variables; empty while there are none.
 
-        The master may have told the robot to stay with what it had at a snapshot.
+        They are those of a snapshot if the master has ordered the robot to adopt it.
         """
         adopted = self._snapshot_values.adopted
         return self._present if adopted is None else adopted
@@ -122,13 +122,13 @@ class Searcher(RobotLoop):
     def _present(self) -> dict[str, int]:
         return self._host.protocol.assignment if self._host else {}
 
-    # Getting ready
+    # Preparation
 
     def prepare(self) -> None:
-        """Tell others which constraints they have to know; get ready once all children have told theirs.
+        """Send constraints to the robots that have to know them; get ready once all children have sent theirs.
 
-        Only where robots of a constraint's scope share it (`Traits.shared_scopes`) does another than the lowest robot
-        know it. Raises `UnsupportedError`.
+        Only with `Traits.shared_scopes` do other robots than the lowest one of a scope know a constraint. Raises
+        `UnsupportedError`.
         """
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
@@ -141,7 +141,7 @@ class Searcher(RobotLoop):
         self._get_ready()
 
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
-        """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
+        """Raise `UnsupportedError` if this robot's file requires more than the protocol supports."""
         robot, traits = self._robot, self._protocol.traits
         unmet = unmet_requirement(robot, traits, owners)
         if robot.kind == ProblemKind.DISWCSP and not traits.costs:
@@ -150,7 +150,7 @@ class Searcher(RobotLoop):
             raise UnsupportedError(f"{unmet}, which {self._task.protocol} does not support")
 
     def learn(self, sender: str, content: bytes) -> None:
-        """Take in constraints of `sender` over variables of this robot. Raises `UnsupportedError`."""
+        """Receive constraints of `sender` over variables of this robot. Raises `UnsupportedError`."""
         try:
             self._copies[sender] = msgspec.msgpack.decode(content, type=tuple[SharedRecord, ...])
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as bad:
@@ -180,7 +180,7 @@ class Searcher(RobotLoop):
         return AgentProblem(self._own, everyone, copies, task.secretive, parameters)
 
     def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
-        """Return a constraint that `sender` holds: it has to be a child, and this robot's variables in the scope."""
+        """Return a constraint of `sender`, which must be a child; the scope must contain variables of both robots."""
         known = known_of(record)
         variables = set(known.constraint.variables)
         mine, theirs = (set(self._task.interfaces.get(name, ())) for name in (self._robot.name, sender))
@@ -190,29 +190,29 @@ class Searcher(RobotLoop):
             or not variables <= self._task.domains.keys()
             or not (variables & mine and variables & theirs)
         ):
-            raise SharedConstraintError(f"{sender} holds {known.constraint.name!r} over variables that it cannot")
+            raise SharedConstraintError(f"{sender} has sent {known.constraint.name!r}, whose scope is not allowed")
         return known
 
     # Messages
 
     def check(self, content: bytes) -> None:
-        """Raise `BadMessageError` when `content` is no message of the protocol."""
+        """Raise `BadMessageError` if `content` is not a message of the protocol."""
         try:
             self._decode(content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise BadMessageError(f"it is no message of the protocol: {error}") from None
+            raise BadMessageError(f"it is not a message of the protocol: {error}") from None
 
     def admit(self, envelope: Envelope) -> bool:
         """See `RobotLoop.admit`.
 
         Raises:
-            BadMessageError: when the sender takes no part in this search, or has sent too much before it begins.
+            BadMessageError: if the sender does not take part in this search, or has sent too much before its start.
         """
         if envelope.sender not in self._task.interfaces:
-            raise BadMessageError(f"{envelope.sender} takes no part in this search")
+            raise BadMessageError(f"{envelope.sender} does not take part in this search")
         is_early = not (self._searching or self._paused)
         if is_early and not self._early_share.accept(envelope.sender, len(envelope.content)):
-            raise BadMessageError(f"{envelope.sender} says too much before the search has begun")
+            raise BadMessageError(f"{envelope.sender} has sent too many messages before the start of the search")
         return super().admit(envelope)
 
     def receive(self, packet: Sequence[Envelope]) -> None:
@@ -232,27 +232,27 @@ class Searcher(RobotLoop):
     # Reports
 
     def _send_to_master(self, message: RobotMessage) -> None:
-        self._context.say(message)
+        self._context.send_to_master(message)
 
     def _report_end(self) -> None:
-        if self._host is None:  # others have not told which constraints they hold, and perhaps never will
-            self._context.say(DetailedReport(self.epoch, {}, Metrics(), NOTHING, assigned=False))
+        if self._host is None:  # the constraints of a child have not arrived, and may never arrive
+            self._context.send_to_master(DetailedReport(self.epoch, {}, Metrics(), NOTHING, assigned=False))
             return
         metrics = self._host.metrics()
         metrics = replace(metrics, ncccs=min(metrics.ncccs, LATEST), memory=own_memory())
-        assigned = bool(self._present)  # a withdrawn robot has a value, and none of its variables has
+        assigned = bool(self._present)  # a withdrawn robot has a value, but its variables have none
         values, findings = self._known_to_master(self._host)
-        self._context.say(DetailedReport(self.epoch, values, metrics, findings, assigned, self._exchanged()))
+        self._context.send_to_master(DetailedReport(self.epoch, values, metrics, findings, assigned, self._exchanged()))
 
     def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
-        """See `RobotLoop`. In private runs that is nothing."""
+        """See `RobotLoop`. Nothing in private runs."""
         return ({}, NOTHING) if self._context.private else (host.protocol.assignment, self._findings(host.protocol))
 
     def _findings(self, protocol: Protocol) -> Findings:
-        """Return the findings, some of which come from others; nothing if one of those cannot be true.
+        """Return the findings; nothing if one that comes from other robots is invalid.
 
-        A master that recalls asks for the cycle that it wants. It does not need them all: in a long search they are
-        more than a frame holds.
+        A master that sends `Recall` requests the cycles it needs, so the trail is left out: in a long search it does
+        not fit into a frame.
         """
         findings = protocol.findings
         if findings.trail is not None and self._snapshot_values.is_used:
@@ -260,7 +260,7 @@ class Searcher(RobotLoop):
         return NOTHING if fault_of_findings(findings, self._task.order) else findings
 
     def _exchanged(self) -> dict[str, Exchanged]:
-        """Return the counts of messages with each other robot, by its name."""
+        """Return the counts of messages with each other robot."""
         others = self._sent_to.keys() | self._received_from.keys()
         return {
             other: Exchanged(self._sent_to[other], self._received_from[other], self._clocks.get(other, 0))
@@ -268,7 +268,7 @@ class Searcher(RobotLoop):
         }
 
     def recall(self, order: Recall) -> None:
-        """Tell the master what it asks for, and keep that until it has been checked. The search goes on."""
+        """Send the requested values to the master, and store them until they are checked. The search continues."""
         host = self._host
         if host is None:
             return
@@ -280,13 +280,13 @@ class Searcher(RobotLoop):
         self._send_to_master(Snapshot(self.epoch, order.number, values, lost, findings))
 
     def adopt(self, number: int, *, published: bool) -> None:
-        """Keep what the robot had at a snapshot; see `SnapshotValues.adopt`. Raises `FrameRefusedError`."""
+        """Keep the values of a snapshot; see `SnapshotValues.adopt`. Raises `FrameRefusedError`."""
         self._snapshot_values.adopt(number, published=published)
 
     def check_constraints(self, values: Mapping[str, int], snapshot: int = 0) -> CheckResult:
-        """Check the robot's constraints against what all have decided, or had at a `snapshot`. See `check_constraints`.
+        """Check the robot's constraints against the team's decision, or against a `snapshot`. See `check_constraints`.
 
-        Raises `FrameRefusedError` if the robot was not asked what it had then.
+        Raises `FrameRefusedError` if the snapshot is not known.
         """
         own = self._snapshot_values.at(snapshot) if snapshot else self._present
         found = check_constraints(self.epoch, self._robot, {**values, **own}, self._learnt)
@@ -294,16 +294,16 @@ class Searcher(RobotLoop):
 
 
 def _sorted(copies: Sequence[KeyedConstraint], order: Sequence[str]) -> tuple[KeyedConstraint, ...]:
-    """Return `copies` in the order of the robots that hold them, as in all runtimes."""
+    """Return `copies` in the order of their holders, as in all runtimes."""
     rank = {name: place for place, name in enumerate(order)}
     return tuple(sorted(copies, key=lambda known: rank.get(known.key.partition("<")[0], -1)))
 
 
 class SnapshotValues:
-    """The values that a robot has told, by the numbers of the snapshots: the last ones, and those that it is to keep.
+    """The values that a robot has reported in snapshots: the latest ones, and those that it is to keep.
 
     Attributes:
-        adopted: The values that are the robot's decision until it hears otherwise; None: there are none.
+        adopted: The values that are the robot's decision until a further order; None: there are none.
     """
 
     def __init__(self) -> None:
@@ -313,15 +313,15 @@ class SnapshotValues:
 
     @property
     def is_used(self) -> bool:
-        """Return whether the robot was ever asked for a snapshot."""
+        """Whether a snapshot was requested from the robot."""
         return self._last[0] > 0
 
     def note(self, number: int, values: _Values) -> None:
-        """Keep `values` until the next snapshot."""
+        """Store `values` until the next snapshot."""
         self._last = (number, values)
 
     def at(self, number: int) -> _Values:
-        """Return the values of a snapshot. Raises `FrameRefusedError` if they are not known, or no more."""
+        """Return the values of a snapshot. Raises `FrameRefusedError` if they are not stored."""
         for known, values in (self._last, self._kept):
             if known == number:
                 return values
@@ -340,7 +340,7 @@ class SnapshotValues:
 
 
 def values_for_recall(order: Recall, protocol: Protocol, domain: CompiledDomain) -> _Values:
-    """Return the values of the robot's variables that `order` asks for. Empty: it has none, or withdraws."""
+    """Return the values of the robot's variables that `order` requests; empty if it has none, or withdraws."""
     if order.value is not None:
         return domain.behind(order.value)
     trail = protocol.findings.trail
@@ -351,6 +351,6 @@ def values_for_recall(order: Recall, protocol: Protocol, domain: CompiledDomain)
 
 
 def _place_in(trail: Trail, cycle: int) -> int | None:
-    """Return the place of the value that the robot had in `cycle`; None if it had none yet."""
+    """Return the place of the robot's value in `cycle`; None if it had none yet."""
     after = bisect_right(trail.entries, cycle, key=lambda entry: entry[0])
     return trail.entries[after - 1][1] if after else None

@@ -1,6 +1,6 @@
-"""A robot's channel to the master and to other robots: frames, and the filters that seal what robots say to each other.
+"""A robot's channel to the master and to other robots: frames, and filters that seal messages between robots.
 
-No I/O: it makes and reads bytes. Key cards of other robots come with the master's task.
+No I/O: it writes and reads bytes. Key cards of other robots arrive with the master's task.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class SecureChannel:
         self._filters: FilterStack | None = None
 
     def start_run(self, run: str, filters: tuple[str, ...]) -> None:
-        """Begin a run, in which messages go through `filters`. Raises `UnsupportedError` for an unknown filter."""
+        """Start a run whose messages pass through `filters`. Raises `UnsupportedError` for an unknown filter."""
         self._framing.start_run(run)
         if not filters:
             return
@@ -45,7 +45,7 @@ class SecureChannel:
         return self._ring.card.encode() if self._ring else b""
 
     def admit(self, cards: Iterable[bytes]) -> list[str]:
-        """Accept the key cards of others that the Authority has certified; return why others were not accepted."""
+        """Accept others' key cards that the Authority has certified; return the reasons why cards were not accepted."""
         if self._ring is None:
             return []
         faults = []
@@ -59,7 +59,7 @@ class SecureChannel:
         return faults
 
     def revoke(self, name: str) -> None:
-        """Accept nothing more from `name`, whose certificate was revoked."""
+        """Accept no further messages from `name`, whose certificate was revoked."""
         if self._ring:
             self._ring.dismiss(name)
 
@@ -68,7 +68,7 @@ class SecureChannel:
         return self._framing.write(MASTER, message)
 
     def sealed_frame(self, receiver: str, message: ToPeer) -> bytes | None:
-        """Return the next frame to another robot; None if that was revoked."""
+        """Return the next frame to another robot; None if the robot was revoked."""
         if self._filters:
             context = self._context(self._name, receiver, self._framing.next_number(receiver), message)
             try:
@@ -79,19 +79,19 @@ class SecureChannel:
         return self._framing.write(receiver, message)
 
     def read(self, sender: str, content: bytes) -> Opened:
-        """Return what is in a frame; it counts as received once it is `taken`. Raises `FrameRefusedError`."""
+        """Return the content of a frame, which is received once `accept` is called. Raises `FrameRefusedError`."""
         return self._framing.read(sender, content)
 
     def accept(self, sender: str, number: int) -> None:
-        """Accept the frame `number` of `sender`: the next one is expected now."""
+        """Accept the frame `number` of `sender`, and expect the next one."""
         self._framing.accept(sender, number)
 
     def unsealed(self, sender: str, number: int, message: ToPeer) -> ToPeer:
-        """Return the message of another robot as it was before the filters sealed it.
+        """Return the unsealed message of another robot.
 
         Raises:
-            NotGenuineError: when the filters find that it was changed.
-            UnknownPeerError: when the sender's key card is not known.
+            NotGenuineError: if the filters find that it was changed.
+            UnknownPeerError: if the sender's key card is not known.
         """
         if self._filters is None:
             return message
@@ -99,6 +99,6 @@ class SecureChannel:
         return msgspec.structs.replace(message, content=self._filters.open(sender, message.content, context))
 
     def _context(self, sender: str, receiver: str, number: int, message: ProtocolMessage | Copies) -> bytes:
-        """Return what binds a sealed message to its place in the run."""
+        """Return the context that binds a sealed message to its place in the run."""
         kind = message.clock if isinstance(message, ProtocolMessage) else "copies"
         return f"{self._framing.run} {sender} {receiver} {number} {message.epoch} {kind}".encode()

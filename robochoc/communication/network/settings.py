@@ -16,14 +16,14 @@ class NetworkSettings:
 
     Attributes:
         filters: The channel filters that messages go through.
-        private: No robot tells its values.
-        patience_s: How long a robot may be away.
-        lease_ms: A link that is silent for so long counts as down.
-        survive: Lost robots break the search off, and are named in its result. Otherwise `RobotsLostError` is raised.
-        protocol: The protocol that the Directory Facilitator says robots use.
-        listen: Where the router listens (`HOST:PORT`), if that is not where it is reached: all addresses of a machine
-            are the name of none.
-        scratch: A folder of this process that the router removes should it outlive the process (empty: there is none).
+        private: No robot discloses its values.
+        patience_s: Seconds for which a robot may be absent.
+        lease_ms: Milliseconds of silence after which a link counts as down.
+        survive: Lost robots end the search, whose result names them. Otherwise it raises `RobotsLostError`.
+        protocol: The protocol in the robots' entries in the Directory Facilitator.
+        listen: The address on which the router listens (`HOST:PORT`), if it differs from the one at which it is
+            reached, such as all addresses of a machine.
+        scratch: A folder of this process that the router removes if it outlives the process (empty: none).
     """
 
     filters: tuple[str, ...] = ()

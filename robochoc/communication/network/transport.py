@@ -1,8 +1,8 @@
-"""The transport of one participant by zenoh: it carries frames both ways, and knows the present members.
+"""The transport of one participant by zenoh: it carries frames in both directions, and tracks the present members.
 
-Frames travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
-what an outage has swallowed; plain ones lose messages silently. Nothing but this file and the router's imports
-zenoh. Its callbacks run in threads of its own, and only put what comes into `inbox`.
+Frames are sent by zenoh's advanced publishers and subscribers, which number and store them, and request again those
+that an outage has lost; plain ones lose messages silently. Only this file and the router's import zenoh. zenoh's
+callbacks run in its threads, and only put items into `inbox`.
 """
 
 from __future__ import annotations
@@ -41,25 +41,25 @@ _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
 
 
 DESCRIPTORS = 24
-"""Open files that a session may need: threads of zenoh's have some, too."""
+"""Open files that a session may need, including those of zenoh's threads."""
 
 
 class CannotConnectError(Exception):
-    """There is no master at that address, or it does not let us in."""
+    """There is no master at that address, or it does not admit us."""
 
 
 TEAM = (MASTER, ALL)
-"""The senders to which a robot subscribes: the master, by a subscriber of its own, and all others."""
+"""The senders to which a robot subscribes: the master, by a separate subscriber, and all others."""
 _Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
 Answering = Callable[[str, bytes], bytes | None]
-"""The answer to a question of a participant; None: there is none."""
+"""Returns the answer to a participant's question; None: there is none."""
 
 
 class Transport:
     """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
 
-    It notices whether those in `watch` are there, and puts the frames of those in `heard` (more: `hear`) into `inbox`.
-    `lease_ms` is how long a silent link counts as alive. Raises `CannotConnectError` when there is no connection within
+    It tracks the presence of the names in `watch`, and puts the frames of `senders` (more: `subscribe`) into `inbox`.
+    A link that is silent for `lease_ms` counts as down. Raises `CannotConnectError` if there is no connection within
     `patience_s`.
     """
 
@@ -89,16 +89,17 @@ class Transport:
     def subscribe(self, senders: Iterable[str]) -> None:
         """Subscribe to the frames of `senders`, too. Their earlier frames arrive soon.
 
-        Each has a subscriber of its own, for zenoh believes what a packet says of its source and number. In one for
-        all, a sender can use the source of another, whose frames then count as old ones, or as missing. It is dear:
-        the router knows of every pair, so robots hear their neighbours by one (`ALL`) and the master by its own.
+        Each sender has its own subscriber, as zenoh trusts the source and number in a packet: with one subscriber for
+        all, a sender can use the source of another, whose frames then count as old or missing. But separate subscribers
+        are expensive, as the router stores every pair; so robots use one for all neighbours (`ALL`), and one for the
+        master.
         """
         for sender in senders:
             if sender not in self._subscribers:
                 self._subscribers[sender] = self._subscribed(sender)
 
     def send(self, receiver: str, content: bytes) -> None:
-        """Send a frame. While the link is down, it waits here. Afterwards it is sent, or requested by the receiver."""
+        """Send a frame. While the link is down, it is stored; later it is sent, or requested by the receiver."""
         publisher = self._publishers.get(receiver)
         if publisher is None:
             publisher = self._publishers[receiver] = zenoh.ext.declare_advanced_publisher(
@@ -113,11 +114,11 @@ class Transport:
 
     @property
     def router(self) -> str:
-        """The router that there is a link to now; empty: there is none. One that was opened anew is another one."""
+        """The identifier of the connected router; empty if there is none. A restarted router has another one."""
         return next(map(str, self._session.info.routers_zid()), "")
 
     def answer(self, key: str, answered: Answering) -> None:
-        """Start to answer questions on `key`, in a thread of zenoh's."""
+        """Start to answer questions on `key`, in one of zenoh's threads."""
 
         def reply(query: zenoh.Query) -> None:
             content = answered(name_in(str(query.key_expr)), query.payload.to_bytes() if query.payload else b"")
@@ -127,9 +128,9 @@ class Transport:
         self._answering = self._session.declare_queryable(key, reply)
 
     def ask(self, key: str, content: bytes, patience_s: float) -> bytes | None:
-        """Return the answer to `content` on `key`; None if none comes within `patience_s` seconds.
+        """Return the answer to `content` on `key`; None if none arrives within `patience_s` seconds.
 
-        The answer yields to all that robots say, and is dropped if it does not get through at once.
+        The answer has a lower priority than robots' frames, and is dropped if it cannot be sent at once.
         """
         replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
         handler = zenoh.handlers.Callback(replies.put, lambda: replies.put(None))
@@ -152,8 +153,8 @@ class Transport:
         self.inbox.put(WakeUp())
 
     def close(self) -> None:
-        """End the connection. What zenoh has taken over is sent before, unless the link is dead."""
-        with suppress(zenoh.ZError):  # it has taken leave in vain: there is nobody at the other end of a dead link
+        """Close the connection. Pending frames are sent before, unless the link is dead."""
+        with suppress(zenoh.ZError):  # the other end of a dead link does not answer
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
     def __enter__(self) -> Self:
@@ -167,8 +168,8 @@ class Transport:
     def _subscribed(self, sender: str) -> _Subscriber:
         """Return a subscriber to `sender` alone (`ALL`: to all others), which also notices lost frames.
 
-        zenoh reports a gap just before the frame behind it, in the same thread (not `indirect`: one thread for each).
-        So the sender of that frame, which the router has proven, has lost frames, not the source that a packet claims.
+        zenoh reports a gap just before the frame after it, in the same thread (with `indirect`, in another one). So the
+        loss is attributed to the sender of that frame, which the router has proven, and not to the source in a packet.
         """
         gap = 0
 
@@ -176,7 +177,7 @@ class Transport:
             nonlocal gap
             gap += miss.nb
 
-        def take(sample: zenoh.Sample) -> None:
+        def receive(sample: zenoh.Sample) -> None:
             nonlocal gap
             lost, gap = gap, 0
             of = name_in(str(sample.key_expr))
@@ -186,7 +187,7 @@ class Transport:
         subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
             frame_key(self.name, sender),
-            zenoh.handlers.Callback(take, indirect=False),
+            zenoh.handlers.Callback(receive, indirect=False),
             history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
             recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
             subscriber_detection=True,
@@ -205,10 +206,10 @@ class Transport:
 
 
 def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
-    """Return a session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
+    """Return a session. zenoh ignores Ctrl-C while it connects, so each attempt is short."""
     if endpoint.startswith("["):
         raise CannotConnectError(
-            f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
+            f"{endpoint}: zenoh cannot check certificates of IPv6 addresses: use a host name of the master"
         )
     require_descriptors(DESCRIPTORS)
     until = time.monotonic() + patience_s
@@ -220,13 +221,13 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
         except zenoh.ZError as error:
             if time.monotonic() >= until:
                 raise CannotConnectError(
-                    f"no master answers at {endpoint}, or it does not let {identity.name} in"
+                    f"no master answers at {endpoint}, or it does not admit {identity.name}"
                 ) from error
         attempt_s = min(2 * attempt_s, _LONGEST_ATTEMPT_S)
 
 
 def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
-    """Return how a participant connects: to that one router, by mutual TLS, and in no other way."""
+    """Return the configuration of a participant: it connects only to this router, by mutual TLS."""
     texts = identity.texts
     tls = {
         "root_ca_certificate_base64": encoded(texts.ca),
@@ -250,5 +251,5 @@ def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms
 
 
 def encoded(content: bytes) -> str:
-    """PEM as zenoh takes it where there is no file."""
+    """Return PEM as zenoh accepts it without a file."""
     return base64.b64encode(content).decode()

@@ -1,4 +1,4 @@
-"""The zenoh configuration of every process of a run, and of sessions with a ROS 2.
+"""The zenoh configuration of every process of a run, and of sessions with ROS 2.
 
 It imports little, so that the router starts fast.
 """
@@ -18,13 +18,13 @@ RX_BYTES = 32 * 2**20
 def config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
     """Return a configuration of zenoh with `settings`, and without discovery or other listeners.
 
-    What these do not say is as `file` has it, or zenoh's default.
+    Other settings are taken from `file`, or are zenoh's defaults.
     """
     made = zenoh.Config() if file is None else zenoh.Config.from_file(file)
     common = {
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
-        "scouting/delay": 0,  # a router that may not look for others would still wait half a second for them
+        "scouting/delay": 0,  # without scouting, a router would still wait half a second for others
         "transport/link/rx/max_message_size": RX_BYTES,
         "transport/shared_memory/enabled": False,
     }

@@ -53,8 +53,8 @@ def test_what_was_not_asked_for_is_a_fault_and_of_another_epoch_it_is_nothing() 
         (has(9), "it has reported values that it cannot have"),
         (Snapshot(0, 1, {"x1": 1, "x2": 2}, 0, NOTHING), "it has reported a value of x2, which is B's"),
         (has(1, lost=-1), "it has reported counts that cannot be"),
-        (has(1, findings=Findings(bound=-1)), "it tells of costs that cannot be"),
-        (has(1, findings=Findings(best=Incumbent(1, {"C": (1,)}))), "it tells of a robot that is not of the team"),
+        (has(1, findings=Findings(bound=-1)), "it has reported impossible costs"),
+        (has(1, findings=Findings(best=Incumbent(1, {"C": (1,)}))), "it has reported a robot that is not in the team"),
     ],
 )
 def test_what_a_robot_across_machines_cannot_have_is_refused(said: Snapshot, fault: str) -> None:

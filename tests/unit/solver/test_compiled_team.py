@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.profile import among, profile_of, ranges_of
+from robochoc.communication.network.profile import profile_of, ranges_of, restrict_to_team
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
@@ -163,7 +163,7 @@ def test_who_shows_more_than_its_file_says_means_what_others_read() -> None:
     """The master lists what was asked for last, wherever it stands in the file."""
     team = untold_interface()
     task = all_shown(team).tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["A"]
-    own = CompiledRobot(team["A"]).relinked(among(team["A"], task.interfaces))
+    own = CompiledRobot(team["A"]).relinked(restrict_to_team(team["A"], task.interfaces))
     assert own.robot.interface == task.interfaces["A"] == ("y", "x")
     assert own.domain.values[0] == (7, 1)
     assert lined_up(CompiledTeam(Team("A", (own.robot,))))
@@ -183,7 +183,7 @@ def test_who_is_left_shows_what_it_showed_and_keeps_its_place() -> None:
         left = keep_interfaces(without_robots(team, gone), team)
         for name, task in members.tasks(2, "abt", Traits(), DEFAULT_PARAMETERS).items():
             assert task.interfaces == {robot.name: robot.interface for robot in left.robots}
-            assert among(team[name], task.interfaces).interface == left[name].interface
+            assert restrict_to_team(team[name], task.interfaces).interface == left[name].interface
 
 
 def test_an_order_does_not_change_when_somebody_is_lost() -> None:
