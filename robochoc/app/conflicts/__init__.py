@@ -1,1 +1,1 @@
-"""Which rules are in each other's way: a minimal set of rules that cannot hold together, without the web."""
+"""Conflicts: minimal sets of rules that cannot be satisfied together. This package does not use NiceGUI."""

@@ -1,6 +1,6 @@
-"""A conflict by CPMpy (https://cpmpy.readthedocs.io): a minimal unsatisfiable subset over assumptions, one a rule.
+"""A conflict by CPMpy (https://cpmpy.readthedocs.io): a minimal unsatisfiable subset, with one assumption per rule.
 
-Imported by the process of a search for conflicts alone: CPMpy and its solver take their memory and their time.
+Only the process of a search for conflicts imports this module, since CPMpy and its solver need much time and memory.
 """
 
 from __future__ import annotations
@@ -20,42 +20,45 @@ from robochoc.model.expression import Constant as Integer
 from robochoc.model.problem import INFINITE, Team
 
 MOST_ROWS = 2_000_000
-"""A table that would be longer is too large."""
+"""The maximum number of rows of a table."""
 
 
 FEW = 8
-"""Up to so many rules are left out in turn, each time from the beginning: a solver simplifies more without assumptions.
-With more, all are assumptions of one model, and the solver says which of them it has used."""
+"""Up to this number of rules, each subset is a new model: a solver simplifies more without assumptions. With more
+rules, all are assumptions of one model, and the solver reports which of them it has used."""
 
 
 class UntranslatedError(ValueError):
-    """A rule is none that CPMpy is told here."""
+    """A rule cannot be translated to CPMpy here."""
 
 
 def minimal_by_cpmpy(sketch: Sketch, rules: Sequence[str]) -> tuple[str, ...] | None:
-    """Return rules that cannot hold together, but without any one of them they can; None: all can.
+    """Return a minimal set of rules that cannot be satisfied together; None if all rules can.
 
     Raises:
-        ImportError: if CPMpy, or its solver OR-Tools, is not installed.
-        UntranslatedError: if a rule is none that CPMpy is told here.
+        ImportError: if CPMpy or its solver OR-Tools is not installed.
+        UntranslatedError: if a rule cannot be translated.
     """
     team = model_of(with_only(sketch, rules)).team
     problem = _Problem(team)
-    said = {rule: parts for rule in rules if (parts := _as_a_whole(sketch, rule, problem.variables))}
-    whole = frozenset(said)
+    translated = {rule: parts for rule in rules if (parts := _global_constraint(sketch, rule, problem.variables))}
+    done = frozenset(translated)
     for constraint in team.constraints():
         rule = rule_of(constraint.name, rules)
         if rule is None:
             raise UntranslatedError(constraint.name)
-        if rule not in whole:
-            said.setdefault(rule, []).append(problem.said(constraint))
-    return problem.minimal({rule: said[rule] for rule in rules if rule in said})
+        if rule not in done:
+            translated.setdefault(rule, []).append(problem.translated(constraint))
+    return problem.minimal({rule: translated[rule] for rule in rules if rule in translated})
 
 
 def minimal_of_team(team: Team, constraints: Mapping[str, Constraint]) -> tuple[str, ...] | None:
-    """Return constraints of a team, by their names here, that cannot hold together. As `minimal_by_cpmpy`."""
+    """Return a minimal set of constraints of a team that cannot be satisfied together, by their names here.
+
+    Raises as `minimal_by_cpmpy`.
+    """
     problem = _Problem(team)
-    return problem.minimal({name: [problem.said(one)] for name, one in constraints.items()})
+    return problem.minimal({name: [problem.translated(constraint)] for name, constraint in constraints.items()})
 
 
 class _Problem:
@@ -73,34 +76,34 @@ class _Problem:
         }
         self._hard = [cpmpy.InDomain(self.variables[name], values) for name, values in self._domains.items()]
 
-    def said(self, constraint: Constraint) -> Any:  # noqa: ANN401 - CPMpy's
-        """Return a constraint. Raises `UntranslatedError`."""
-        if can_be_undefined(constraint, self._limits):  # what is undefined forbids, here, but not in CPMpy
+    def translated(self, constraint: Constraint) -> Any:  # noqa: ANN401 - CPMpy's
+        """Return a constraint for CPMpy. Raises `UntranslatedError`."""
+        if can_be_undefined(constraint, self._limits):  # undefined values are forbidden here, but not in CPMpy
             return _table(constraint, self.variables, self._domains)
-        return _said(constraint, self.variables, self._domains)
+        return _translated_constraint(constraint, self.variables, self._domains)
 
-    def minimal(self, said: Mapping[str, list[Any]]) -> tuple[str, ...] | None:
-        """Return some of these rules that cannot hold together, but without any one they can; None: all can."""
+    def minimal(self, rules: Mapping[str, list[Any]]) -> tuple[str, ...] | None:
+        """Return a minimal subset of rules that cannot be satisfied together; None if all rules can."""
         import cpmpy  # noqa: PLC0415 - an extra
         from cpmpy.tools.explain import mus  # noqa: PLC0415 - the same
 
         hard = [*self._hard]
-        softs = {rule: cpmpy.all(parts) for rule, parts in said.items()}
+        softs = {rule: cpmpy.all(parts) for rule, parts in rules.items()}
         if len(softs) <= FEW:
             return minimal(
                 [*softs], lambda some: cpmpy.Model(hard, *(softs[one] for one in some)).solve(solver="ortools")
             )
         if cpmpy.Model(hard, *softs.values()).solve(solver="ortools"):
             return None
-        # Each rule is one Boolean, so that it stays whole.
+        # Each rule is one Boolean, so that it is used as a whole.
         marks = {rule: cpmpy.boolvar(name=f"rule {rule}") for rule in softs}
         hard += [mark.implies(softs[rule]) for rule, mark in marks.items()]
         found = {str(one) for one in mus([*marks.values()], hard=hard, solver="ortools")}
         return tuple(rule for rule, mark in marks.items() if str(mark) in found)
 
 
-def _as_a_whole(sketch: Sketch, name: str, variables: dict[str, Any]) -> list[Any]:
-    """Return a rule that is one global constraint: that all are different. Empty: it is another one."""
+def _global_constraint(sketch: Sketch, name: str, variables: dict[str, Any]) -> list[Any]:
+    """Return the AllDifferent constraint of a rule; empty for other rules."""
     import cpmpy  # noqa: PLC0415 - an extra
 
     rule = sketch.rule(name)
@@ -110,7 +113,7 @@ def _as_a_whole(sketch: Sketch, name: str, variables: dict[str, Any]) -> list[An
 
 
 def _table(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
-    """Return a constraint as all that it allows, tried out."""
+    """Return a constraint as the table of allowed values, by enumeration."""
     import cpmpy  # noqa: PLC0415 - an extra
 
     rows = []
@@ -122,13 +125,13 @@ def _table(constraint: Constraint, variables: dict[str, Any], domains: dict[str,
     return cpmpy.Table([variables[name] for name in constraint.variables], rows) if rows else cpmpy.BoolVal(False)
 
 
-def _said(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
+def _translated_constraint(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
     import cpmpy  # noqa: PLC0415 - an extra
 
     definition = constraint.definition
     if isinstance(definition, Relation):
         return _table(constraint, variables, domains)
-    if isinstance(definition, Function):  # it only costs
+    if isinstance(definition, Function):  # a soft constraint
         return cpmpy.BoolVal(True)
     actual = [variables[one] if isinstance(one, str) else one for one in constraint.parameters]
     return _translated(definition.body, dict(zip(definition.parameters, actual, strict=True)))

@@ -1,4 +1,4 @@
-"""Which constraints of a team of files are in each other's way; they are told in words."""
+"""A conflict between the constraints of an imported team, in words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from robochoc.app.conflicts.by_cpmpy import UntranslatedError, minimal_of_team
 from robochoc.app.conflicts.found import Conflict, Finder
 from robochoc.app.conflicts.rules import minimal
-from robochoc.app.conflicts.time_left import OutOfTimeError, can_hold
+from robochoc.app.conflicts.time_left import OutOfTimeError, is_satisfiable
 from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.app.foreign.sentences import sentence
 from robochoc.app.log import log_error
@@ -23,36 +23,37 @@ from robochoc.model.problem import Robot, Team
 
 
 def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
-    """Return the conflict in the team whose files are in `folder`, after so many events of its scenario.
+    """Return the conflict in the team with files in `folder`, after a number of `events` of its scenario.
 
-    It is found by CPMpy where that is installed, else by our own central solver. Raises `InvalidInputError`.
+    CPMpy is used if it is installed, else robochoc's central solver. Raises `InvalidInputError`.
     """
     team = team_after_events(read_team(folder), events)
-    held = [*_held(team)]
+    owned = [*_owned_constraints(team)]
     limits = limits_of(team)
-    forbidding = [str(number) for number, (_, one) in enumerate(held) if _forbids(one, limits)]
+    forbidding = [str(number) for number, (_, constraint) in enumerate(owned) if _forbids(constraint, limits)]
     until = time.monotonic() + seconds
 
-    def told(rules: Sequence[str] | None, finder: Finder) -> Conflict:
-        owners = [held[int(rule)] for rule in rules or ()]
-        words = tuple(f"{robot.name}: {_words(robot, one)}" for robot, one in owners)
+    def conflict_of(rules: Sequence[str] | None, finder: Finder) -> Conflict:
+        found = [owned[int(rule)] for rule in rules or ()]
+        words = tuple(f"{robot.name}: {_words(robot, constraint)}" for robot, constraint in found)
         return Conflict(None if rules is None else tuple(rules), finder, words=words)
 
     if use_cpmpy:
         try:
-            return told(minimal_of_team(team, {rule: held[int(rule)][1] for rule in forbidding}), Finder.CPMPY)
+            return conflict_of(minimal_of_team(team, {rule: owned[int(rule)][1] for rule in forbidding}), Finder.CPMPY)
         except (ImportError, UntranslatedError):
             pass
-        except Exception as fault:  # noqa: BLE001 - kept; numbers that are too large for its solver, say
+        except Exception as fault:  # noqa: BLE001 - logged; for example, numbers that are too large for the solver
             log_error(fault, "a conflict by CPMpy")
     try:
-        return told(minimal(forbidding, lambda some: can_hold(with_only(team, {*map(int, some)}), until)), Finder.OWN)
+        rules = minimal(forbidding, lambda some: is_satisfiable(with_only(team, {*map(int, some)}), until))
+        return conflict_of(rules, Finder.OWN)
     except OutOfTimeError:
         return Conflict(None, Finder.OWN, late=True)
 
 
 def with_only(team: Team, kept: Collection[int]) -> Team:
-    """Return a team with these of its constraints alone, which are numbered in the order of `Team.constraints`."""
+    """Return a team with only the constraints of these numbers, in the order of `Team.constraints`."""
     numbers = iter(range(sum(1 for _ in team.constraints())))
 
     def some(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -67,7 +68,7 @@ def with_only(team: Team, kept: Collection[int]) -> Team:
     return replace(team, robots=tuple(robots))
 
 
-def _held(team: Team) -> Iterator[tuple[Robot, Constraint]]:
+def _owned_constraints(team: Team) -> Iterator[tuple[Robot, Constraint]]:
     for robot in team.robots:
         for constraint in robot.constraints():
             yield robot, constraint
@@ -79,7 +80,7 @@ def _words(robot: Robot, constraint: Constraint) -> str:
 
 
 def _forbids(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
-    """Return whether a constraint can be in the way: one that only costs cannot, unless it is undefined somewhere."""
+    """Return whether a constraint can be part of a conflict: it forbids values, or is undefined for some values."""
     definition = constraint.definition
     if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
         return INFINITE in (*definition.costs, definition.default_cost)

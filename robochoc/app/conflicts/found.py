@@ -1,4 +1,4 @@
-"""Which rules of a sketch are in each other's way: the search is a process of its own, and ends in time."""
+"""The search for a conflict between the rules of a team, in a separate process with a time limit."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from robochoc.app.log import error_text
 from robochoc.app.sketch.sketch import Sketch
 
 PATIENCE_S = 30.0
-"""The search is given so long."""
+"""The time limit of a search."""
 _GRACE_S = 5.0
-"""Its process needs so long to begin, and to tell."""
+"""The additional time for the start of the process and for its output."""
 _PROCESS = "robochoc.app.conflicts.process"
 
 
@@ -30,15 +30,15 @@ class Finder(StrEnum):
 
 
 class Conflict(msgspec.Struct, frozen=True):
-    """The result of a search for rules that cannot hold together.
+    """The result of a search for rules that cannot be satisfied together.
 
     Attributes:
-        rules: The ids of rules that cannot hold together; any proper subset of them can. Empty: the decisions
-            themselves have no values. None: all rules can hold together, or nothing was found in time.
-        finder: The tool that has found it.
-        late: Whether the time was over before.
-        why: Why the search has failed; empty if it has not.
-        words: What the constraints of files say that cannot hold together.
+        rules: The ids of a minimal set of rules that cannot be satisfied together. Empty: a decision has no values.
+            None: all rules can be satisfied together, or nothing was found in time.
+        finder: The tool that has found the conflict.
+        late: Whether the time limit was reached.
+        why: The error of a failed search; else empty.
+        words: The conflicting constraints of an imported team, in words.
     """
 
     rules: tuple[str, ...] | None
@@ -48,47 +48,47 @@ class Conflict(msgspec.Struct, frozen=True):
     words: tuple[str, ...] = ()
 
 
-class FilesAsked(NamedTuple):
-    """A team of files: their folder, and how many events of its scenario have happened."""
+class TeamOfFiles(NamedTuple):
+    """An imported team: the folder of its files, and the number of past events of its scenario."""
 
     folder: Path
     events: int = 0
 
 
 class ConflictSearch:
-    """A search, which begins at once. `found` has what it finds; `end` ends it.
+    """A search, which starts immediately. `found` waits for the result; `end` ends the search.
 
     Args:
         asked: The team.
-        seconds: The search is given so long.
-        folder: The team's folder: the search ends when that is removed.
+        seconds: The time limit.
+        folder: The team's folder: the search ends when it is removed.
     """
 
-    def __init__(self, asked: Sketch | FilesAsked, seconds: float = PATIENCE_S, *, folder: Path | None = None) -> None:
+    def __init__(self, asked: Sketch | TeamOfFiles, seconds: float = PATIENCE_S, *, folder: Path | None = None) -> None:
         self._asked, self._seconds = asked, seconds
         self._job = Job("conflict search", self._search, folder=folder).start()
 
     @property
     def pid(self) -> int | None:
-        """Its process, while there is one."""
+        """The id of its process, while there is one."""
         return self._job.pid
 
     def result(self) -> Conflict | None:
-        """Wait for what it finds. None: it was ended."""
-        return _told(self._job.future.result)
+        """Wait for the result; None if the search was ended."""
+        return _conflict(self._job.future.result)
 
     async def found(self) -> Conflict | None:
-        """Wait for what it finds. None: it was ended."""
+        """Wait for the result; None if the search was ended."""
         await asyncio.wait([asyncio.wrap_future(self._job.future)])
         return self.result()
 
     def end(self) -> None:
-        """End it."""
+        """End the search."""
         self._job.end()
 
     def _search(self, job: Job[Conflict]) -> Conflict:
         asked = self._asked
-        if isinstance(asked, FilesAsked):
+        if isinstance(asked, TeamOfFiles):
             arguments = (str(self._seconds), str(asked.folder), str(asked.events))
             command = Command(arguments, module=_PROCESS)
         else:
@@ -102,10 +102,10 @@ class ConflictSearch:
         return msgspec.json.decode(finished.out, type=Conflict)
 
 
-def _told(result: Callable[[], Conflict]) -> Conflict | None:
+def _conflict(result: Callable[[], Conflict]) -> Conflict | None:
     try:
         return result()
     except EndedError:
         return None
-    except Exception as fault:  # noqa: BLE001 - the file of errors has it already
+    except Exception as fault:  # noqa: BLE001 - already in the error log
         return Conflict(None, why=error_text(fault))

@@ -1,4 +1,4 @@
-"""Whether a team has a solution, by our own central solver, until the time is over."""
+"""Satisfiability of a team by robochoc's central solver, within a time limit."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from robochoc.run.orchestrator import solve
 
 
 class OutOfTimeError(Exception):
-    """The time was over."""
+    """The time limit was reached."""
 
 
-def can_hold(team: Team, until: float) -> bool:
-    """Return whether all constraints of a team can hold together. Raises `OutOfTimeError` at `until` (monotonic)."""
+def is_satisfiable(team: Team, until: float) -> bool:
+    """Return whether a team has a solution. Raises `OutOfTimeError` at the time `until` (monotonic clock)."""
     left = until - time.monotonic()
     if left <= 0:
         raise OutOfTimeError

@@ -1,4 +1,4 @@
-"""Which constraints may be undefined for some values: a division by zero forbids these values, also where it costs."""
+"""Constraints that may be undefined for some values: a division by zero forbids them, even in a soft constraint."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from robochoc.model.problem import Team
 
 
 def limits_of(team: Team) -> dict[str, Interval]:
-    """Return the least and the greatest value of each variable that has some."""
+    """Return the minimum and maximum value of each variable with values."""
     domains = {name: one.domain.ranges for name, one in team.variables.items()}
     return {name: Interval(ranges[0][0], ranges[-1][-1]) for name, ranges in domains.items() if ranges}
 
 
 def can_be_undefined(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
-    """Return whether a constraint may have no value somewhere. It is never missed, but may be told without need.
+    """Return whether a constraint may be undefined for some values; the result may be a false positive.
 
     Args:
         constraint: The constraint.
-        limits: What `limits_of` returns for its team. A constraint on a variable without values is defined.
+        limits: The result of `limits_of` for its team. A constraint on a variable without values is defined.
     """
     definition = constraint.definition
     if isinstance(definition, Relation) or not limits.keys() >= {*constraint.variables}:
@@ -39,4 +39,4 @@ def _can_be(expression: Expression, limits: Mapping[str, Interval]) -> bool:
     if operator in {"div", "mod"}:
         divisor = bounds(arguments[1], limits)
         return divisor.low <= 0 <= divisor.high
-    return False  # results beyond 64 bits are refused when a team is read (`model/magnitudes.py`)
+    return False  # results beyond 64 bits are rejected when a team is read (`model/magnitudes.py`)

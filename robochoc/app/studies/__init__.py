@@ -1,1 +1,1 @@
-"""Studies: protocols are compared on a team, or on a family of problems like it, in a process of its own."""
+"""Studies: comparisons of protocols on a team or on a similar family of problems, in a separate process."""

@@ -1,4 +1,4 @@
-"""The family of random problems that is most like a sketch: as many robots, values and links."""
+"""The family of random problems that is most similar to a sketch: equal numbers of robots, values and links."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
 
 Option = int | float | str | list[int] | list[float]
-_MOST_LOOKED_AT = 60
-"""Values of which all pairs are looked at; of more, so many of them, evenly spread."""
+_MOST_SAMPLED = 60
+"""The maximum number of values whose pairs are all checked; of more values, this number is sampled evenly."""
 _COLOURINGS = frozenset({"different", "neighbours-different"})
 _STEP = 0.1
 _LEAST, _MOST = 0.02, 0.9
@@ -26,10 +26,10 @@ class Family(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Its name.
-        options: Its options, as a study says them. Lists stand for each of their values.
-        key: The key of its words in the catalogue.
-        named: What the words name.
-        points: How many kinds of problems it has.
+        options: Its options in the form of a study; a list means each of its values.
+        key: The key of its description in the catalogue.
+        named: The arguments of the description.
+        points: The number of combinations of its options.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Family(msgspec.Struct, frozen=True):
 
 
 def family_of(sketch: Sketch) -> Family | None:
-    """Return the family that is most like a sketch. None: there is none, without links between two robots."""
+    """Return the family that is most similar to a sketch; None if there is none, for example without links."""
     if len(sketch.decisions) != 1 or len(sketch.robots) < _PAIR:
         return None
     (decision,) = sketch.decisions
@@ -89,11 +89,11 @@ def _random(sketch: Sketch, values: tuple[Value, ...], linked: dict[frozenset[st
 
 
 _Turned = tuple[SketchRule, bool]
-"""A rule of two robots, and whether it has them in the other order than that of their names."""
+"""A rule of two robots, and whether their order in the rule is the reverse of that of their names."""
 
 
 def _linked(sketch: Sketch, rules: list[SketchRule]) -> dict[frozenset[str], list[_Turned]]:
-    """Return the rules between every two robots that share some."""
+    """Return the rules between each pair of robots with a common rule."""
     found: dict[frozenset[str], list[_Turned]] = {}
     for rule, (one, other) in _pairs(sketch, rules):
         found.setdefault(frozenset((one, other)), []).append((rule, one > other))
@@ -108,7 +108,7 @@ def _pairs(sketch: Sketch, rules: list[SketchRule]) -> Iterator[tuple[SketchRule
 
 
 def _forbidden(sketch: Sketch, values: list[Value], said: list[_Turned]) -> float:
-    """Return the share of pairs of values that rules forbid which must hold."""
+    """Return the share of pairs of values that hard rules forbid."""
     hard = [(PALETTE[rule.kind], Applied(sketch, rule), turned) for rule, turned in said if rule.cost is None]
     kept = sum(
         all(entry.holds(given, pair[::-1] if turned else pair) for entry, given, turned in hard)
@@ -118,7 +118,7 @@ def _forbidden(sketch: Sketch, values: list[Value], said: list[_Turned]) -> floa
 
 
 def _spread(values: tuple[Value, ...]) -> list[Value]:
-    step = max(1, -(-len(values) // _MOST_LOOKED_AT))
+    step = max(1, -(-len(values) // _MOST_SAMPLED))
     return [*values[::step]]
 
 

@@ -1,4 +1,4 @@
-"""What is compared, and the study that says so: a TOML file of `robochoc experiment` (docs/guides/experiments.md)."""
+"""The question of a study, and its TOML file for `robochoc experiment` (docs/guides/experiments.md)."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from robochoc.run.options import Options, Runtime
 MOST_RUNS = 100
 MOST_SECONDS = 600
 _COMMON = ("afc-ng", "abt", "sfb", "dpop", "afb")
-"""Protocols that are chosen beside what `auto` takes, the first that fits."""
+"""The candidates for the second protocol, besides the choice of `auto`."""
 
 
 class Question(msgspec.Struct, frozen=True):
-    """What is asked.
+    """The question of a study.
 
     Attributes:
-        protocols: The protocols, two at least.
-        family: Whether the problems are of the family that is most like the team. Else it is the team.
-        runs: Runs of each protocol, or problems of each kind.
-        timeout: The limit of a run in seconds.
-        ordered: Whether the team's own order is kept: a partially known constraint says who of two asks.
+        protocols: The protocols, at least two.
+        family: Whether the problems are of the most similar family, or the team's problem.
+        runs: The number of runs of each protocol, or of problems of each kind.
+        timeout: The time limit of a run in seconds.
+        ordered: Whether the team's order is used: a partially known constraint determines which of two robots asks.
     """
 
     protocols: tuple[str, ...]
@@ -42,14 +42,14 @@ class Question(msgspec.Struct, frozen=True):
 
 
 class Possible(msgspec.Struct, frozen=True):
-    """What can be compared on a team.
+    """The possible questions for a team.
 
     Attributes:
-        protocols: The protocols that fit, complete ones first, and whether each is complete.
-        usual: Two of them to begin with.
+        protocols: The suitable protocols, complete ones first, and whether each is complete.
+        usual: Two of them, chosen at first.
         costs: Whether there are costs.
-        family: The family most like it, if there is one.
-        ordered: Whether its order cannot be another one.
+        family: The most similar family, if there is one.
+        ordered: Whether the team's order is fixed.
     """
 
     protocols: tuple[tuple[str, bool], ...]
@@ -60,10 +60,10 @@ class Possible(msgspec.Struct, frozen=True):
 
 
 def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
-    """Return what can be compared on the team of a sketch, or of files.
+    """Return the possible questions for the team of a sketch, or of files.
 
     Raises:
-        NotReadyError: for a sketch that is no team yet.
+        NotReadyError: for an incomplete sketch.
         InvalidInputError: if the files are damaged.
     """
     team = team_of(sketch, files)
@@ -79,24 +79,24 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
 
 
 def folder_of(sketch: Sketch) -> str:
-    """Return the name of the team's folder beside a study."""
+    """Return the name of the team's folder in the folder of a study."""
     return sketch.name if is_name(sketch.name) and len(sketch.name) <= MAX_LABEL else "team"
 
 
 def number_of_runs(question: Question, family: Family | None) -> int:
-    """Return how many runs there are in all."""
+    """Return the total number of runs."""
     kinds = family.points if question.family and family else 1
     return len(question.protocols) * question.runs * kinds
 
 
 def title_of(sketch: Sketch, question: Question) -> str:
-    """Return what heads the report."""
+    """Return the title of the report."""
     key = "compare.title-family" if question.family else "compare.title-team"
     return say(key, protocols=listed(question.protocols), team=folder_of(sketch))
 
 
 def study_of(sketch: Sketch, question: Question, family: Family | None) -> str:
-    """Return the study, as the text of its file."""
+    """Return the TOML text of the study."""
     seeds = f"1..{question.runs}"
     runs: dict[str, object] = {"protocol": [*question.protocols]}
     if question.family and family:

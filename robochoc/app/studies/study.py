@@ -1,4 +1,4 @@
-"""A study that is carried out: `robochoc experiment run` and `report`, each a process, in a folder of the team."""
+"""The execution of a study: processes of `robochoc experiment run` and `report`, in a folder of the team."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _FINISHED = frozenset({Status.DONE, Status.ENDED})
 
 
 class Stage(StrEnum):
-    """How far a study is."""
+    """The stage of a study."""
 
     PREPARING = "preparing"
     RUNNING = "running"
@@ -51,7 +51,7 @@ ENDED = frozenset({Stage.DONE, Stage.STOPPED, Stage.FAILED})
 
 
 class Line(msgspec.Struct, frozen=True):
-    """What a protocol needed: medians of all of its runs, and how many of them came to an end in time."""
+    """The results of a protocol: medians of its runs, and the number of runs that ended in time."""
 
     protocol: str
     runs: int
@@ -62,8 +62,8 @@ class Line(msgspec.Struct, frozen=True):
     cost: float | None = None
 
 
-class Facts(msgspec.Struct):
-    """What is known of a study. `lines`: what each protocol needed."""
+class StudyState(msgspec.Struct):
+    """The state of a study, with the results of each protocol in `lines`."""
 
     question: Question
     text: str
@@ -75,7 +75,7 @@ class Facts(msgspec.Struct):
 
 
 class Study:
-    """The study of a team: there is one at a time, and the last one is kept."""
+    """The study of a team: one at a time; the last one is saved."""
 
     def __init__(self, project: Project) -> None:
         self._folder = project.folder / "study"
@@ -86,7 +86,7 @@ class Study:
 
     @property
     def running(self) -> bool:
-        """Whether it is carried out at present."""
+        """Whether the study is running."""
         return self.facts is not None and self.facts.stage not in ENDED
 
     @property
@@ -96,67 +96,67 @@ class Study:
         return file if self.facts and self.facts.stage == Stage.DONE and file.is_file() else None
 
     def start(self, sketch: Sketch, question: Question, files: TeamFiles | None = None) -> None:
-        """Begin, on the team of a sketch or of files. Of runs that are the same as before, the rows are kept."""
+        """Start a study of the team of a sketch or of files. Results of equal earlier runs are reused."""
         if self.running:
             return
         family = family_of(sketch) if question.family else None
         text = study_of(sketch, question, family)
-        facts = self.facts = Facts(question, text, number_of_runs(question, family))
+        facts = self.facts = StudyState(question, text, number_of_runs(question, family))
         self._call = event_loop_caller()
         self._job = Job(
             f"study {self._folder}",
-            partial(self._carry_out, sketch, files, facts),
-            over=partial(self._broken_off, facts),
+            partial(self._work, sketch, files, facts),
+            over=partial(self._interrupted, facts),
             folder=self._folder,
             stopping=_STOPPING,
         ).start()
-        self._tell()
+        self._notify()
 
     def stop(self) -> None:
-        """Ask it to stop. What is there is kept."""
+        """Request a stop. Existing results are retained."""
         if self._job:
             self._job.stop()
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` when there is news; return what ends that."""
+        """Call `callback` after each change; return a function that removes it."""
         return self._listeners.add(callback)
 
-    def _carry_out(self, sketch: Sketch, files: TeamFiles | None, facts: Facts, job: Job[None]) -> None:
+    def _work(self, sketch: Sketch, files: TeamFiles | None, facts: StudyState, job: Job[None]) -> None:
         try:
             self._prepare(sketch, files, facts)
             if not self._is_stopped(job, facts):
                 self._run(facts, job)
         except (ModelError, InvalidInputError, ValueError, sqlite3.Error) as error:
-            self._become(facts, Stage.FAILED, str(error))
+            self._set_stage(facts, Stage.FAILED, str(error))
 
-    def _run(self, facts: Facts, job: Job[None]) -> None:
-        self._become(facts, Stage.RUNNING)
+    def _run(self, facts: StudyState, job: Job[None]) -> None:
+        self._set_stage(facts, Stage.RUNNING)
         finished = self._command(job, "run", STUDY, "-o", ROWS)
         facts.done = self._rows()
         if self._is_stopped(job, facts):
             return
         if finished.status:
-            self._become(facts, Stage.FAILED, _said(finished))
+            self._set_stage(facts, Stage.FAILED, _error_of(finished))
             return
-        self._become(facts, Stage.REPORTING)
+        self._set_stage(facts, Stage.REPORTING)
         facts.lines = lines_of(self._folder / ROWS, facts.question.protocols)
         (self._folder / REPORT).unlink(missing_ok=True)
         reported = self._command(job, "report", ROWS, "-o", REPORT)
         if not self._is_stopped(job, facts):
-            self._become(facts, Stage.DONE, _said(reported) if reported.status else "")
+            self._set_stage(facts, Stage.DONE, _error_of(reported) if reported.status else "")
 
-    def _is_stopped(self, job: Job[None], facts: Facts) -> bool:
-        """Return whether somebody has stopped it; say so, then."""
+    def _is_stopped(self, job: Job[None], facts: StudyState) -> bool:
+        """Return whether the study was stopped; if so, set its stage."""
         stopped = job.stopped_at is not None
         if stopped:
-            self._become(facts, Stage.STOPPED)
+            self._set_stage(facts, Stage.STOPPED)
         return stopped
 
-    def _broken_off(self, facts: Facts, why: str) -> None:
-        self._become(facts, Stage.FAILED if why else Stage.STOPPED, why)
+    def _interrupted(self, facts: StudyState, why: str) -> None:
+        self._set_stage(facts, Stage.FAILED if why else Stage.STOPPED, why)
 
-    def _prepare(self, sketch: Sketch, files: TeamFiles | None, facts: Facts) -> None:
-        self._folder.mkdir(mode=0o700, exist_ok=True)  # not its parents: the team was removed if they are not there
+    def _prepare(self, sketch: Sketch, files: TeamFiles | None, facts: StudyState) -> None:
+        self._folder.mkdir(mode=0o700, exist_ok=True)  # without parents: if they do not exist, the team was removed
         if files:
             write_team(read_team(files.folder), self._folder / folder_of(sketch), replace=True)
         elif not facts.question.family:
@@ -164,19 +164,19 @@ class Study:
         (self._folder / STUDY).write_text(facts.text, encoding="utf-8")
 
     def _command(self, job: Job[None], *arguments: str) -> Finished:
-        """Carry out `robochoc experiment`."""
+        """Run `robochoc experiment`."""
         errors = self._folder / _ERRORS
-        return job.run(Command(("experiment", *arguments), self._folder, errors=errors), self._look)
+        return job.run(Command(("experiment", *arguments), self._folder, errors=errors), self._update)
 
-    def _look(self) -> None:
-        """Look how far it is."""
+    def _update(self) -> None:
+        """Update the number of completed runs."""
         done = self._rows()
         if self.facts and done != self.facts.done:
             self.facts.done = done
-            self._tell()
+            self._notify()
 
     def _rows(self) -> int:
-        """Return how many of the study's runs are there."""
+        """Return the number of completed runs."""
         file = self._folder / ROWS
         if not file.is_file():
             return 0
@@ -184,46 +184,46 @@ class Study:
             with _opened(file) as rows:
                 (found,) = rows.execute("SELECT count(*) FROM results").fetchone()
                 return int(found)
-        except sqlite3.Error:  # it is being made
+        except sqlite3.Error:  # the file is being created
             return self.facts.done if self.facts else 0
 
-    def _become(self, facts: Facts, stage: Stage, message: str = "") -> None:
+    def _set_stage(self, facts: StudyState, stage: Stage, message: str = "") -> None:
         if facts.stage in ENDED:
             return
         facts.message, facts.stage = message, stage
         if stage in ENDED:
             with suppress(OSError):
                 (self._folder / _STATE).write_bytes(msgspec.json.encode(facts))
-        self._tell()
+        self._notify()
 
-    def _last(self) -> Facts | None:
+    def _last(self) -> StudyState | None:
         try:
-            return msgspec.json.decode((self._folder / _STATE).read_bytes(), type=Facts)
+            return msgspec.json.decode((self._folder / _STATE).read_bytes(), type=StudyState)
         except (OSError, msgspec.DecodeError, RecursionError):
             return None
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self._call(self._listeners)
 
 
-def _said(finished: Finished) -> str:
+def _error_of(finished: Finished) -> str:
     return " ".join(finished.why.split())[-_MAX_MESSAGE:]
 
 
 def lines_of(file: Path, protocols: Sequence[str]) -> list[Line]:
-    """Return what each protocol needed, in the order in which they were asked for."""
-    asked = "SELECT status, messages, ncccs, bytes, cost FROM results WHERE protocol = ?"
+    """Return the results of each protocol, in the order of the question."""
+    query = "SELECT status, messages, ncccs, bytes, cost FROM results WHERE protocol = ?"
     found = []
     with _opened(file) as rows:
         for protocol in protocols:
-            of_it = rows.execute(asked, [protocol]).fetchall()
-            counted = [row for row in of_it if None not in row[1:4]]
+            own = rows.execute(query, [protocol]).fetchall()
+            counted = [row for row in own if None not in row[1:4]]
             if counted:
                 messages, ncccs, sent = (median(column) for column in [*zip(*counted, strict=True)][1:4])
                 costs = [float(row[4]) for row in counted if row[4] is not None]
-                finished = sum(row[0] in _FINISHED for row in of_it)
+                finished = sum(row[0] in _FINISHED for row in own)
                 cost = median(costs) if costs else None
-                found.append(Line(protocol, len(of_it), finished, messages, ncccs, sent, cost))
+                found.append(Line(protocol, len(own), finished, messages, ncccs, sent, cost))
     return found
 
 
@@ -234,5 +234,5 @@ def _opened(file: Path) -> Iterator[sqlite3.Connection]:
 
 
 def study_on(project: Project) -> Study:
-    """Return the study of a team, the same object for all pages that show it."""
+    """Return the study of a team; the same object for all pages."""
     return project.part(Study)

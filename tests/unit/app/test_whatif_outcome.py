@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.app.pages.whatif.outcome import Fate, outcome, part_of, parts_of_epochs
+from robochoc.app.pages.whatif.outcome import Fate, compare, part_of, parts_of_epochs
 from robochoc.app.runs.result import RunResult
 from robochoc.app.sketch.changes import AnyChange, Battery, Blocked, Fails, Joins, changed
 from robochoc.app.sketch.differences import changing_model
@@ -32,7 +32,7 @@ def test_robots_stay_move_leave_and_come() -> None:
     )
     parts = parts_of_epochs(TEAM, after, changing_model(TEAM, after), said)
     assert parts is not None
-    found = outcome((TEAM, parts[0]), (after, parts[1]), said.protocol)
+    found = compare((TEAM, parts[0]), (after, parts[1]), said.protocol)
     assert [(row.robot, row.before, row.after, row.fate) for row in found.rows] == [
         ("A", "two words", "", Fate.LEFT),
         ("B", "wash", "wash", Fate.SAME),
@@ -47,7 +47,7 @@ def test_without_a_solution_nobody_has_moved() -> None:
         TEAM, TEAM, changing_model(TEAM, TEAM), result(("solution", {"A.task": "wash"}, 1), ("no-solution", {}, 2))
     )
     assert parts is not None
-    found = outcome((TEAM, parts[0]), (TEAM, parts[1]), "dynabt")
+    found = compare((TEAM, parts[0]), (TEAM, parts[1]), "dynabt")
     assert {row.fate for row in found.rows} == {Fate.OPEN}
     assert (found.before.solved, found.after.solved, found.moved) == (True, False, [])
 

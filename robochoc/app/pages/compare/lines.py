@@ -1,4 +1,4 @@
-"""What each protocol needed, as a table with bars."""
+"""The table of a study: medians of each protocol, with bars."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robochoc.app.texts import say
 
 
 def show_lines(lines: Sequence[Line], *, worth: bool = False) -> None:
-    """Show the medians of each protocol. `worth`: what answers cost is what they are worth."""
+    """Show the medians of each protocol. `worth`: whether costs are utilities."""
     if not lines:
         return
     costs = any(line.cost for line in lines)

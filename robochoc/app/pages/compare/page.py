@@ -1,4 +1,4 @@
-"""The page "Compare": two or more protocols on this team, or on a family like it, and the pictures of it."""
+"""The page "Compare": a study of two or more protocols on this team or on a similar family, with its report."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, Possible, Question, possible, study_of
-from robochoc.app.studies.study import ENDED, Facts, Stage, study_on
+from robochoc.app.studies.study import ENDED, Stage, StudyState, study_on
 from robochoc.app.texts import say
 
-_LOOK_S = 0.2
+_DELAY_S = 0.2
 _TEAM, _FAMILY = "team", "family"
 _FEWEST = 2
 
@@ -38,7 +38,7 @@ def build_compare(project: Project) -> None:
 
 
 class ComparePage:
-    """The page, as one tab shows it."""
+    """The page in one browser tab."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
@@ -50,20 +50,20 @@ class ComparePage:
         self._text: ui.label | None = None
         self._start: ui.button | None = None
         self._shown: object = None
-        self._progress_of: Facts | None = None
+        self._progress_of: StudyState | None = None
         with ui.element("div").classes("compare"):
-            self._asked = ui.element("section").classes("panel compare-part")
-            self._told = ui.element("section").classes("compare-told").props("aria-live=polite")
-        self._looking = ui.timer(_LOOK_S, self._look)
-        on_leave(project.on_change(self._looking.activate))
+            self._form = ui.element("section").classes("panel compare-part")
+            self._results = ui.element("section").classes("compare-told").props("aria-live=polite")
+        self._timer = ui.timer(_DELAY_S, self._show_form)
+        on_leave(project.on_change(self._timer.activate))
         on_leave(self._study.on_change(self._follow))
-        with self._asked:
+        with self._form:
             ui.label(say("compare.looking")).classes("soft")
         self._follow()
 
-    async def _look(self) -> None:
-        """Look what can be compared: of large teams that takes its time."""
-        self._looking.deactivate()
+    async def _show_form(self) -> None:
+        """Show the form after finding the suitable protocols, which is slow for large teams."""
+        self._timer.deactivate()
         sketch = self._project.sketch
         if sketch == self._sketch:
             return
@@ -71,9 +71,9 @@ class ComparePage:
         found = await run_query(possible, sketch, self._project.files)
         if found is None or self._sketch is not sketch:
             return
-        self._asked.clear()
+        self._form.clear()
         self._boxes, self._text, self._start = {}, None, None
-        with self._asked:
+        with self._form:
             if isinstance(found, ErrorText):
                 ui.label(say("compare.not-yet", why=found)).classes("error")
                 ui.link(say("compare.to-model"), f"/team/{self._project.id}/model")
@@ -81,7 +81,7 @@ class ComparePage:
                 self._possible = found
                 self._build_question(sketch, found)
 
-    # What is asked
+    # The form
 
     def _build_question(self, sketch: Sketch, found: Possible) -> None:
         last = self._study.facts.question if self._study.facts else None
@@ -173,10 +173,10 @@ class ComparePage:
         if not few and self._sketch is not None:
             self._study.start(self._sketch, question, self._project.files)
 
-    # What came of it
+    # The results
 
     def _follow(self) -> None:
-        """Show how far it is, and what came of it."""
+        """Show the progress and the results."""
         self._follow_start()
         facts = self._study.facts
         state = facts and (facts.stage, facts.done, facts.message, id(facts))
@@ -184,11 +184,11 @@ class ComparePage:
             return
         self._shown = state
         if facts is not None and facts is self._progress_of and facts.stage not in ENDED:
-            self._advance(facts)  # in place: a button that is made anew loses the click that is on its way
+            self._advance(facts)  # in place: a rebuilt button could lose a click
             return
         self._progress_of = None
-        self._told.clear()
-        with self._told:
+        self._results.clear()
+        with self._results:
             if facts is not None:
                 self._show(facts)
 
@@ -197,7 +197,7 @@ class ComparePage:
             self._start.set_enabled(not self._study.running)
             self._start.set_text(say("compare.again" if self._study.facts else "compare.start"))
 
-    def _show(self, facts: Facts) -> None:
+    def _show(self, facts: StudyState) -> None:
         match facts.stage:
             case Stage.PREPARING | Stage.RUNNING | Stage.REPORTING:
                 self._show_progress(facts)
@@ -214,7 +214,7 @@ class ComparePage:
                 show_lines(facts.lines, worth=self._worth)
                 _message(say("compare.no-pictures", message=facts.message))
 
-    def _show_progress(self, facts: Facts) -> None:
+    def _show_progress(self, facts: StudyState) -> None:
         with ui.element("div").classes("panel compare-part"):
             self._words = ui.label()
             self._bar = ui.linear_progress(show_value=False)
@@ -224,7 +224,7 @@ class ComparePage:
         self._progress_of = facts
         self._advance(facts)
 
-    def _advance(self, facts: Facts) -> None:
+    def _advance(self, facts: StudyState) -> None:
         words = {
             Stage.PREPARING: say("compare.preparing"),
             Stage.RUNNING: say("compare.progress", done=facts.done, total=facts.total),

@@ -1,4 +1,4 @@
-"""The report of a study, served as it is: a whole document, with a policy of its own, for a frame of the page."""
+"""Serve the report of a study, a complete document with its own policy, for a frame of the page."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from robochoc.app.projects import Projects
 from robochoc.app.studies.study import study_on
 
 REPORT = "study/report.html"
-"""Its address, relative to the pages of its team."""
+"""The address of the report, relative to the pages of its team."""
 
 
 def install_reports(projects: Projects) -> None:
     """Install the address of reports."""
 
     @app.get("/team/{name}/" + REPORT)
-    async def report(name: str) -> Response:  # in the event loop, as all that opens teams: there is one of each
+    async def report(name: str) -> Response:  # in the event loop, as in all code that opens teams
         try:
             file = study_on(projects.open(name)).report
         except (KeyError, ValueError):

@@ -7,7 +7,7 @@ from functools import partial
 
 from nicegui import ui
 
-from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, FilesAsked, Finder
+from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, Finder, TeamOfFiles
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.pages.foreign.answer import epochs_html
 from robochoc.app.pages.foreign.model import style
@@ -72,7 +72,7 @@ class ForeignNoSolutionPanel:
         folder = self._project.foreign
         if self._search or folder is None:  # it searches already
             return
-        self._search = search = ConflictSearch(FilesAsked(folder, self._events), folder=self._project.folder)
+        self._search = search = ConflictSearch(TeamOfFiles(folder, self._events), folder=self._project.folder)
         self._tell(say("decide.searching", seconds=int(PATIENCE_S)))
         try:
             conflict = await search.found()

@@ -1,12 +1,12 @@
-"""How the team has decided again: who does something else now, and how many messages it took."""
+"""The team's decision after a change: changed values, and numbers of messages."""
 
 from __future__ import annotations
 
 from nicegui import ui
 
 from robochoc.app.flights.answer_check import claim_words
-from robochoc.app.pages.whatif.outcome import Fate, Outcome, Row
-from robochoc.app.pages.whatif.story import Kept, Story
+from robochoc.app.pages.whatif.outcome import Comparison, Fate, Row
+from robochoc.app.pages.whatif.story import SavedChange, Story
 from robochoc.app.pages.whatif.ways_out import WaysOut
 from robochoc.app.projects import Project
 from robochoc.app.runs.run import Run, State
@@ -16,20 +16,20 @@ from robochoc.model.cost_units import cost_shown
 
 
 class Answer:
-    """The part of the page below the map. It is made anew when there is something new to tell."""
+    """The part of the page below the map. It is rebuilt after each change of the outcome."""
 
     def __init__(self, project: Project, story: Story) -> None:
         self._project, self._story = project, story
         self._shown: object = None
         self._box = ui.element("div").classes("whatif-result")
 
-    def look(self) -> None:
-        """Tell how far it is, while the team decides."""
+    def update(self) -> None:
+        """Show the progress during a run."""
         if self._story.running:
             self.follow()
 
     def follow(self) -> None:
-        """Show what there is."""
+        """Show the present state."""
         story = self._story
         state = story.running, story.outcome, story.message, story.run, story.run and story.run.state
         messages = _messages(story) if story.running else 0
@@ -41,7 +41,7 @@ class Answer:
             if story.running:
                 self._running(messages)
             elif story.outcome is not None and story.kept is not None and story.run is not None:
-                self._told(story.outcome, story.kept, story.run)
+                self._show_outcome(story.outcome, story.kept, story.run)
             elif why := _failure(story):
                 with ui.element("div").classes("panel"):
                     ui.label(why).classes("error")
@@ -53,7 +53,7 @@ class Answer:
             ui.label(text).classes("grow")
             ui.button(say("whatif.stop"), icon="stop", on_click=self._story.stop).props("no-caps outline dense")
 
-    def _told(self, found: Outcome, kept: Kept, run: Run) -> None:
+    def _show_outcome(self, found: Comparison, kept: SavedChange, run: Run) -> None:
         with ui.element("div").classes("panel whatif-part"):
             with ui.element("h2"):
                 ui.label(claim_words(run, _headline(found)))
@@ -83,14 +83,14 @@ class Answer:
                     with ui.element("pre"):
                         ui.label(command)
 
-    def _can_keep(self, kept: Kept) -> bool:
+    def _can_keep(self, kept: SavedChange) -> bool:
         return bool(self._story.changes) and self._story.after() == kept.after
 
     def _keep(self) -> None:
         self._story.keep()
         ui.notify(say("whatif.kept"))
 
-    def _figures(self, found: Outcome, kept: Kept) -> None:
+    def _figures(self, found: Comparison, kept: SavedChange) -> None:
         beside = self._story.beside.result if self._story.beside else None
         anew = None if beside is None or kept.anew else beside.messages
         again = found.after.messages
@@ -110,7 +110,7 @@ class Answer:
             ui.label(text).classes("soft")
 
 
-def _headline(found: Outcome) -> str:
+def _headline(found: Comparison) -> str:
     if found.after.verdict == "no-solution":
         return say("whatif.unsolved")
     if not found.after.solved:
@@ -123,14 +123,14 @@ def _headline(found: Outcome) -> str:
     return say(key, changed=len(found.moved), count=found.stayed, names=listed(found.moved))
 
 
-def _costs(found: Outcome) -> str:
+def _costs(found: Comparison) -> str:
     before, after = found.before, found.after
     if not (before.solved and after.solved) or not (before.cost or after.cost):
         return ""
     return say("whatif.costs", before=cost_shown(before.cost or 0), after=cost_shown(after.cost or 0))
 
 
-def _table(found: Outcome) -> None:
+def _table(found: Comparison) -> None:
     several = len({row.decision for row in found.rows}) > 1
     heads = ["who", *(["what"] if several else []), "before", "after"]
     with ui.element("div").classes("whatif-table"), ui.element("table"):
@@ -169,7 +169,7 @@ def _messages(story: Story) -> int:
 
 
 def _failure(story: Story) -> str:
-    """Return why there is no outcome; empty: nobody has asked for one."""
+    """Return the reason why there is no outcome; empty if no run was started."""
     if story.message:
         return say("whatif.failed", message=story.message)
     for run in (story.run, story.beside):

@@ -1,8 +1,8 @@
-"""Whether a team can go on from what it had decided, told before it decides again."""
+"""Whether a team can continue from its earlier decision after a change, determined before the run."""
 
 from __future__ import annotations
 
-from robochoc.app.pages.whatif.story import goes_on
+from robochoc.app.pages.whatif.story import is_dynamic
 from robochoc.app.runs.rule_costs import rules_with_costs
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.differences import AnewError, changing_model
@@ -18,15 +18,15 @@ from robochoc.run.options import Options, Runtime
 from robochoc.solver.encoding import UnsupportedError
 
 MOST_CHOSEN_FOR = 60
-"""Of larger teams it is not looked at beforehand which protocol `auto` takes."""
+"""For larger teams, the choice of `auto` is not computed before the run."""
 
 
 def why_not_continue(before: Sketch, after: Sketch) -> str:
-    """Return why the team will begin anew after a change, in words; empty: it can go on from before.
+    """Return the reason why the team must decide from scratch after a change; empty if it can continue.
 
     Args:
         before: The team before the change.
-        after: The team after it.
+        after: The team after the change.
     """
     if rules_with_costs(before) or rules_with_costs(after):
         return say("whatif.before-costs")
@@ -37,7 +37,7 @@ def why_not_continue(before: Sketch, after: Sketch) -> str:
         return _by_protocol(changing_model(before, after).team)
     except AnewError as anew:
         return say("whatif.all-anew", why=say(anew.key, **anew.named))
-    except (ModelError, InvalidInputError, UnsupportedError):  # a mistake, which is told elsewhere
+    except (ModelError, InvalidInputError, UnsupportedError):  # the error is shown elsewhere
         return ""
 
 
@@ -45,10 +45,10 @@ def _by_protocol(team: Team) -> str:
     if len(team.robots) > MOST_CHOSEN_FOR:
         return ""
     protocol = decided(team, Options(runtime=Runtime.SIMULATOR)).options.protocol
-    return "" if goes_on(protocol) else say("whatif.before-protocol", protocol=protocol)
+    return "" if is_dynamic(protocol) else say("whatif.before-protocol", protocol=protocol)
 
 
 def _has_secrets(sketch: Sketch) -> bool:
-    """Return whether two robots have a rule of which only one of them knows."""
+    """Return whether two robots have a rule that only one of them knows."""
     private = [rule for rule in sketch.rules if rule.on and rule.private and rule.kind in PALETTE]
     return any(PALETTE[rule.kind].links != Links.EACH for rule in private)

@@ -1,4 +1,4 @@
-"""What a change comes to: who decides something else now, and what it has cost to find out."""
+"""The comparison of a team's decisions before and after a change."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _SOLVED = frozenset({"solution", "optimal"})
 
 
 class Fate(StrEnum):
-    """What becomes of a robot's decision."""
+    """The effect of a change on a robot's decision."""
 
     MOVED = "moved"
     SAME = "same"
     LEFT = "left"
     NEW = "new"
     OPEN = "open"
-    """There is nothing to compare: no solution, before or after."""
+    """Not comparable: no solution before or after the change."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A decision of a robot, before and after, in words. Empty: there is none."""
+    """A decision of a robot before and after the change, in words; empty if there is none."""
 
     robot: str
     decision: str
@@ -41,13 +41,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Part:
-    """What was decided before the change, or after it.
+    """The decision before or after the change.
 
     Attributes:
-        verdict: How it ended.
-        values: What was decided.
-        cost: What it costs, where there are costs.
-        messages: How many messages it took.
+        verdict: The verdict.
+        values: The values.
+        cost: The cost, if there are costs.
+        messages: The number of messages.
     """
 
     verdict: str
@@ -62,8 +62,8 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """Both parts, side by side. `protocol` decided after the change."""
+class Comparison:
+    """Both decisions. `protocol` is the protocol after the change."""
 
     before: Part
     after: Part
@@ -72,23 +72,23 @@ class Outcome:
 
     @property
     def moved(self) -> list[str]:
-        """Who decides something else than before."""
+        """The robots with a changed decision."""
         return [*dict.fromkeys(row.robot for row in self.rows if row.fate == Fate.MOVED)]
 
     @property
     def stayed(self) -> int:
-        """How many robots there are before and after."""
+        """The number of robots that are in the team before and after the change."""
         return len({row.robot for row in self.rows if row.fate not in {Fate.LEFT, Fate.NEW}})
 
 
 def part_of(sketch: Sketch, model: Model | None, result: RunResult) -> Part:
-    """Return what a run came to. `model`: the one that was solved, if it is not the sketch's own."""
+    """Return the decision of a run. `model`: the solved model, if it is not that of the sketch."""
     values = decided(sketch, result.assignment, model)
     return Part(result.verdict, values, result.cost, result.messages)
 
 
 def parts_of_epochs(before: Sketch, after: Sketch, model: Model, result: RunResult) -> tuple[Part, Part] | None:
-    """Return what was decided in both epochs of a run; None: it did not come so far."""
+    """Return the decisions in both epochs of a run; None if the run has only one."""
     sketches = before, after
     if len(result.epochs) != len(sketches):
         return None
@@ -96,10 +96,10 @@ def parts_of_epochs(before: Sketch, after: Sketch, model: Model, result: RunResu
     return one, other
 
 
-def outcome(before: tuple[Sketch, Part], after: tuple[Sketch, Part], protocol: str) -> Outcome:
-    """Return both parts, side by side: first the robots that were there, then those that have come."""
+def compare(before: tuple[Sketch, Part], after: tuple[Sketch, Part], protocol: str) -> Comparison:
+    """Return the comparison of both decisions, with new robots in the last rows."""
     rows = tuple(_rows(before, after))
-    return Outcome(before[1], after[1], rows, protocol)
+    return Comparison(before[1], after[1], rows, protocol)
 
 
 def _of_epoch(sketch: Sketch, model: Model, epoch: Mapping[str, Any]) -> Part:
@@ -138,6 +138,6 @@ def _fate(was: Decision | None, now: Decision | None, old: Value | None, new: Va
 
 
 def _decision(sketch: Sketch, robot: str, name: str) -> Decision | None:
-    """Return a decision that a robot takes."""
+    """Return a decision of a robot, by its name."""
     decision = sketch.decision(name)
     return decision if decision is not None and robot in sketch.deciders(decision) else None

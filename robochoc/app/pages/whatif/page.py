@@ -1,4 +1,4 @@
-"""The page "What if": something happens to the team, and it decides again."""
+"""The page "What if": the user changes the team, and it decides again."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import MAX_SIDE, Cell, Kind, Sketch
 from robochoc.app.texts import say
 
-_LOOK_S = 0.25
+_UPDATE_S = 0.25
 _LINK_S = 0.05
 
 
@@ -42,7 +42,7 @@ def build_whatif(project: Project) -> None:
 
 
 class WhatIfPage:
-    """The page, as one tab shows it."""
+    """The page in one browser tab."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
@@ -59,7 +59,7 @@ class WhatIfPage:
         with ui.element("section").classes("whatif-answer").props("aria-live=polite"):
             self._answer = Answer(project, self._story)
         self._linking = ui.timer(_LINK_S, self._link, active=False)
-        ui.timer(_LOOK_S, self._answer.look)
+        ui.timer(_UPDATE_S, self._answer.update)
         on_leave(project.on_change(self._follow))
         on_leave(self._story.on_change(self._follow))
         self._follow()
@@ -100,7 +100,7 @@ class WhatIfPage:
                 self._decide.classes("go")
                 self._clear = ui.button(say("whatif.clear"), on_click=self._story.clear).props("no-caps flat")
 
-    # What is chosen, and what happens
+    # Events
 
     def _robot_clicked(self, clicked: Clicked) -> None:
         if clicked.name in (self._robots.options or []):
@@ -114,7 +114,7 @@ class WhatIfPage:
         self._row.set_value(cell.y + 1)
 
     def _act(self, chosen: Act) -> None:
-        """Let happen what was chosen at a robot or a cell of the map."""
+        """Add the event that was chosen at a robot or a cell of the map."""
         name, cell = chosen.name, Cell(chosen.x, chosen.y)
         changes: dict[str, AnyChange] = {
             "fail": Fails(name),
@@ -148,7 +148,7 @@ class WhatIfPage:
         except EditError as error:
             self._wrong.set_text(edit_error_text(error))
 
-    # What is shown
+    # Content
 
     def _follow(self) -> None:
         words = self._story.words()
@@ -179,14 +179,14 @@ class WhatIfPage:
                     back.props("flat round dense").props["aria-label"] = say("whatif.back", what=text)
 
     async def _link(self) -> None:
-        """Draw the rules, and say what is wrong: of large teams that takes its time."""
+        """Draw the rules and show errors, which are computed in a thread: this is slow for large teams."""
         self._linking.deactivate()
         after = self._story.after()
         pair = self._project.sketch, after
         if self._linked == pair:
             return
         self._linked = pair
-        found = await run.io_bound(_looked_at, *pair)
+        found = await run.io_bound(_links_and_errors, *pair)
         if found is not None and self._linked is pair:
             links, wrong, anew = found
             self._anew.set_text(anew)
@@ -194,13 +194,13 @@ class WhatIfPage:
             self._wrong.set_text(say("whatif.wrong", text=wrong) if wrong else "")
 
 
-def _looked_at(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, str]:
+def _links_and_errors(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, str]:
     wrong = next((error.text for error in errors_of(after)), "")
     return links_of(after), wrong, "" if wrong or before == after else why_not_continue(before, after)
 
 
 def _offered(sketch: Sketch) -> tuple[dict[str, str], dict[str, str]]:
-    """Return what can happen to a robot, and to a cell."""
+    """Return the possible events of a robot, and of a cell."""
     robot = {"fail": say("whatif.fail")}
     if any(decision.kind == Kind.LEVEL for decision in sketch.decisions):
         shares = {"half": FULL // 2, "quarter": FULL // 4}

@@ -1,6 +1,6 @@
-"""What has happened to a team, one thing after the other, and how it decided again. All tabs of a team share it.
+"""The changes of a team on the page "What if", and its decisions before and after them, shared by all tabs.
 
-It is kept in the team's folder (`whatif.json`), and with each run what belongs to it (`change.json`).
+They are saved in the team's folder (`whatif.json`), and the changes of a run in its folder (`change.json`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import log_error
 from robochoc.app.pages.background_query import ErrorText, run_query
-from robochoc.app.pages.whatif.outcome import Outcome, Part, outcome, part_of, parts_of_epochs
+from robochoc.app.pages.whatif.outcome import Comparison, Part, compare, part_of, parts_of_epochs
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.run import CHANGE, Run, State
@@ -26,21 +26,23 @@ from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
-from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 from robochoc.modelling.model import Model
 from robochoc.run.registry import UnknownProtocolError, protocol_named
 
 PURPOSE = "whatif"
-"""What the run is for that decides before and after the change."""
+"""The purpose of the run that decides before and after the change."""
 BESIDE = "whatif-anew"
-"""What the run beside it is for: the changed team alone, which decides anew."""
+"""The purpose of the second run, in which only the changed team decides, from scratch."""
 _STORY = "whatif.json"
 MOST_CHANGES = 50
 
 
-class Kept(msgspec.Struct):
-    """What belongs to a run: the team after the change, what has happened, and why it decides anew, if it does."""
+class SavedChange(msgspec.Struct):
+    """The change of a run: the team after it, its events in words, and why the team decides from scratch, if so.
+
+    `beside` is the id of the second run.
+    """
 
     after: Sketch
     happened: list[str]
@@ -49,31 +51,31 @@ class Kept(msgspec.Struct):
 
 
 class Story:
-    """What has happened to a team."""
+    """The changes of a team, and the runs before and after them."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
         self._listeners = Listeners()
         self.changes: tuple[AnyChange, ...] = self._loaded()
-        self.kept: Kept | None = None
+        self.kept: SavedChange | None = None
         self.run: Run | None = None
         self.beside: Run | None = None
-        self.outcome: Outcome | None = None
+        self.outcome: Comparison | None = None
         self.message = ""
-        """Why it could not decide."""
+        """The error of a failed run."""
         self.preparing = False
         self._model: Model | None = None
         self._task: asyncio.Task[None] | None = None
         self._find_last()
 
-    # What happens
+    # Changes
 
     def after(self) -> Sketch:
-        """Return the team after all that has happened. Raises `EditError` if that can no longer happen."""
+        """Return the team after all changes. Raises `EditError` if they are not possible any more."""
         return changed(self._project.sketch, self.changes)
 
     def words(self) -> list[str]:
-        """Return what has happened, in words. What can no longer happen, since the team was edited, is let go."""
+        """Return the changes in words. Changes that are not possible any more, after an edit, are dropped."""
         while True:
             try:
                 return told(self._project.sketch, self.changes)
@@ -81,7 +83,7 @@ class Story:
                 self.changes = self._possible()
 
     def add(self, change: AnyChange) -> None:
-        """Let something more happen. Raises `EditError` if it cannot."""
+        """Add a change. Raises `EditError` if it is not possible."""
         if len(self.changes) >= MOST_CHANGES:
             raise EditError("whatif.too-many", most=MOST_CHANGES)
         after = changed(self._project.sketch, (*self._possible(), change))
@@ -91,38 +93,38 @@ class Story:
         self._changed()
 
     def take_back(self, place: int) -> None:
-        """Take one change back, and what can no longer happen without it."""
+        """Remove one change, and later changes that are not possible without it."""
         self.changes = self.changes[:place] + self.changes[place + 1 :]
         self.changes = self._possible()
         self._changed()
 
     def clear(self) -> None:
-        """Take all back."""
+        """Remove all changes."""
         self.changes = ()
         self._changed()
 
     def keep(self) -> None:
-        """Make the changed team the team: one step, that can be undone."""
+        """Apply the changes to the team, as one edit."""
         after = self.after()
         self._project.edit(lambda _: after)
         self.clear()
 
-    # How the team decides again
+    # Runs
 
     @property
     def running(self) -> bool:
-        """Whether it decides at present."""
+        """Whether a run is in progress."""
         return self.preparing or any(run.state == State.RUNNING for run in (self.run, self.beside) if run)
 
     async def decide(self) -> None:
-        """Let the team decide, before and after what has happened. Returns as soon as it has begun."""
+        """Start a run of the team before and after the changes."""
         if self.running:
             return
         before, after, words = self._project.sketch, self.after(), self.words()
         self.preparing, self.outcome, self.message, self.beside, self._task = True, None, "", None, None
-        self._tell()
+        self._listeners()
         try:
-            self.kept = Kept(after, words)
+            self.kept = SavedChange(after, words)
             try:
                 self._model = await asyncio.to_thread(_checked, before, after)
             except AnewError as anew:
@@ -131,68 +133,68 @@ class Story:
             self.run = runs_of(self._project).start(
                 sketch=before, model=model_of if model is None else lambda _: model, purpose=PURPOSE
             )
-            self._keep()
-            self.run.on_change(self._followed)
+            self._save_change()
+            self.run.on_change(self._on_run_change)
         except (ModelError, InvalidInputError) as mistake:
             self.run, self.message = None, str(mistake)
-        except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
+        except Exception as fault:  # noqa: BLE001 - shown, and written to the error log
             self.run, self.message = None, log_error(fault, "what if")
         finally:
             self.preparing = False
-            self._tell()
+            self._listeners()
 
     def stop(self) -> None:
-        """Stop deciding."""
+        """Stop the runs."""
         for run in (self.run, self.beside):
             if run:
                 run.stop()
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` when something has changed; return what ends that."""
+        """Call `callback` after each change; return a function that removes it."""
         return self._listeners.add(callback)
 
-    def _followed(self) -> None:
-        """Follow both runs, and say if that goes wrong."""
+    def _on_run_change(self) -> None:
+        """Follow both runs, and report errors."""
         try:
             self._follow()
-        except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
+        except Exception as fault:  # noqa: BLE001 - shown, and written to the error log
             self.message = log_error(fault, "what if")
-        self._tell()
+        self._listeners()
 
     def _follow(self) -> None:
-        """Begin the second run when the first one has ended, and find the outcome when both have."""
+        """Start the second run after the first one, and compute the outcome after both."""
         run, kept = self.run, self.kept
         if run and kept and run.state != State.RUNNING:
-            if self.beside is None and run.state == State.ENDED and run.result and self._wants_beside(run):
+            if self.beside is None and run.state == State.ENDED and run.result and self._needs_second_run(run):
                 protocol = run.result.protocol
                 options = RunOptions(protocol=protocol) if not kept.anew else RunOptions()
                 self.beside = runs_of(self._project).start(options, sketch=kept.after, purpose=BESIDE)
                 kept.beside = self.beside.id
-                self._keep()
-                self.beside.on_change(self._followed)
+                self._save_change()
+                self.beside.on_change(self._on_run_change)
             elif self.outcome is None and self._task is None and not self.running:
-                self._later(self._conclude)
+                self._compute_later(self._comparison)
 
-    def _later(self, work: Callable[[], Outcome | None]) -> None:
-        """Find the outcome beside the event loop: of a large team it takes its time."""
+    def _compute_later(self, work: Callable[[], Comparison | None]) -> None:
+        """Compute the outcome in a thread, since this is slow for a large team."""
 
-        async def concluded() -> None:
+        async def compute() -> None:
             found = await run_query(work)
             if isinstance(found, ErrorText):
                 self.message = found
             else:
                 self.outcome = found
             self.preparing = False
-            self._tell()
+            self._listeners()
 
         self.preparing = True
-        self._task = asyncio.get_running_loop().create_task(concluded())
+        self._task = asyncio.get_running_loop().create_task(compute())
 
-    def _wants_beside(self, run: Run) -> bool:
-        """Return whether deciding anew is still to be measured: for a protocol that goes on, or where none can."""
-        return bool(self.kept and self.kept.anew) or bool(run.result and goes_on(run.result.protocol))
+    def _needs_second_run(self, run: Run) -> bool:
+        """Return whether a run from scratch must be measured: the protocol is dynamic, or the first run is not."""
+        return bool(self.kept and self.kept.anew) or bool(run.result and is_dynamic(run.result.protocol))
 
-    def _conclude(self) -> Outcome | None:
+    def _comparison(self) -> Comparison | None:
         run, kept, beside = self.run, self.kept, self.beside
         if run is None or kept is None or run.result is None:
             return None
@@ -201,30 +203,30 @@ class Story:
             if not kept.anew:
                 model = self._model or changing_model(before, kept.after)
                 found = parts_of_epochs(before, kept.after, model, run.result)
-                return _side_by_side(before, kept.after, found, run.result.protocol) if found else None
+                return _compared(before, kept.after, found, run.result.protocol) if found else None
             if beside and beside.result:
                 parts = part_of(before, None, run.result), part_of(kept.after, None, beside.result)
-                return _side_by_side(before, kept.after, parts, beside.result.protocol)
+                return _compared(before, kept.after, parts, beside.result.protocol)
         return None
 
     def _find_last(self) -> None:
-        """Find what was decided before the server ended."""
+        """Load the last runs, from before a restart of the server."""
         runs = runs_of(self._project)
         run = runs.latest_for(PURPOSE)
         if run is None or run.state == State.RUNNING:
             return
         with suppress(OSError, msgspec.DecodeError, ValueError, RecursionError):
-            self.kept = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=Kept)
+            self.kept = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=SavedChange)
             self.run, self.beside = run, runs.find(self.kept.beside) if self.kept.beside else None
-            self._later(self._conclude)
+            self._compute_later(self._comparison)
 
-    def _keep(self) -> None:
+    def _save_change(self) -> None:
         if self.run and self.kept:
             with suppress(OSError):
                 (self.run.folder / CHANGE).write_bytes(msgspec.json.encode(self.kept))
 
     def _possible(self) -> tuple[AnyChange, ...]:
-        """Return the changes that can happen to the team as it is now."""
+        """Return the changes that are possible for the present team."""
         found: list[AnyChange] = []
         sketch = self._project.sketch
         for change in self.changes:
@@ -242,34 +244,27 @@ class Story:
     def _changed(self) -> None:
         with suppress(OSError):
             (self._project.folder / _STORY).write_bytes(msgspec.json.encode(self.changes))
-        self._tell()
-
-    def _tell(self) -> None:
         self._listeners()
 
 
 def story_of(project: Project) -> Story:
-    """Return what has happened to a team, the same object for all pages that show it."""
+    """Return the changes of a team; the same object for all pages."""
     return project.part(Story)
 
 
-def goes_on(protocol: str) -> bool:
-    """Return whether a protocol goes on with what still holds when the problem changes."""
+def is_dynamic(protocol: str) -> bool:
+    """Return whether a protocol continues when the problem changes."""
     try:
         return protocol_named(protocol).traits.dynamic
     except (UnknownProtocolError, ImportError):
         return False
 
 
-def _side_by_side(before: Sketch, after: Sketch, parts: tuple[Part, Part], protocol: str) -> Outcome:
-    return outcome((before, parts[0]), (after, parts[1]), protocol)
+def _compared(before: Sketch, after: Sketch, parts: tuple[Part, Part], protocol: str) -> Comparison:
+    return compare((before, parts[0]), (after, parts[1]), protocol)
 
 
 def _checked(before: Sketch, after: Sketch) -> Model:
-    """Return the model that changes, or say what is wrong with either team."""
-    _built(model_of(after))
+    """Return the model with the changes. Raises `ModelError` or `InvalidInputError` for errors of either team."""
+    _ = model_of(after).team
     return changing_model(before, after)
-
-
-def _built(model: Model) -> Team:
-    return model.team

@@ -1,4 +1,4 @@
-"""The changed team has no solution: who would have to step aside, and which rules are in each other's way."""
+"""The panel for a changed team without a solution: withdraw robots, or find conflicting rules."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 
 ASIDE = "whatif-aside"
-"""What a run is for that finds out who would have to step aside after a change."""
+"""The purpose of a run with withdrawals after a change."""
 
 
 class WaysOut:
-    """The two doors of the page "Decide", for the team after what has happened."""
+    """The panel of the page "Decide" for a team without a solution, here for the changed team."""
 
     def __init__(self, project: Project, story: Story, after: Sketch) -> None:
         self._project, self._story, self._after = project, story, after
@@ -39,7 +39,7 @@ class WaysOut:
     def _decide(self, *, withdraw: bool = False) -> None:
         if withdraw:
             self._follow(runs_of(self._project).start(RunOptions(withdraw=True), sketch=self._after, purpose=ASIDE))
-        else:  # a rule was changed: before and after are decided again
+        else:  # a rule was changed: decide again before and after the changes
             self._deciding = asyncio.get_running_loop().create_task(self._story.decide())
 
     def _end(self) -> None:

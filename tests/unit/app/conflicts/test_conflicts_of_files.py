@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.app.conflicts.files import found_in_files, with_only
-from robochoc.app.conflicts.found import Conflict, ConflictSearch, FilesAsked, Finder
+from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder, TeamOfFiles
 from robochoc.app.conflicts.process import found_in
 from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.formats import read_team, write_team
@@ -151,7 +151,7 @@ def test_which_constraints_may_be_undefined(body: str, *, undefined: bool) -> No
 
 def test_that_the_process_takes_files(tmp_path: Path) -> None:
     write_team(triangle(2), tmp_path / "triangle")
-    conflict = ConflictSearch(FilesAsked(tmp_path / "triangle")).result()
+    conflict = ConflictSearch(TeamOfFiles(tmp_path / "triangle")).result()
     assert isinstance(conflict, Conflict)
     assert len(conflict.words) == 3
     assert conflict.finder in {*Finder}

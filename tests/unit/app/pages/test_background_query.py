@@ -70,12 +70,12 @@ def _story(folder: Path, then: Callable[[Story], Awaitable[None]]) -> Story:
         end_all(HANG_S)
 
 
-@pytest.mark.parametrize("broken", ["_checked", "outcome"])
+@pytest.mark.parametrize("broken", ["_checked", "compare"])
 def test_a_team_that_decides_again_comes_to_an_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: str
 ) -> None:
     monkeypatch.setattr(stories, broken, _fails)
-    if broken == "outcome":
+    if broken == "compare":
         monkeypatch.setattr(Story, "_conclude", _fails)
     story = _story(tmp_path, lambda story: story.decide())
     assert not story.running
@@ -84,7 +84,7 @@ def test_a_team_that_decides_again_comes_to_an_end(
 
 
 def test_the_second_run_that_cannot_begin_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Story, "_wants_beside", _fails)
+    monkeypatch.setattr(Story, "_needs_second_run", _fails)
     story = _story(tmp_path, lambda story: story.decide())
     assert story.run
     assert story.run.state is State.ENDED

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("nicegui")
 
 from robochoc.app.pages.whatif.can_continue import why_not_continue
-from robochoc.app.pages.whatif.story import goes_on
+from robochoc.app.pages.whatif.story import is_dynamic
 from robochoc.app.sketch.changes import AnyChange, Battery, Blocked, Fails, Joins, changed
 from robochoc.app.sketch.differences import changing_model
 from robochoc.app.sketch.examples import example
@@ -33,7 +33,7 @@ def test_what_is_told_before_comes_true(key: str, change: AnyChange, says: str) 
     assert told.startswith(says)
     assert bool(told) is bool(says)
     solution = changing_model(before, after).solve(runtime="simulator")
-    assert goes_on(solution.protocol) is not bool(told)
+    assert is_dynamic(solution.protocol) is not bool(told)
 
 
 def test_what_no_event_can_say_is_told_before() -> None:
