@@ -85,7 +85,7 @@ class SearchState:
 
     def _conclude(self, name: str, verdict: str) -> str:
         """Record a verdict that the robot `name` concluded alone. The first verdict counts."""
-        fault = self._traits.fault_of_conclusion(verdict)
+        fault = self._traits.conclusion_error(verdict)
         if not fault and self.verdict is None:
             self.verdict, self.witness = Verdict(verdict), name
         return fault

@@ -1,4 +1,4 @@
-"""FIPA acts that messages of several protocols have in common; other messages declare their own."""
+"""FIPA acts shared by messages of several protocols; other messages declare their own."""
 
 from __future__ import annotations
 

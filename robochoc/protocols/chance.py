@@ -3,10 +3,10 @@
 Draw n (1, 2, ...) is a hash of key + n * step, modulo 2**64: SplitMix64 (Steele, Lea, Flood: "Fast splittable
 pseudorandom number generators", OOPSLA 2014), with Stafford's 13th variant of its mixing function. Key and step are two
 halves of a BLAKE2b digest of seed and name, so similar names have independent streams. A robot's n-th number depends on
-nothing else: not on the runtime, nor on what others draw. Plain Python computes a number in a third of a microsecond,
-from two words of state; numpy computes the same ones for all robots at once (`communication/arrays/cycle_run.py`).
+nothing else: not on the runtime, nor on other robots' draws. Plain Python computes a number from two words of state in
+a third of a microsecond; numpy computes the same ones for all robots at once (`communication/arrays/cycle_run.py`).
 
-No secret may depend on it.
+Secrets must not depend on it: see `key_stream.py`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FEWEST_TRANSITIONS: Final = 24
 
 
 def key_and_step(seed: int, name: str) -> tuple[int, int]:
-    """Return the two words that the numbers of the robot `name` follow from; the step is odd.
+    """Return the two words that determine the numbers of the robot `name`; the step is odd.
 
     As in the paper's `mixGamma`, a step whose bits change too seldom is replaced by one whose bits change often.
     """

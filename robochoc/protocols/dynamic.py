@@ -1,6 +1,6 @@
 """The base of protocols that continue when the problem changes.
 
-It is not compiled, as `protocol.py` is: a protocol has two bases then, and mypyc allows one.
+It is apart from `protocol.py`, which is compiled: such a protocol has two bases, and mypyc allows one.
 """
 
 from __future__ import annotations
@@ -33,5 +33,5 @@ class DynamicProtocol(Protocol):
         """Continue the search; called before any message.
 
         Args:
-            lossless: No message of the epoch before was lost.
+            lossless: No message of the previous epoch was lost.
         """

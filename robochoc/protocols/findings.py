@@ -30,19 +30,19 @@ class Trail(msgspec.Struct, frozen=True):
 
 
 class Listing(msgspec.Struct, frozen=True):
-    """The places of a robot's values in the optima that its tree lists; at most `limit` are."""
+    """The places of a robot's values in the optima that its tree lists, at most `limit` of them."""
 
     places: list[int]
     limit: int
 
 
 class Findings(msgspec.Struct, frozen=True):
-    """A robot's knowledge of the whole search; None for what it, or its protocol, does not know.
+    """A robot's knowledge of the whole search; None for information that it, or its protocol, does not have.
 
-    `bound` is a lower bound on the cost of every assignment of the robots that it is for (a root: its tree; the first
-    robot: all robots). `count` is the number of optima of a root's tree, in hexadecimal digits, as it may need more
-    than 64 bits; `listing` has the robot's values in some. `left` are the places of the own values that preprocessing
-    has left.
+    `bound` is a lower bound on the cost of every assignment of its robots (for a root: those of its tree; for the first
+    robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, as it may need more than 64
+    bits; `listing` has the robot's values in some of them. `left` are the places of the values that remain after
+    preprocessing.
     """
 
     best: Incumbent | None = None

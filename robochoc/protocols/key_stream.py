@@ -1,10 +1,9 @@
 """The source of random keys for private protocols: the host gives each robot one, `Protocol.secret`.
 
-Across machines it is the operating system's (`secrets.randbits`): nobody can compute the keys, and a run cannot be
-repeated. In the simulator and in processes all robots are in one hand, the user's, and nothing is secret from it. There
-it is a `KeyStream`, which follows from the run's seed, so that runs can be repeated and replayed. It is BLAKE2b in
-counter mode, keyed by the seed and the robot's name: what a robot hears of keys tells nothing of others, unless it
-knows the seed.
+Across machines it is the operating system's (`secrets.randbits`): the keys cannot be predicted, and a run cannot be
+repeated. In the simulator and in processes all robots belong to one user, and nothing is secret from that user. There
+the source is a `KeyStream`, determined by the run's seed, so that runs can be repeated and replayed. It is BLAKE2b in
+counter mode, keyed by the seed and the robot's name: without the seed, known keys reveal nothing about other keys.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ _BLOCK = 64
 
 
 class KeyStream:
-    """The repeatable source of one robot: each call draws a number of so many bits."""
+    """The repeatable source of one robot: each call draws a number of the given bits."""
 
     def __init__(self, seed: int, name: str) -> None:
         self._key = blake2b(f"keys {seed} {name}".encode()).digest()
@@ -27,14 +26,14 @@ class KeyStream:
     def __call__(self, bits: int) -> int:
         """Return the next number, from 0 up to below 2 to the power of `bits` (512 at most)."""
         if not 0 < bits <= 8 * _BLOCK:
-            raise ValueError(f"{bits} bits cannot be drawn at a time")
+            raise ValueError(f"cannot draw {bits} bits at a time; it must be 1 to {8 * _BLOCK}")
         self._drawn += 1
         block = blake2b(self._drawn.to_bytes(8, "little"), key=self._key).digest()
         return int.from_bytes(block, "little") >> 8 * _BLOCK - bits
 
 
 def shuffled(items: Sequence[T], secret: Callable[[int], int]) -> list[T]:
-    """Return `items` in a random order: each is as likely as any other, but for one in 2^64."""
+    """Return `items` in a random order; all orders are equally likely up to a deviation of 2^-64."""
     left = list(items)
     for place in range(len(left) - 1, 0, -1):
         other = secret(place.bit_length() + 64) % (place + 1)

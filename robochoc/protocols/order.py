@@ -1,4 +1,4 @@
-"""Orders of the robots: the total priority order, and pseudo-trees that go with it (paper, Section 5.2)."""
+"""Orders of the robots: the total priority order, and the pseudo-trees that it induces (paper, Section 5.2)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from robochoc.system.compiling import mypyc_attr
 class PriorityOrder:
     """The names of all robots, the highest priority first. Static, and the same for every robot of a run.
 
-    `tree` is the pseudo-tree that the order induces; None unless the protocol asked for it (`Traits.tree`). `rank` is
-    the place of each robot; where it is known (`TeamKnowledge`), all robots look it up in the same mapping.
+    `tree` is the pseudo-tree that the order induces; None unless the protocol requires it (`Traits.tree`). `rank` is
+    the place of each robot; if it is passed (by `TeamKnowledge`), all robots share the mapping.
     """
 
     def __init__(

@@ -2,8 +2,8 @@
 
 A host (see `communication/host.py`) drives it: it calls `start` once, then for each packet of waiting messages
 `receive` for each message, and `settle` when the inbox has been drained. Sent messages collect in `outbox`, which the
-host empties. A protocol never reads the time or draws random numbers by itself, and does not know whether it runs in a
-simulator or on a robot.
+host empties. A protocol never reads the time or draws random numbers by itself, and behaves the same in a simulator and
+on a robot.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class Protocol(ABC):
     messages: ClassVar[Any]
     traits: ClassVar[Traits] = Traits()
     settings: ClassVar[Settings] = NO_SETTINGS
-    """The defaults; the host puts what was asked for in their place before `start`."""
+    """The defaults; the host replaces them by the given settings before `start`."""
     chance: Callable[[], float]
-    """Draws from [0, 1): the host's, seeded for each robot. There before `start`. No secret may depend on it."""
+    """Draws from [0, 1), seeded for each robot; set by the host before `start`. Secrets must not depend on it."""
     secret: Callable[[int], int]
-    """Draws a number of so many bits, for keys (`protocols/key_stream.py`). There before `start`."""
+    """Draws a number of the given bits, for keys (`protocols/key_stream.py`); set by the host before `start`."""
     numbered_values: ClassVar[bool] = False
     """True if the robots never receive others' values, only numbers of assignments; `view` contains these numbers."""
 
@@ -47,12 +47,12 @@ class Protocol(ABC):
         self.outbox: list[tuple[str, Message]] = []
         """Receivers and messages."""
         self.said_at: list[int] = []
-        """Of each message in the outbox: `problem.checks` when the robot sent it. The host computes the message's clock
-        from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
+        """For each message in the outbox: `problem.checks` at the time of sending. The host computes the message's
+        clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
         self.value: int | None = None
-        """The own value, as its place in the compiled domain; None: unassigned."""
+        """This robot's value, as its place in the compiled domain; None: unassigned."""
         self.verdict: Verdict | None = None
-        """Set when this robot alone can tell how the search ends, such as by deriving the empty nogood."""
+        """Set when this robot alone can decide the result of the search, for example by deriving the empty nogood."""
 
     @abstractmethod
     def start(self) -> None:
@@ -66,18 +66,18 @@ class Protocol(ABC):
         """Decide on the whole view; called when the inbox has been drained."""
 
     def miss(self, sender: str) -> None:  # noqa: B027 - optional
-        """Note that a message of `sender` is lost: the one that would have come before the next."""
+        """Note that a message of `sender` is lost; its next message follows the lost one."""
 
     def go_on(self) -> bool:
-        """Continue without the messages that this robot waits for: nothing more comes. Return False if it cannot.
+        """Continue without the awaited messages, as no more will arrive. Return False if that is impossible.
 
-        It must not return True for ever.
+        It must return False after finitely many calls.
         """
         return False
 
     def send(self, receiver: str, message: Message) -> None:
         """Send `message` to `receiver`; its clock does not include later checks."""
-        # A replay has a list of its own: as a list's, mypyc would not call its `append`.
+        # A replay has its own kind of list: for a `list`, mypyc would not call its `append`.
         outbox: MutableSequence[tuple[str, Message]] = self.outbox
         outbox.append((receiver, message))
         self.said_at.append(self.problem.checks)
@@ -88,14 +88,14 @@ class Protocol(ABC):
         Raises:
             ValueError: if `verdict` is not one of `traits.concludes`.
         """
-        fault = self.traits.fault_of_conclusion(verdict)
+        fault = self.traits.conclusion_error(verdict)
         if fault:
             raise ValueError(fault)
         self.verdict = verdict
 
     @property
     def assignment(self) -> dict[str, int]:
-        """The own variables' values as decided; empty while unassigned."""
+        """The decided values of this robot's variables; empty while unassigned."""
         return {} if self.value is None else self.problem.solution(self.value)
 
     @property

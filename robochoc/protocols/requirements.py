@@ -1,7 +1,7 @@
 """Requirements of a problem on a protocol: the kinds of constraints that a robot has.
 
 A run checks all robots before it begins (`run/compatibility`). Across machines only the robot itself knows its
-constraints, so each robot checks itself. This module is where both can import it.
+constraints, so each robot checks its own. Both import this module.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
 
 BREAKABLE = "a constraint that is restated when a robot is absent"
-"""The end of the error text on such a constraint."""
+"""The end of the error text about such a constraint."""
 _TWO = 2
 
 

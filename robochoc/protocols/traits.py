@@ -8,49 +8,49 @@ from importlib.util import find_spec
 from robochoc.model.outcome import Verdict
 
 ENDS_WITH_PROOF = (Verdict.NO_SOLUTION,)
-"""Solutions are found by falling quiet; one robot alone can only tell that there is none."""
+"""Solutions are detected by quiescence; one robot alone can only prove that there is none."""
 ENDS_WITH_EITHER = (Verdict.SOLUTION, Verdict.NO_SOLUTION)
-"""One robot sees either end of the search, such as the last that a token comes to."""
+"""One robot decides either result of the search, for example the last robot that a token reaches."""
 UNDECLARED = (Verdict.SOLUTION, Verdict.NO_SOLUTION, Verdict.UNKNOWN)
 """The default of `concludes`. It never contains `optimal`: a run reports that for a `solution` with a proof."""
 
 
 @dataclass(frozen=True)
 class Traits:
-    """The declared properties of a protocol (`traits` of its class). A run refuses what is not declared.
+    """The declared properties of a protocol (`traits` of its class). A run refuses features that are not declared.
 
     Attributes:
         paper: The authors and the year of publication.
-        complete: It ends on every problem, with a solution or a proof that there is none.
+        complete: It terminates on every problem, with a solution or a proof that there is none.
         synchronous: One robot acts at a time.
-        costs: It minimises costs (a DisWCSP).
+        costs: It minimises costs (a DCOP).
         n_ary: Constraints may be over more than two robots.
-        partially_known: It takes partially known constraints (PKC).
-        asymmetric: Their parts may cost something: each side pays what its own part says, and the sum is minimised.
+        partially_known: It accepts partially known constraints (PKC).
+        asymmetric: Their parts may have costs: each side pays its own part, and the sum is minimised.
         shared_scopes: Every robot of a constraint's scope knows the constraint, because the order of the robots changes
             during the search. Otherwise only the lowest robot of the scope knows it.
-        writes_to_non_neighbours: Its robots also write to robots that they share no constraint with. Where they do not,
-            access control across machines prevents it.
+        writes_to_non_neighbours: Its robots also send messages to robots with which they share no constraint.
+            Otherwise access control across machines prevents it.
         tree: It works on a pseudo-tree.
         dynamic: It continues when the problem changes (then it is a `DynamicProtocol`).
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
             (`solver/exact_costs.py`).
-        wide_tables: Its tables have a dimension for each robot of the pseudo-tree's width: where one such protocol is
+        wide_tables: Its tables have a dimension for each robot of the pseudo-tree's width: if one such protocol is
             refused for memory, so are the others.
-        encrypted_tables: Its tables have a cipher for each cell and each cost. It takes small problems only, and is not
-            named as an alternative to other protocols.
+        encrypted_tables: Its tables have a ciphertext for each cell and each cost. It is for small problems only, and
+            is not suggested as an alternative to other protocols.
         secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
-        needs: A module of an extra that it computes with, and how to install that. A run without it is refused.
+        needs: A required module of an extra, and the command to install it. A run without it is refused.
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
         arrays: It has a form for whole teams at once (`communication/arrays`).
-        bears_loss: It goes on when messages are lost on their way (`Protocol.miss`, `Protocol.go_on`).
-        allocates: It takes task allocations only: teams that share nothing but that some things are done by one robot
-            at most, and in which each robot can do without (`solver/exclusions.py`).
-        congestion: Of those it also takes such in which several robots may do a task, each pair of them at a cost.
+        bears_loss: It continues when messages are lost in transit (`Protocol.miss`, `Protocol.go_on`).
+        allocates: It accepts only task allocations: teams whose only shared constraints are that a task is done by at
+            most one robot, and in which each robot may do none (`solver/exclusions.py`).
+        congestion: It also accepts task allocations in which several robots may do a task, each pair at a cost.
         drops_only: The protocol accepts only constraints that are dropped when a robot is absent (`model/absence.py`).
             Its robots withdraw one after the other, so earlier decisions could break a restated constraint.
-        privacy: The information that neighbours do not get.
+        privacy: The information that neighbours do not receive.
         use_when: A short recommendation, for `robochoc protocols`.
     """
 
@@ -82,18 +82,18 @@ class Traits:
 
     @property
     def lacks(self) -> str:
-        """Return what has to be installed first, in words; empty: nothing."""
+        """Return the missing dependency and how to install it, in words; empty if there is none."""
         if self.needs is None or find_spec(self.needs[0]) is not None:
             return ""
-        return f"{self.needs[0]}, which is not installed; say: {self.needs[1]}"
+        return f"{self.needs[0]}, which is not installed; run: {self.needs[1]}"
 
-    def fault_of_conclusion(self, verdict: str) -> str:
-        """Return why no robot of this protocol may end the search with `verdict`; empty if one may.
+    def conclusion_error(self, verdict: str) -> str:
+        """Return an error text if no robot of this protocol may end the search with `verdict`; otherwise empty.
 
-        The protocol's own code, the parent of processes, and the master across machines use this one rule.
+        The protocol itself, the parent of processes, and the master across machines all apply this rule.
         """
         if verdict in self.concludes:
             return ""
         may = " and ".join(self.concludes) or "nothing"
-        said = verdict if verdict in set(Verdict) else "what is no verdict"
-        return f"it has concluded {said}, and a robot of this protocol concludes {may} alone (Traits.concludes)"
+        concluded = verdict if verdict in set(Verdict) else "an invalid verdict"
+        return f"it has concluded {concluded}, but a robot of this protocol may conclude only {may} (Traits.concludes)"

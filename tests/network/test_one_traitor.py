@@ -72,8 +72,8 @@ def test_a_verdict_that_its_protocol_does_not_have(
     lied: Callable[..., InMemoryNetwork], protocol: type[Protocol], verdict: str
 ) -> None:
     state = lied(traitors.concluding(verdict), protocol).state
-    said = "what is no verdict" if verdict == "maybe" else verdict
-    assert state.lost["RB"].startswith(f"it has concluded {said}, and a robot of this protocol concludes ")
+    said = "an invalid verdict" if verdict == "maybe" else verdict
+    assert state.lost["RB"].startswith(f"it has concluded {said}, but a robot of this protocol may conclude only ")
     assert state.result(0).verdict is Verdict.UNKNOWN
 
 
@@ -83,7 +83,7 @@ def test_a_protocol_of_ones_own_is_held_to_the_same() -> None:
             self.conclude(Verdict.OPTIMAL)
 
     with pytest.raises(
-        ValueError, match="it has concluded optimal, and a robot of this protocol concludes no-solution"
+        ValueError, match="it has concluded optimal, but a robot of this protocol may conclude only no-solution"
     ):
         InMemoryNetwork(CHAIN, Boastful).search()
 
@@ -96,7 +96,7 @@ class Sly(ABT):
 
 
 def test_processes_are_held_to_the_same() -> None:
-    with ProcessesRun(CHAIN, Sly) as run, pytest.raises(RobotsLostError, match="it has concluded optimal, and a robot"):
+    with ProcessesRun(CHAIN, Sly) as run, pytest.raises(RobotsLostError, match="it has concluded optimal, but a robot"):
         run.search()
 
 

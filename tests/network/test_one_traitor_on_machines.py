@@ -60,7 +60,10 @@ def test_that_is_what_people_read(site: Deployment) -> None:
 @pytest.mark.parametrize(
     ("lie", "why"),
     [
-        ("optimal", "RB was lost: it has concluded optimal, and a robot of this protocol concludes no-solution alone"),
+        (
+            "optimal",
+            "RB was lost: it has concluded optimal, but a robot of this protocol may conclude only no-solution",
+        ),
         ("too early", "RB was lost: it has concluded a verdict before the start of the search"),
         ("a strange name", "RB was lost: it has reported a variable with an invalid name"),
         ("another's variable", "RB was lost: it has reported a value of A, which is RA's"),

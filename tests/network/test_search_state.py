@@ -81,7 +81,7 @@ def test_strangers_say_nothing() -> None:
 @looped("verdict", ["", "bogus", "SOLUTION", "Solution "])
 def test_a_verdict_that_is_none_is_refused(verdict: str) -> None:
     state = begun(AuditedSearchState(1, ROBOTS))
-    assert state.handle("R1", Conclusion(1, verdict)).startswith("it has concluded what is no verdict")
+    assert state.handle("R1", Conclusion(1, verdict)).startswith("it has concluded an invalid verdict")
     assert state.verdict is None
 
 

@@ -39,7 +39,7 @@ agent = partial(robot_of, ABT, different("AB", "AB", 2))
 def test_a_robot_alone_ends_the_search_with_what_its_protocol_declares_only() -> None:
     robot = agent("RA")
     for verdict in (Verdict.SOLUTION, Verdict.OPTIMAL, Verdict.UNKNOWN):
-        with pytest.raises(ValueError, match=rf"it has concluded {verdict}, .* concludes no-solution alone"):
+        with pytest.raises(ValueError, match=rf"it has concluded {verdict}, .* may conclude only no-solution"):
             robot.conclude(verdict)
         assert robot.verdict is None
     robot.conclude(Verdict.NO_SOLUTION)
@@ -49,13 +49,13 @@ def test_a_robot_alone_ends_the_search_with_what_its_protocol_declares_only() ->
 @looped(("concludes", "verdict", "fault"), [
     (ENDS_WITH_EITHER, "solution", ""), (ENDS_WITH_PROOF, "no-solution", ""),
     (UNDECLARED, "unknown", ""),
-    (ENDS_WITH_EITHER, "unknown", "it has concluded unknown, and a robot of this protocol concludes solution and"),
-    (UNDECLARED, "optimal", "it has concluded optimal, and"),
-    (UNDECLARED, "nonsense", "it has concluded what is no verdict, and"),
-    ((), "solution", "it has concluded solution, and a robot of this protocol concludes nothing alone"),
+    (ENDS_WITH_EITHER, "unknown", "it has concluded unknown, but a robot of this protocol may conclude only solution"),
+    (UNDECLARED, "optimal", "it has concluded optimal, but"),
+    (UNDECLARED, "nonsense", "it has concluded an invalid verdict, but"),
+    ((), "solution", "it has concluded solution, but a robot of this protocol may conclude only nothing"),
 ])  # fmt: skip
 def test_verdicts_that_are_not_declared_are_faults(concludes: tuple[Verdict, ...], verdict: str, fault: str) -> None:
-    told = Traits(concludes=concludes).fault_of_conclusion(verdict)
+    told = Traits(concludes=concludes).conclusion_error(verdict)
     assert told.startswith(fault)
     assert bool(told) is bool(fault)
 

@@ -1,8 +1,8 @@
 """Asymmetric Coordinated Local Search (ACLS).
 
-Local search in cycles for asymmetric costs. Each robot proposes a value that improves its own side, drawn by how much
-it improves. Its neighbours tell what their own sides cost now, and with the proposal. So the robot knows what its move
-costs both sides, and takes it with a probability if that is cheap enough.
+Local search in cycles for asymmetric costs. Each robot proposes a value that improves its own side, drawn in proportion
+to the improvement. Its neighbours answer with the costs of their own sides, now and with the proposal. So the robot
+knows the costs of its move for both sides, and moves with a given probability if it is cheap enough.
 
 - **When to use**: asymmetric costs, many robots, a good answer without proof.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality.
@@ -14,11 +14,11 @@ What others learn: for each proposal, the sum of a neighbour's own side in two e
 
 Choices that the paper leaves open, and differences:
 
-- The costs now are asked for in every cycle, so they are true when neighbours have moved.
-- Of broken hard constraints and costs, the first decide: a proposal that breaks less is cheaper, one that breaks more
-  is not taken. c is for costs.
+- The present costs are requested in every cycle, so they are correct after neighbours have moved.
+- Broken hard constraints come before costs: a proposal that breaks fewer is cheaper, one that breaks more is rejected.
+  c applies to costs.
 - Totally known constraints are part of every robot's own costs; they may be n-ary.
-- Where a value is lost, the last one known stands for it. A robot that misses a neighbour's side does not move.
+- If a value is lost, the last known one is used. A robot that misses a neighbour's side does not move.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -47,7 +47,7 @@ from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 
 class ACLSSettings(CycleCount, frozen=True):
-    """`coordination` (c): a proposal is taken if c times its cost is less than now; 1: only if it is cheaper.
+    """`coordination` (c): a proposal is accepted if c times its cost is below the present cost; 1: if it is cheaper.
 
     `probability` (p): the probability of a move. `cycles`: the number of cycles.
     """
@@ -95,21 +95,21 @@ class Sides(wire.Message, frozen=True):
         return f"my side costs {saving_in_words(*self.now)} now, and {saving_in_words(*self.proposed)} as you propose"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the sender's part, with both values of the receiver."""
+        # The cost of the sender's part with both values of the receiver.
         wanted = hearing.last(Proposal, hearing.receiver, hearing.sender)
         own = hearing.last(Value, hearing.receiver, hearing.sender)
-        told = hearing.last(Value, hearing.sender, hearing.receiver)
-        if wanted is None or wanted.value is None or own is None or told is None:
+        theirs = hearing.last(Value, hearing.sender, hearing.receiver)
+        if wanted is None or wanted.value is None or own is None or theirs is None:
             return NOTHING
         sides = ((own.value, self.now), (wanted.value, self.proposed))
         return [
-            PartPays(hearing.sender, told.value, hearing.receiver, value, INFINITE if broken else cost)
+            PartPays(hearing.sender, theirs.value, hearing.receiver, value, INFINITE if broken else cost)
             for value, (broken, cost) in sides
         ]
 
 
 class ACLS(CycleProtocol):
-    """One agent of ACLS. State: the `proposal` of this cycle, and `before` and `after`, what both sides would pay."""
+    """One agent of ACLS. State: the `proposal` of this cycle, and the costs of both sides `before` and `after` it."""
 
     messages = Value | Proposal | Sides
     settings: ClassVar[ACLSSettings] = ACLSSettings()
@@ -140,7 +140,7 @@ class ACLS(CycleProtocol):
         self.tell_value(self._propose)
 
     def _propose(self, messages: Mapping[str, wire.Message]) -> None:
-        """Draw a value that improves the own side, and propose it."""
+        """Draw a value that improves this robot's side, and propose it."""
         self._values = self.checked_values(messages)
         costs = self.problem.lexicographic_costs(self._values)
         self.before = costs[self.present]
@@ -153,7 +153,7 @@ class ACLS(CycleProtocol):
         self.listen(self.problem.neighbours, self._answer)
 
     def _drawn(self, gains: Sequence[LexicographicCost]) -> int | None:
-        """Return the place of a value that gains something, drawn by its gain; None: there is none."""
+        """Return the place of a value with a gain, drawn in proportion to the gain; None: there is none."""
         better = [place for place, saved in enumerate(gains) if saved > NO_GAIN]
         if not better:
             return None
@@ -163,7 +163,7 @@ class ACLS(CycleProtocol):
         return next((place for place, total in zip(better, sums, strict=True) if lot < total), better[-1])
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Tell each neighbour that proposes a value what the own side costs now, and would cost."""
+        """Send each neighbour with a proposal the costs of this robot's side, now and with the proposal."""
         for name in self.problem.neighbours:
             message = messages.get(name)
             wanted = message.value if isinstance(message, Proposal) else None
@@ -178,9 +178,9 @@ class ACLS(CycleProtocol):
         """Take the proposal with a probability, if it is cheap enough for both sides together."""
         index = self.present
         if self.proposal is not None and len(messages) == len(self.problem.neighbours):
-            told = [message for message in messages.values() if isinstance(message, Sides)]
-            before = _sum([self.before, *(sides.now for sides in told)])
-            after = _sum([self.after, *(sides.proposed for sides in told)])
+            sides = [message for message in messages.values() if isinstance(message, Sides)]
+            before = _sum([self.before, *(side.now for side in sides)])
+            after = _sum([self.after, *(side.proposed for side in sides)])
             if self._cheap(before, after) and self.chance() < self.settings.probability:
                 index = self.proposal
         self.take(index)
@@ -188,7 +188,7 @@ class ACLS(CycleProtocol):
             self.tell_value(self._propose)
 
     def _cheap(self, before: LexicographicCost, after: LexicographicCost) -> bool:
-        """Return whether a proposal that costs `after` is to be taken instead of `before`."""
+        """Return whether to accept a proposal that costs `after` instead of `before`."""
         return after[0] < before[0] or (after[0] == before[0] and after[1] * self.settings.coordination < before[1])
 
 

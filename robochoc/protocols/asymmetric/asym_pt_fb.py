@@ -1,29 +1,29 @@
 """Asymmetric Pseudo-tree Forward Bounding (AsymPT-FB).
 
-PT-FB for asymmetric costs: each robot of a constraint pays its own part, and nobody else knows it. The bounds that
-robots of a subtree report are about their own sides. Before a robot lets its own subtree search, it asks all robots
-above that it shares a constraint with for what their sides cost, for all its values. It keeps the answers: they hold as
-long as that robot has the same value, or has it again, and count in its bounds from then on.
+PT-FB for asymmetric costs: each robot of a constraint pays its own part, which no other robot knows. The bounds that
+robots of a subtree report are on their own sides. Before a robot has its subtree searched, it asks all robots above
+with which it shares a constraint for the costs of their sides with each of its values. It stores the answers: they
+apply whenever that robot has the same value, and are part of its bounds from then on.
 
 - **When to use**: asymmetric costs, a pseudo-tree with branches.
-- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Besides what PT-FB
-  remembers, a robot remembers at most as many costs as the other sides of its constraints have.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. In addition to
+  PT-FB's state, a robot stores at most as many costs as the other sides of its constraints have.
 - **Parameters**: none.
 - **Reference**: Litov, Meisels: "Forward bounding on pseudo-trees for DCOPs and ADCOPs", AIJ 252, 2017 (AsymPT-FB).
 
 The methods, besides those of PT-FB (`pt_fb.py`):
 
-    ask robots above for their sides   `search_subtree`     their answers   `_tell_row`     add them    `_take_row`
+    ask robots above for their sides   `search_subtree`     their answers   `_send_row`     add them    `_add_row`
 
-What others learn: what PT-FB tells, with bounds on own sides; and for each value that a robot has while its subtree
-searches, what its side charges for all values of a robot below, less the least of these. Of its part towards a robot
-below, a robot needs the least entry of each own value, and the rows of values that it takes.
+Information disclosed: as in PT-FB, with bounds on single sides; and for each value that a robot has while its subtree
+searches, the costs of its side for all values of a robot below, less their minimum. Of its part towards a robot below,
+a robot uses only the least entry for each of its values, and the rows of values that it takes.
 
 Choices that the paper leaves open, and differences:
 
-- All own values are asked about at once, and once for each value of the robot above.
-- A robot's costs contain, from the beginning, what its own parts charge at least with robots below. Its answers are
-  what its side costs more than that.
+- A robot asks about all of its values at once, and once for each value of the robot above.
+- A robot's costs contain, from the beginning, the least costs of its own parts with robots below. Its answers are the
+  costs of its side in excess of these.
 - Totally known constraints are paid by the lowest robot of the scope in the tree, as in PT-FB; they may be n-ary.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -54,7 +54,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class RowRequest(Message, frozen=True):
-    """A request for what the receiver's own side charges with its value for each of the sender's `values`."""
+    """A request for the costs of the receiver's side, with its value, for each of the sender's `values`."""
 
     values: list[Value]
 
@@ -65,7 +65,7 @@ class RowRequest(Message, frozen=True):
 
 
 class Row(Message, frozen=True):
-    """For each value of the receiver, the cost that the sender's own side adds to what the sender counts itself."""
+    """For each value of the receiver, the cost of the sender's side in excess of the cost that the sender counts."""
 
     costs: list[Number]
 
@@ -76,25 +76,25 @@ class Row(Message, frozen=True):
 
 
 class CostsOfBothSides(CostsAbove):
-    """The own values' costs with robots above, with these robots' sides as far as they have told them."""
+    """The costs of this robot's values with robots above, including these robots' sides as far as received."""
 
     def __init__(self, problem: LocalProblem) -> None:
         super().__init__(problem)
         self._rows: dict[tuple[str, Value], Sequence[Number]] = {}
 
     def knows(self, name: str) -> bool:
-        """Return whether `name` has told its side for its present value."""
+        """Return whether the side of `name` for its present value is known."""
         return (name, self.values[name]) in self._rows
 
-    def learn(self, name: str, row: Sequence[Number]) -> None:
-        """Add the side of `name` with its present value to the own costs, with it and all robots below it."""
+    def add_side(self, name: str, row: Sequence[Number]) -> None:
+        """Add the side of `name` with its present value to the costs, for it and all robots below it."""
         self._rows[name, self.values[name]] = row
         names = [*self.values]
         for lower in names[names.index(name) :]:
             self.totals[lower] = [cost + more for cost, more in zip(self.totals[lower], row, strict=True)]
 
     def added(self, name: str, view: Mapping[str, Value]) -> Sequence[Number]:
-        """Return what each own value costs more with the value of `name`, with its side if it is known."""
+        """Return the additional cost of each value with the value of `name`, including its side if it is known."""
         own = super().added(name, view)
         row = self._rows.get((name, view[name]))
         return own if row is None else [cost + more for cost, more in zip(own, row, strict=True)]
@@ -105,8 +105,8 @@ class AsymPTFB(PTFB):
 
     State, besides PT-FB's:
 
-    - `least`: for each robot below that shares a constraint, what each own value pays at least for the own parts of it.
-    - `asking`: robots above that have not told their sides yet; the search begins when they have. None: it is not to.
+    - `least`: for each robot below that shares a constraint, the least cost of each value for this robot's parts.
+    - `asking`: robots above that have not sent their sides yet; the search begins after them. None: no search waits.
     """
 
     messages = TreeMessage | Members | Request | Report | CPA | Reduce | Result | Terminate | RowRequest | Row
@@ -129,22 +129,21 @@ class AsymPTFB(PTFB):
         self.asking: set[str] | None = None
 
     def costs_above(self) -> CostsOfBothSides:
-        """Return what finds the own costs, and keeps what robots above have told."""
+        """Return the costs of this robot with robots above, which store the sides received."""
         return CostsOfBothSides(self.problem)
 
     def begin(self) -> None:
-        """Compute what the own sides cost at least; then begin as PT-FB."""
+        """Compute the least costs of this robot's sides; then begin as PT-FB."""
         self.least = {name: self.problem.least_side(name) for name in self.descendants}
         self.above.alone = [sum(costs) for costs in zip(self.problem.charges, *self.least.values(), strict=True)]
         super().begin()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Members | Request | Report | CPA | Reduce | Result | Terminate | RowRequest | Row", message):
             case RowRequest(values):
-                self._tell_row(sender, values)
+                self._send_row(sender, values)
             case Row(costs):
-                self._take_row(sender, costs)
+                self._add_row(sender, costs)
             case Reduce(bound) if self.asking is not None:
                 self.limit = min(self.limit, bound)
             case Members() | Request() | Report() | CPA() | Reduce() | Result() | Terminate():
@@ -156,9 +155,9 @@ class AsymPTFB(PTFB):
 
     @property
     def _unknown(self) -> list[str]:
-        """The robots above that may have a side, and have not told it for their present value.
+        """The robots above that may have a side, and have not sent it for their present value.
 
-        A robot knows which of its parents have one; a child may have one that it does not know of.
+        A robot knows which of its parents have a side; a child may have one unknown to it.
         """
         may = {*self.problem.pkc_parents, *self.problem.children}
         return [name for name in self.ancestors if name in may and not self.above.knows(name)]
@@ -170,18 +169,18 @@ class AsymPTFB(PTFB):
     def search_subtree(self, bound: Number) -> None:
         """Ask the robots above for their sides; search once all are known."""
         if self.asking is not None:
-            raise ValueError(f"{self.problem.agent} is asking for sides already")
+            raise ValueError(f"{self.problem.agent} is already asking for sides")
         self.limit, self.asking = bound, {*self._unknown}
         for name in self._unknown:
             self.send(name, RowRequest([*self.problem.values]))
         self._search_if_all_is_known()
 
-    def _take_row(self, sender: str, costs: list[Number]) -> None:
+    def _add_row(self, sender: str, costs: list[Number]) -> None:
         """Add the side of a robot above."""
         if not self.asking or sender not in self.asking or len(costs) != len(self.problem.values):
-            raise ValueError(f"{sender} tells sides that {self.problem.agent} has not asked for")
+            raise ValueError(f"{sender} sends costs for which {self.problem.agent} has not asked")
         self.asking.remove(sender)
-        self.above.learn(sender, costs)
+        self.above.add_side(sender, costs)
         self._search_if_all_is_known()
 
     def _search_if_all_is_known(self) -> None:
@@ -191,8 +190,8 @@ class AsymPTFB(PTFB):
 
     # Robots below
 
-    def _tell_row(self, sender: str, values: Sequence[Value]) -> None:
-        """Tell what the own side charges for each value of a robot below, besides what the own costs contain."""
+    def _send_row(self, sender: str, values: Sequence[Value]) -> None:
+        """Send a robot below the costs of this robot's side for each of its values, in excess of the costs counted."""
         index = self.present(self.child_above(sender))
         self.send(sender, Row([self._side(index, sender, value) for value in values]))
 

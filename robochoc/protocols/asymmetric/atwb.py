@@ -1,12 +1,12 @@
 """Asymmetric Two-Way Bounding (ATWB).
 
-AFB for asymmetric costs: each robot of a constraint pays its own part, and nobody else knows it. The robot that holds
+AFB for asymmetric costs: each robot of a constraint pays its own part, which no other robot knows. The robot that holds
 the current partial assignment (CPA) bounds it both ways at the same time. Robots after it answer with estimates, as in
-AFB (forward bounding). Robots before it that share a partially known constraint with it answer with what their own
-sides cost with its new value (backward bounding). Once all of these have answered, the CPA goes on with its exact cost.
-As soon as the cost so far and the estimates reach the best solution (B), the holder takes its next value.
+AFB (forward bounding). Robots before it that share a partially known constraint with it answer with the costs of their
+own sides with its new value (backward bounding). Once all of these have answered, the CPA continues with its exact
+cost. As soon as the cost so far and the estimates reach the best solution (B), the holder takes its next value.
 
-- **When to use**: asymmetric costs; fewer messages and checks than SyncABB, and more is said of own costs.
+- **When to use**: asymmetric costs; fewer messages and checks than SyncABB, but robots disclose more of their costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
 - **Parameters**: none.
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
@@ -14,21 +14,21 @@ As soon as the cost so far and the estimates reach the best solution (B), the ho
 
 The methods, besides those of AFB (`afb.py`):
 
-    backward bounding: ask robots before   `_pass_on`          their answers            `_tell_side`
-    both ways are priced: the CPA goes on  `_assign_cpa`       add them                 `_take_side`
+    backward bounding: ask robots before   `_pass_on`          their answers            `_send_side`
+    both costs are known: pass on the CPA  `_assign_cpa`       add them                 `_add_side`
 
-What others learn: robots after the holder learn the values of the CPA, its cost, and B. The holder learns bounds on the
-own costs of robots after it, and of each robot before what its side adds with each value that it tries. Of its part
-towards robots after it, a robot needs the least entry of each own value, and those that it is asked about; nothing else
-of it changes any message.
+Information disclosed: robots after the holder learn the values of the CPA, its cost, and B. The holder learns bounds on
+the costs of robots after it, and, of each robot before, the cost that its side adds with each value that it tries. Of
+its part towards robots after it, a robot uses only the least entry for each of its values, and the requested ones;
+nothing else of it changes any message.
 
 Choices that the paper leaves open, and differences:
 
-- A request names the counters of both values, and the answer that of the holder's. So a request for a value that its
-  receiver has given up is dropped, and an answer about a value that the holder has given up as well: a stronger CPA is
-  under way, or the search has ended.
-- A robot's cost in the CPA contains, from the beginning, what its own parts charge at least with robots after it. Its
-  answers are what its side costs more than that.
+- A request contains the counters of both values, and the answer the counter of the holder's. So a request for a value
+  that its receiver has changed is dropped, and so is an answer about a value that the holder has changed: a stronger
+  CPA is in transit, or the search has ended.
+- A robot's cost in the CPA contains, from the beginning, the least costs of its own parts with robots after it. Its
+  answers are the costs of its side in excess of these.
 - Totally known constraints are paid by their lowest robot, as in AFB; they may be n-ary.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -57,9 +57,10 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class SideRequest(Message, frozen=True):
-    """A request for what the receiver's own side of constraints with the sender adds to the CPA (backward bounding).
+    """A request for the cost that the receiver's side of constraints with the sender adds to the CPA.
 
-    The sender has taken `value`, the `counter`-th one; the receiver's value in the CPA is its `yours`-th.
+    This is backward bounding. The sender has taken `value`, its `counter`-th; the receiver's value in the CPA is its
+    `yours`-th.
     """
 
     value: Value
@@ -73,7 +74,7 @@ class SideRequest(Message, frozen=True):
 
 
 class Side(Message, frozen=True):
-    """The cost that the sender's own side adds, beyond what it counts, to the CPA with the `counter`-th value asked."""
+    """The cost that the sender's side adds, in excess of the counted cost, to the CPA with the `counter`-th value."""
 
     counter: int
     cost: Cost
@@ -85,20 +86,20 @@ class Side(Message, frozen=True):
 
 
 class KnownSides(CostLookup):
-    """The costs of the own values, and of the other sides what robots before have told: it is asked for once."""
+    """The costs of this robot's values, including the received sides of robots before, each requested once."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self._rank = order.rank
         self._known: dict[tuple[str, Value], dict[int, Cost]] = {}
-        """For a robot's value, its sides by the places of own values."""
+        """For a robot's value, its sides by the places of this robot's values."""
 
     def knows(self, robot: str, index: int | None) -> bool:
-        """Return whether `robot` has told its side for the own value at `index`, with its own in the last CPA."""
+        """Return whether the side of `robot`, with its value in the last CPA, for the value at `index` is known."""
         return index in self._known.get((robot, self._view[robot]), {})
 
-    def learn(self, robot: str, index: int, cost: Cost) -> None:
-        """Add the side of `robot`, with its value in the last CPA, to the own value at `index`."""
+    def add_side(self, robot: str, index: int, cost: Cost) -> None:
+        """Add the side of `robot`, with its value in the last CPA, to the cost of the value at `index`."""
         self._known.setdefault((robot, self._view[robot]), {})[index] = cost
         first = self._rank[robot] + 1
         for length in range(first, len(self._rows)):
@@ -109,13 +110,13 @@ class KnownSides(CostLookup):
             self.estimates[length] = self._estimate(row)
 
     def _added(self, robot: str) -> Sequence[Cost] | None:
-        """Return what each own value costs more with the value of `robot`, with its side as far as it is known."""
+        """Return the additional cost of each value with the value of `robot`, including its side as far as known."""
         more = super()._added(robot)
-        told = self._known.get((robot, self._view[robot]))
-        if not told:
+        sides = self._known.get((robot, self._view[robot]))
+        if not sides:
             return more
         own = more or [0] * len(self._problem.values)
-        return [cost + told.get(index, 0) for index, cost in enumerate(own)]
+        return [cost + sides.get(index, 0) for index, cost in enumerate(own)]
 
 
 class ATWB(AFB):
@@ -123,8 +124,8 @@ class ATWB(AFB):
 
     State, besides AFB's:
 
-    - `least`: for each child, what each own value pays at least for the own parts of constraints with it.
-    - `asked`: the robots before that have not told their sides for the own value yet; None: the CPA has gone on.
+    - `least`: for each child, the least cost of each value for this robot's parts of constraints with the child.
+    - `asked`: the robots before that have not sent their sides for the value yet; None: the CPA has been passed on.
     """
 
     messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate | SideRequest | Side
@@ -147,21 +148,20 @@ class ATWB(AFB):
         self.asked: set[str] | None = None
 
     def _cost_lookup(self) -> KnownSides:
-        """Return what finds the own costs, and keeps what robots before have told."""
+        """Return the lookup of this robot's costs, which stores the received sides of robots before."""
         return KnownSides(self.problem, self.order)
 
     def start(self) -> None:
-        """Compute what the own sides cost at least; then begin as AFB."""
+        """Compute the least costs of this robot's sides; then begin as AFB."""
         self.least = {child: self.problem.least_side(child) for child in self.problem.children}
         super().start()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("CPA | FBCPA | FBEstimate | NewSolution | Terminate | SideRequest | Side", message):
             case SideRequest() as request:
-                self._tell_side(sender, request)
+                self._send_side(sender, request)
             case Side() as side:
-                self._take_side(sender, side)
+                self._add_side(sender, side)
             case CPA() | FBCPA() | FBEstimate() | NewSolution() | Terminate():
                 super().receive(sender, message)
             case never:
@@ -170,14 +170,14 @@ class ATWB(AFB):
     # The holder
 
     def _assign(self, index: int) -> None:
-        """Take a value; its cost contains what the own sides charge at least, and what is known of other sides."""
+        """Take a value; its cost contains the least costs of this robot's sides, and the known costs of other sides."""
         super()._assign(index)
         self.cost += sum(least[index] for least in self.least.values())
 
     def _pass_on(self, lower_bounds: list[Cost]) -> bool:
-        """Ask robots on both sides for their costs, unless all robots before have told theirs: then the CPA goes on.
+        """Ask robots on both sides for their costs; pass on the CPA if the sides of all robots before are known.
 
-        Return False if the CPA is complete, or costs too much by what is known of other sides.
+        Return False if the CPA is complete, or too costly with the known other sides.
         """
         cpa = self._cpa
         if self.cost + self.estimates.totals(stamp_of(cpa))[-1] >= self.bound:
@@ -193,18 +193,18 @@ class ATWB(AFB):
         self._send_fb_cpas(cpa, self.below)
         return True
 
-    def _take_side(self, sender: str, side: Side) -> None:
-        """Add the side of a robot before, unless the own value is another one by now."""
+    def _add_side(self, sender: str, side: Side) -> None:
+        """Add the side of a robot before, unless the value has changed since."""
         if self.value is None or side.counter != self.counter:
             return
         if self.asked is None or sender not in self.asked:
-            raise ValueError(f"{sender} tells a side that {self.problem.agent} has not asked for")
+            raise ValueError(f"{sender} sends a cost for which {self.problem.agent} has not asked")
         self.asked.remove(sender)
-        self.costs.learn(sender, self.value, side.cost)
+        self.costs.add_side(sender, self.value, side.cost)
         self.cost += side.cost
 
     def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
-        """Keep a value, or take the next one, as AFB; once all robots before have told their sides, go on with it."""
+        """Keep a value, or take the next one, as AFB; pass on the CPA once the sides of all robots before are known."""
         super()._assign_cpa(lower_bounds)
         if self.value is not None and self.asked is not None and not self.asked:
             self.asked = None
@@ -213,8 +213,8 @@ class ATWB(AFB):
 
     # The robots before
 
-    def _tell_side(self, sender: str, request: SideRequest) -> None:
-        """Tell what the own side charges, besides what the CPA's cost contains; drop what is about another value."""
+    def _send_side(self, sender: str, request: SideRequest) -> None:
+        """Send the cost of this robot's side in excess of the cost in the CPA; drop requests about another value."""
         if sender not in self.problem.children:
             raise ValueError(f"{sender} is not below {self.problem.agent}")
         if self.over or self.value is None or request.yours != self.counter:

@@ -1,16 +1,16 @@
 """Guaranteed Convergence Asymmetric MGM (GCA-MGM).
 
-As MCS-MGM, but a robot hands over its entry whenever a neighbour's move has cost it anything. A robot that was handed
-over an entry pays it for good, so fewer and fewer moves look better than they are, and the robots come to rest.
+As MCS-MGM, but a robot hands over its entry whenever a neighbour's move has cost it anything. A robot pays the entries
+that it has received from then on, so fewer and fewer moves seem better than they are, and the robots stop moving.
 
-- **When to use**: asymmetric costs, where robots have to come to rest.
+- **When to use**: asymmetric costs, if convergence is required.
 - **Guarantees**: incomplete; it converges, and stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji,
-  what both sides of a pair pay together, never changes.
+  the total cost of both sides of a pair, never changes.
 - **Parameters (`--set`)**: `cycles` (default 100).
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
   problems", JAIR 47, 2013 (GCA-MGM).
 
-For the choices see `mcs_mgm.py`. More entries are told than there.
+For the choices see `mcs_mgm.py`. More entries are disclosed than there.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,29 +1,28 @@
 """Minimal Constraint Sharing MGM (MCS-MGM).
 
-MGM for asymmetric costs: gains are those of the own side. A robot that has moved may have cost a neighbour more than it
-gained itself. Then the neighbour hands over the entry of its part that has become due: from now on the other robot pays
-it. So the sum of both sides of each constraint stays what it was, and the next move of that robot takes it into
-account.
+MGM for asymmetric costs: each robot computes gains for its own side. A robot's move may cost a neighbour more than the
+robot has gained. Then the neighbour hands over the entry of its part that has become due: from then on the other robot
+pays it. So the sum of both sides of each constraint stays the same, and the next move of that robot takes the entry
+into account.
 
-- **When to use**: asymmetric costs, many robots, little told of the own costs.
-- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji, what both
-  sides of a pair pay together, never changes.
+- **When to use**: asymmetric costs, many robots, little disclosed of their costs.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji, the total cost
+  of both sides of a pair, never changes.
 - **Parameters (`--set`)**: `cycles` (default 100).
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
   problems", JAIR 47, 2013 (MCS-MGM).
 
-What others learn: single entries of parts, those that are handed over; values, and gains.
+Information disclosed: the single entries of parts that are handed over; values, and gains.
 
 Choices that the paper leaves open, and differences:
 
 - A cycle has three phases: values, transfers (mostly of nothing), gains.
-- Nothing is handed over before somebody has moved.
+- Nothing is handed over before a robot has moved.
 - If neighbours have the same gain, the first one in the priority order moves.
 - Gains and entries are pairs, broken hard constraints first. Totally known constraints are paid by all robots of the
   scope, as in MGM, and never handed over.
-- Where a value is lost, the last one known stands for it; a robot that misses a gain stays. An entry that is lost is
-  paid by nobody from then on: P_ij + P_ji then falls in the robots' eyes, not in the answer, whose cost is computed
-  from the files.
+- If a value is lost, the last known one is used; a robot that misses a gain does not move. No robot counts a lost entry
+  from then on: P_ij + P_ji then falls for the robots, but not in the answer, whose cost is computed from the files.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -69,14 +68,14 @@ class Transfer(Message, frozen=True):
 
 
 Entry = tuple[int, wire.Value]
-"""An entry of the own side: the place of the own value, and the other robot's value."""
+"""An entry of this robot's side: the place of its value, and the other robot's value."""
 
 
 class MCSMGM(Gainers):
     """One agent of MCS-MGM.
 
-    `changed` holds, for each neighbour, by how much entries of the own side differ from what the own part says: what
-    was handed over is added to them, or taken away. `told` are the neighbours' last gains.
+    `changed` holds, for each neighbour, the differences of entries of this robot's side from its part: entries handed
+    over are added or subtracted. `last_gains` are the neighbours' last gains.
     """
 
     messages = Value | Transfer | Gain
@@ -92,13 +91,13 @@ class MCSMGM(Gainers):
         writes_to_non_neighbours=False,
         bears_loss=True,
         privacy="parts of PKC but for entries that are handed over",
-        use_when="asymmetric costs, many robots, little told of them",
+        use_when="asymmetric costs, many robots, little disclosed of them",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.changed: dict[str, dict[Entry, LexicographicCost]] = {name: {} for name in problem.neighbours}
-        self.told: dict[str, LexicographicCost] = {}
+        self.last_gains: dict[str, LexicographicCost] = {}
         self._values: dict[str, wire.Value] = {}
 
     def begin(self) -> None:
@@ -107,12 +106,12 @@ class MCSMGM(Gainers):
         self.tell_value(self._transfer)
 
     def side(self, neighbour: str, value: wire.Value) -> LexicographicCost:
-        """Return what this robot pays for its present value and `value`, after all that was handed over."""
+        """Return this robot's cost for its present value and `value`, including all transfers."""
         plain = self.problem.own_side(self.present, neighbour, value)
         return _sum(plain, self.changed[neighbour].get((self.present, value), NO_GAIN))
 
     def burdens(self, view: Mapping[str, wire.Value]) -> list[LexicographicCost]:
-        """Return the cost of every own value, after all that was handed over."""
+        """Return the cost of every value of this robot, including all transfers."""
         costs = self.problem.lexicographic_costs(view)
         for name, value in view.items():
             changed = self.changed[name]
@@ -121,11 +120,11 @@ class MCSMGM(Gainers):
         return costs
 
     def too_much(self, loss: LexicographicCost, gained: LexicographicCost) -> bool:
-        """Return whether a neighbour's move, by which it `gained`, has cost this robot so much that it hands over."""
+        """Return whether a neighbour's move, by which it `gained`, has cost this robot enough for a transfer."""
         return loss > max(gained, NO_GAIN)
 
     def _transfer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Hand over entries that neighbours' moves have made due, with all neighbours' values known."""
+        """Hand over the entries that are due after neighbours' moves, with all neighbours' values known."""
         values = self.checked_values(messages)
         entries: dict[str, LexicographicCost | None] = {}
         for name, value in values.items():
@@ -133,7 +132,7 @@ class MCSMGM(Gainers):
             entry = None
             if value != before:
                 now = self.side(name, value)
-                if self.too_much(gain(now, self.side(name, before)), self.told.get(name, NO_GAIN)):
+                if self.too_much(gain(now, self.side(name, before)), self.last_gains.get(name, NO_GAIN)):
                     entry = now
                     self._add(name, value, gain(NO_GAIN, now))
             entries[name] = entry
@@ -143,7 +142,7 @@ class MCSMGM(Gainers):
         self.listen(self.problem.neighbours, self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """Take what was handed over, and send the gain of the best own move."""
+        """Add the entries received, and send the gain of this robot's best move."""
         for name, message in messages.items():
             if isinstance(message, Transfer) and message.entry is not None and name in self._values:
                 self._add(name, self._values[name], message.entry)
@@ -152,17 +151,19 @@ class MCSMGM(Gainers):
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if the own gain is the largest, with all neighbours' gains known."""
-        self.told = {name: (told.broken, told.cost) for name, told in messages.items() if isinstance(told, Gain)}
-        if len(self.told) < len(messages):
-            raise ValueError(f"a neighbour of {self.problem.agent} tells something else than its gain in this phase")
+        """Move if this robot's gain is the largest, with all neighbours' gains known."""
+        self.last_gains = {
+            name: (message.broken, message.cost) for name, message in messages.items() if isinstance(message, Gain)
+        }
+        if len(self.last_gains) < len(messages):
+            raise ValueError(f"a neighbour of {self.problem.agent} sends another message than its gain in this phase")
         moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
         self.take(self.target if moves else self.present)
         if not self.over:
             self.tell_value(self._transfer)
 
     def _add(self, neighbour: str, value: wire.Value, cost: LexicographicCost) -> None:
-        """Add `cost` to the own side's entry for the present value and `value` of a neighbour."""
+        """Add `cost` to the entry of this robot's side for its present value and `value` of a neighbour."""
         entry = (self.present, value)
         self.changed[neighbour][entry] = _sum(self.changed[neighbour].get(entry, NO_GAIN), cost)
 

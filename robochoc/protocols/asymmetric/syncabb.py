@@ -1,14 +1,14 @@
 """Synchronous Asymmetric Branch and Bound (SyncABB), with one phase or two.
 
-Branch and bound for asymmetric costs: each robot of a constraint pays its own part, and nobody else knows it. The
+Branch and bound for asymmetric costs: each robot of a constraint pays its own part, which no other robot knows. The
 values of the robots so far (the CPA) go from robot to robot in priority order, as in SyncBB. Its holder knows only its
-own side. So the CPA also goes back, and the robots before add what their own sides charge for the new value. Only the
-sum travels. Once it reaches the bound, the holder takes its next value.
+own side. So the CPA also goes back, and the robots before add the costs of their own sides for the new value. Only the
+sum is sent. Once it reaches the bound, the holder takes its next value.
 
 With one phase (`phases=1`) each new value is priced at once. With two, the CPA first becomes complete with the sides of
 lower robots alone, then goes back once, and each robot adds its sides towards all lower robots.
 
-- **When to use**: asymmetric costs, few robots, little said of the own costs.
+- **When to use**: asymmetric costs, few robots, little disclosed of their costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Space is linear.
 - **Parameters (`--set`)**: `phases` (1 or 2, default 1).
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
@@ -20,8 +20,8 @@ The methods:
     CPA on its way back                          `_add_side`, `_add_all_sides`
     it has come back, with its cost              `_hand_on`
 
-What others learn: robots after it learn its values, and the cost of the CPA in sum. A robot before learns the cost of
-the CPA without its own side. No entry of a part that no CPA asked for changes any message.
+Information disclosed: robots after a robot learn its values, and the total cost of the CPA. A robot before learns the
+cost of the CPA without its own side. Entries of a part that no CPA requires change no message.
 
 Choices that the paper leaves open, and differences:
 
@@ -59,7 +59,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class SyncABBSettings(Settings, frozen=True):
-    """`phases`: 1, each new value is priced by the robots before at once; 2, only a complete CPA is."""
+    """`phases`: 1, the robots before add their costs for each new value at once; 2, only for a complete CPA."""
 
     phases: Literal[1, 2] = 1
 
@@ -88,7 +88,7 @@ class CPA(Message, frozen=True):
 class CPABack(Message, frozen=True):
     """The CPA on its way back: the new value of `robot`, for the receiver to add its own side (`CPA_BACK`).
 
-    `left` are the robots that it has to reach after the receiver; `bound` is the cost at which it returns at once.
+    `left` are the robots that it must reach after the receiver; `bound` is the cost at which it returns at once.
     """
 
     robot: str
@@ -138,7 +138,7 @@ class Priced(Message, frozen=True):
         return f"with {words.receiver}'s value it costs {cost_text(self.paid)} in all"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what the CPA costs that it has sent back."""
+        # The cost of the CPA that the receiver has sent back.
         above = hearing.order[: hearing.order.index(hearing.receiver)]
         if not above:
             return NOTHING
@@ -154,7 +154,7 @@ class Priced(Message, frozen=True):
 
 
 class TooCostly(Message, frozen=True):
-    """The CPA with the receiver's value costs the bound or more, with the own sides of robots before."""
+    """The CPA with the receiver's value costs the bound or more, including the sides of robots before."""
 
     act = acts.REJECT_VALUE
     proves_nothing = True
@@ -187,7 +187,6 @@ class SyncABB(SyncBB):
         self.values: list[Value] = []
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         if self.verdict is not None:
             return
         match cast("CPA | CPABack | FullBack | Priced | TooCostly | Backtrack | Terminate", message):
@@ -210,7 +209,7 @@ class SyncABB(SyncBB):
     # The holder
 
     def _start_cpa(self, cpa: CPA) -> None:
-        """Take the first value with a CPA of all robots before, if these can have its values."""
+        """Take the first value with a CPA of all robots before, if its values are possible."""
         if len(cpa.values) != self.rank:
             raise ValueError(f"a CPA for {self.problem.agent} has {self.rank} values, not {len(cpa.values)}")
         self._view = dict(zip(self.order.names, cpa.values, strict=False))
@@ -220,7 +219,7 @@ class SyncABB(SyncBB):
         self._extend(0)
 
     def _pass_on(self, cost: Cost) -> bool:
-        """Send the CPA back for its cost, if robots before have a side in it; otherwise hand it on."""
+        """Send the CPA back for its cost, if robots before have a side in it; otherwise pass it on."""
         paid = self.paid + cost
         if self.settings.phases == TWO_PHASES:
             if not self.rank or self.rank + 1 < len(self.order.names):
@@ -243,22 +242,22 @@ class SyncABB(SyncBB):
 
     @property
     def _all_values(self) -> list[Value]:
-        """The CPA with the own value."""
+        """The CPA with this robot's value."""
         assert self.value is not None  # noqa: S101 - for mypy: the holder has one
         return [*self.values, self.problem.values[self.value]]
 
     @property
     def _next(self) -> int:
-        """The place of the next own value."""
+        """The place of this robot's next value."""
         return 0 if self.value is None else self.value + 1
 
     # The robots before
 
     def _add_side(self, back: CPABack) -> None:
-        """Add the own side of constraints with the CPA's holder, and send the CPA further back, or to its holder."""
+        """Add this robot's side of constraints with the CPA's holder; send the CPA further back, or to its holder."""
         above = self.order.names[: self.rank]
         if back.robot not in self.problem.children or not {*back.left} <= {*above}:
-            raise ValueError(f"a CPA of {back.robot} came back that cannot be")
+            raise ValueError(f"unexpected returning CPA of {back.robot}")
         paid = back.paid + self._side(back.robot, back.value)
         if paid >= back.bound:
             self.send(back.robot, TooCostly())
@@ -269,7 +268,7 @@ class SyncABB(SyncBB):
             self.send(back.robot, Priced(paid))
 
     def _add_all_sides(self, back: FullBack) -> None:
-        """Add the own side of constraints with all robots after this one, and send the complete CPA further back."""
+        """Add this robot's side of constraints with all robots after it, and send the complete CPA further back."""
         names = self.order.names
         if len(back.values) != len(names):
             raise ValueError(f"a complete CPA has {len(names)} values, not {len(back.values)}")
@@ -283,8 +282,8 @@ class SyncABB(SyncBB):
             self.send(names[-1], Priced(paid))
 
     def _side(self, robot: str, value: Value) -> Cost:
-        """Return what the own side of constraints with `robot` charges for its `value` and the own one."""
+        """Return the cost of this robot's side of constraints with `robot`, for its `value` and this robot's."""
         if self.value is None:
-            raise ValueError(f"a CPA of {robot} came back, and {self.problem.agent} has no value in it")
+            raise ValueError(f"unexpected returning CPA of {robot}: {self.problem.agent} has no value in it")
         broken, cost = self.problem.own_side(self.value, robot, value)
         return INFINITE if broken else cost

@@ -226,7 +226,6 @@ class CountDPOP(DPOP):
         self._own_numbers: Numbers | None = None
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | CountDimensions | Proceed | UTIL | Counts | VALUE", message):
             case Domain(values):
                 keep_once(sender, values, self.domains, self.ancestors)

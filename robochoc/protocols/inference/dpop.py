@@ -282,7 +282,6 @@ class DPOP(TreeProtocol):
         self._measure()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | Dimensions | Proceed | UTIL | VALUE", message):
             case Domain(values):
                 keep_once(sender, values, self.domains, self.ancestors)

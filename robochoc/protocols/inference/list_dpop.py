@@ -139,7 +139,6 @@ class ListDPOP(CountDPOP):
         self.listed: list[int] | None = None
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | CountDimensions | Proceed | UTIL | Counts | ListedValues", message):
             case ListedValues(assignments, numbers):
                 self._values_handler(assignments, numbers)

@@ -209,7 +209,6 @@ class MBDPOP(DPOP):
             self._measure()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("DomainAtDepth | Label | Proceed | Context | UTIL | VALUE", message):
             case DomainAtDepth(depth, values):
                 keep_once(sender, values, self.domains, self.ancestors)

@@ -128,7 +128,6 @@ class ODPOP(DPOP):
         self._waiting: set[str] = set()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Domain | Dimensions | Proceed | Ask | Good | Done | VALUE", message):
             case Domain(values):
                 keep_once(sender, values, self.domains, self.ancestors)

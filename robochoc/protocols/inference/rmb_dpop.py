@@ -318,7 +318,6 @@ class RMBDPOP(MBDPOP):
         self._places: dict[str, IncomingPlaces] = {}
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("RMBMessage", message):
             case ClusterLabel() as label:
                 self._keep_cluster_label(sender, label)

@@ -244,7 +244,6 @@ class SDPOP(DPOP, DynamicProtocol):
     # Messages
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Check | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE", message):
             case Check(changed):
                 self._go(changed)

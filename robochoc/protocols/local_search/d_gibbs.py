@@ -190,7 +190,6 @@ class DGibbs(TreeProtocol):
         self._tell(self.ancestors)
 
     def handle(self, sender: str, message: wire.Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Value | Difference | Finish", message):
             case Value(value, kept):
                 self.problem.refuse_value(sender, value)

@@ -320,7 +320,6 @@ class DUCT(TreeProtocol):
         self._tell_separator()
 
     def handle(self, sender: str, message: wire.Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Separator | SampleContext | SampleCost | Fixed", message):
             case Separator(robots, dearest):
                 self._keep_separator(sender, robots, dearest)

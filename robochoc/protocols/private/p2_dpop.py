@@ -201,7 +201,6 @@ class P2DPOP(LinearOrderProtocol):
         return msgspec.structs.replace(super().findings, bound=self.optimum if self.parent is None else None)
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("RerootingMessage | LinearMessage", message):
             case Join() | Setup() | Vector() as before:
                 self.reroot(sender, before)

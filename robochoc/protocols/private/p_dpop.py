@@ -268,7 +268,6 @@ class PDPOP(AnonymousTreeProtocol):
         self._compute_util()
 
     def handle(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type."""
         match cast("Codes | UTIL | VALUE", message):
             case Codes() as codes:
                 self._process_codes(sender, codes)
