@@ -76,7 +76,7 @@ def test_a_team_that_decides_again_comes_to_an_end(
 ) -> None:
     monkeypatch.setattr(stories, broken, _fails)
     if broken == "compare":
-        monkeypatch.setattr(Story, "_conclude", _fails)
+        monkeypatch.setattr(Story, "_comparison", _fails)
     story = _story(tmp_path, lambda story: story.decide())
     assert not story.running
     assert story.message == FAULT
