@@ -315,11 +315,11 @@ def test_a_landing_that_fails_is_tried_again_and_given_up_at_last(
 
 
 def test_whom_a_person_flies_is_left_alone_by_a_pilot_that_fails(
-    pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch
+    pilot: Ordered, played: Played, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arrived(pilot, played)
     played.seen = replace(played.seen, mode="POSCTL")
-    monkeypatch.setattr(pilot, "_trouble", broken)
+    monkeypatch.setattr(pilot.traffic, "see", broken)
     steps(pilot, played, 3)
     assert "land" not in played.done
 
