@@ -72,7 +72,7 @@ class Proposal(wire.Message, frozen=True):
 
     value: wire.Value | None
 
-    act = Act(Performative.QUERY_REF, "the sender asks what its proposal would cost the receiver")
+    act = Act(Performative.QUERY_REF, "the sender asks for the receiver's cost with its proposal")
 
     def in_words(self, words: Wording) -> str:
         if self.value is None:

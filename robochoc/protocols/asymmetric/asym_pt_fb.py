@@ -58,7 +58,7 @@ class RowRequest(Message, frozen=True):
 
     values: list[Value]
 
-    act = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side charges with each of its values")
+    act = Act(Performative.QUERY_REF, "the sender asks for the costs of the receiver's side with each of its values")
 
     def in_words(self, _: Wording) -> str:
         return f"what does your side add for each of my {counted(len(self.values), 'value')}?"

@@ -67,7 +67,7 @@ class SideRequest(Message, frozen=True):
     counter: int
     yours: int
 
-    act = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side of constraints adds to the cost")
+    act = Act(Performative.QUERY_REF, "the sender asks for the cost that the receiver's side of constraints adds")
 
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} for now; what does your side of it add?"

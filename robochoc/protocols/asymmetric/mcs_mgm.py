@@ -57,7 +57,7 @@ class Transfer(Message, frozen=True):
 
     entry: tuple[int, int | float] | None
 
-    act = Act(Performative.INFORM, "the receiver comes to know what its move has cost the sender, if that is too much")
+    act = Act(Performative.INFORM, "the receiver learns the cost of its move for the sender, if that is too high")
     # The entry may contain costs that were handed over before.
     proves_nothing = True
 

@@ -64,7 +64,7 @@ class SyncABBSettings(Settings, frozen=True):
     phases: Literal[1, 2] = 1
 
 
-ASK = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side of constraints adds to the cost")
+ASK = Act(Performative.QUERY_REF, "the sender asks for the cost that the receiver's side of constraints adds")
 
 
 class CPA(Message, frozen=True):
@@ -132,7 +132,7 @@ class Priced(Message, frozen=True):
 
     paid: Cost
 
-    act = Act(Performative.INFORM, "the answer to `CPABack` or `FullBack`: what the CPA costs")
+    act = Act(Performative.INFORM, "the answer to `CPABack` or `FullBack`: the cost of the CPA")
 
     def in_words(self, words: Wording) -> str:
         return f"with {words.receiver}'s value it costs {cost_text(self.paid)} in all"

@@ -50,7 +50,7 @@ class Threshold(Message, frozen=True):
     threshold: Number
     context: dict[str, message.Value]
 
-    act = Act(Performative.REQUEST, "the receiver is to keep its value while it costs no more")
+    act = Act(Performative.REQUEST, "the receiver must keep its value while it costs no more")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:

@@ -128,7 +128,7 @@ class FBCPA(Message, frozen=True):
 
     assignments: list[Assignment]
 
-    act = Act(Performative.QUERY_REF, "the sender asks which costs the receiver adds to the CPA")
+    act = Act(Performative.QUERY_REF, "the sender asks for the costs that the receiver adds to the CPA")
 
     def in_words(self, words: Wording) -> str:
         values = words.partial([value for value, _ in self.assignments])
@@ -182,7 +182,7 @@ class NewSolution(Message, frozen=True):
     values: list[Value]
     cost: Cost
 
-    act = Act(Performative.INFORM, "the receiver comes to know the best solution so far")
+    act = Act(Performative.INFORM, "the receiver learns the best solution so far")
 
     def in_words(self, words: Wording) -> str:
         return f"the best solution so far costs {cost_text(self.cost)}: {words.partial(self.values)}"

@@ -203,7 +203,7 @@ class Moved(Message, frozen=True):
 
     costs: list[Number]
 
-    act = Act(Performative.INFORM, "the receiver comes to know costs that it is to count as its own")
+    act = Act(Performative.INFORM, "the receiver learns costs that it must count as its own")
 
     def in_words(self, _: Wording) -> str:
         told = ", ".join(cost_text(cost) for cost in self.costs)

@@ -51,7 +51,7 @@ class Members(Message, frozen=True):
 
     linked: dict[str, list[str]]
 
-    act = Act(Performative.INFORM, "the receiver comes to know who below it is linked with whom above")
+    act = Act(Performative.INFORM, "the receiver learns the links between robots below and above it")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

@@ -209,7 +209,7 @@ class InferCtxt(Message, frozen=True):
 
     places: dict[str, int]
 
-    act = Act(Performative.REQUEST, "the receiver is to infer a tighter lower bound")
+    act = Act(Performative.REQUEST, "the receiver must infer a tighter lower bound")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

@@ -84,7 +84,7 @@ class Search(Message, frozen=True):
 
     bound: Number
 
-    act = Act(Performative.REQUEST, "the receiver is to search its subtree")
+    act = Act(Performative.REQUEST, "the receiver must search its subtree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

@@ -84,7 +84,7 @@ class Reduce(Message, frozen=True):
 
     bound: Number
 
-    act = Act(Performative.INFORM, "the receiver comes to know a lower bound for its search")
+    act = Act(Performative.INFORM, "the receiver learns a lower bound for its search")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

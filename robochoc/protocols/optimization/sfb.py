@@ -128,7 +128,7 @@ class Above(Message, frozen=True):
     domains: list[Domain]
     runs: list[Run]
 
-    act = Act(Performative.INFORM, "the receiver comes to know the domains above it")
+    act = Act(Performative.INFORM, "the receiver learns the domains above it")
 
     @classmethod
     def of(cls, domains: Iterable[Domain]) -> Self:
@@ -155,7 +155,7 @@ class Below(Message, frozen=True):
     runs: list[Run]
     most: int
 
-    act = Act(Performative.INFORM, "the receiver comes to know the domains and charges below it")
+    act = Act(Performative.INFORM, "the receiver learns the domains and charges below it")
 
     @classmethod
     def of(cls, robots: Iterable[tuple[Domain, Charges]], most: int) -> Self:
@@ -215,7 +215,7 @@ class CPAs(Message, frozen=True):
 class Explored(Message, frozen=True):
     """The end of the exploration of the oldest unanswered `CPAs` from the receiver."""
 
-    act = Act(Performative.INFORM, "what was proposed with `CPAs` has been seen to the end")
+    act = Act(Performative.INFORM, "the partial assignments proposed with `CPAs` have been explored")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -228,7 +228,7 @@ class Solution(Message, frozen=True):
     cost: int
     places: list[int]
 
-    act = Act(Performative.INFORM, "the receiver comes to know a solution that costs less")
+    act = Act(Performative.INFORM, "the receiver learns a solution that costs less")
 
     def in_words(self, _: Wording) -> str:
         places = listed([str(place + 1) for place in self.places])

@@ -219,7 +219,7 @@ class Narrow(Message, frozen=True):
     values: tuple[Value, ...]
 
     act = Act(
-        Performative.REQUEST, "with all of the receiver's aggregate no value of the sender goes, with a part some"
+        Performative.REQUEST, "the sender has a value for a part of the receiver's aggregate, but none for all of it"
     )
     proves_nothing = True
 

@@ -50,7 +50,7 @@ class NotOk(Message, frozen=True):
     assignments: Assignments
     sc: int
 
-    act = Act(Performative.DISCONFIRM, "the receiver takes the CPA to be right, and it has no solution")
+    act = Act(Performative.DISCONFIRM, "the receiver assumes that the CPA is consistent, and it has no solution")
 
     def in_words(self, words: Wording) -> str:
         return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"

@@ -41,7 +41,7 @@ class Solved(Message, frozen=True):
     solution: dict[str, Value]
 
     shareable = True
-    act = Act(Performative.INFORM, "the receiver comes to know the solution")
+    act = Act(Performative.INFORM, "the receiver learns the solution")
 
     def in_words(self, words: Wording) -> str:
         return f"a solution is found, and the search is over: {words.assigned(self.solution.items())}"

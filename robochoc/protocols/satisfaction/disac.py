@@ -66,7 +66,7 @@ class Del(Message, frozen=True):
 
     places: tuple[int, ...]
 
-    act = Act(Performative.INFORM, "the receiver comes to know which of the sender's values are in no solution")
+    act = Act(Performative.INFORM, "the receiver learns the sender's values that are in no solution")
     # The removal may follow from any robot's constraints.
     proves_nothing = True
 
