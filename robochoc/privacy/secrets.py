@@ -21,7 +21,7 @@ from robochoc.model.wording import is_withdrawn
 from robochoc.privacy.possible import Possible, Secret, Terms
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.explanation import held_above, held_below
+from robochoc.solver.explanation import constraints_above, parts_below
 
 MOST_SECRETS = 200_000
 """Robots' values and entries of constraints, in all."""
@@ -73,9 +73,9 @@ class TeamSecrets:
         for robot in team.team.robots:
             self._add_charges(robot, team, parameters)
         for robot in team.team.robots:
-            for one in held_above(robot):
+            for one in constraints_above(robot):
                 self._add_constraint(one.constraint, robot.name)
-            for _, part in held_below(robot):
+            for _, part in parts_below(robot):
                 self._add_constraint(part.constraint, robot.name)
             for other in (*(one.name for one in robot.parents), *(one.name for one in robot.children)):
                 self._link(robot.name, other)

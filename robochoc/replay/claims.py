@@ -30,7 +30,7 @@ from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_by_class
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.domain import TooManySolutionsError
+from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError, assignment_cost, violations
 
 _COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")

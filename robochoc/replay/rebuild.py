@@ -26,10 +26,10 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileError, Compiler, CompileTimeoutError, Limits
+from robochoc.solver.compiled_domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
-from robochoc.solver.domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
+from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.system.errors import TransferableError
 from robochoc.verification.objective import withdrawal_cost
 

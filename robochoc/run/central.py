@@ -16,7 +16,7 @@ from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check_assignment
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, TeamSolver
-from robochoc.solver.failures import SolverLostError
+from robochoc.solver.errors import SolverLostError
 from robochoc.verification.absence_reason import absence_reason
 from robochoc.verification.checker import assignment_cost, robots_without_values
 from robochoc.verification.objective import withdrawal_cost

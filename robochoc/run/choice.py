@@ -23,18 +23,17 @@ from robochoc.run.facts import LARGE, Facts, Sizes
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import UnknownProtocolError, installed_protocols, protocol_named
-from robochoc.solver.compile import CompileError, CompileTimeoutError
-from robochoc.solver.domain import TooManySolutionsError
+from robochoc.solver.compile import CompileError, CompileTimeoutError, TeamCompileTimeoutError
+from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.failures import SolverLostError, SolverMissingError
-from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.solver.errors import SolverLostError, SolverMissingError
 
 SOMEBODY = "it accepts the team with these options, and what suits the team better does not"
 NOBODY = "no protocol accepts the team with these options"
 
 FAILURES = (
-    CompileError, CompileTimeoutError, TooManySolutionsError, SolverLostError, SolverMissingError, OutOfTimeError,
-    UnsupportedError,
+    CompileError, CompileTimeoutError, TooManySolutionsError, SolverLostError, SolverMissingError,
+    TeamCompileTimeoutError, UnsupportedError,
 )  # fmt: skip
 """What compiling domains may end with. The run tells of it."""
 

@@ -12,7 +12,7 @@ from robochoc.communication.run_result import Progress
 from robochoc.journal.events import Observer
 from robochoc.run.options import CentralSolverName, Options
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.team_compiler import TeamCompiler
+from robochoc.solver.compile import TeamCompiler
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess

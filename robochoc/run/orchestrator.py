@@ -25,10 +25,9 @@ from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import Environment
 from robochoc.run.this_machine import ThisMachine
-from robochoc.solver.compile import CompileTimeoutError
-from robochoc.solver.domain import TooManySolutionsError
+from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
+from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
-from robochoc.solver.team_compiler import OutOfTimeError
 from robochoc.system.time_limit import TimeLimitError, computed_by
 from robochoc.verification.checker import check_told_cost
 
@@ -140,7 +139,7 @@ def _solve_distributed(
     except TooLargeError as refused:
         others = _alternatives(team, options, complete=True, costs=True, narrow=protocol.traits.wide_tables)
         raise UnsupportedError(f"{refused}{others}") from None
-    except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
+    except (TooManySolutionsError, CompileTimeoutError, TeamCompileTimeoutError) as limit:
         outcome = deployment.outcome(header, deployment.limit_reached(str(limit)))
     context.kills.warn_of_pending()
     return outcome

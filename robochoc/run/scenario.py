@@ -33,9 +33,9 @@ from robochoc.model.rejoin import rejoin
 from robochoc.model.symbols import symbol_table
 from robochoc.model.team_edits import ChangeError, without_robots
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
+from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
-from robochoc.solver.team_compiler import OutOfTimeError
 
 Compile = Callable[[Team], CompiledTeam]
 
@@ -182,7 +182,7 @@ class ScenarioRun:
                 return
             try:
                 epoch = self._change(session, joining)
-            except OutOfTimeError:
+            except TeamCompileTimeoutError:
                 yield FinishedEpoch(self.team, epoch, opened, NOT_SEARCHED)
                 return
 

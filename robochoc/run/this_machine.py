@@ -24,8 +24,8 @@ from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, Scenar
 from robochoc.run.start_events import StartEvents
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.team_compiler import NoLocalSolutionError
 from robochoc.verification.objective import withdrawal_cost
 
 

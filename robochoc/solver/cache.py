@@ -1,9 +1,9 @@
-"""Solutions of networks that were solved before, kept in the user's cache folder by what the network is.
+"""A cache of solved networks in the user's cache folder.
 
-A file is named by the digest of the network and of the versions of all that went into the answer, so other
-versions have other files. It begins with the digest of its own content and repeats its name: a file that is cut
-off, changed, or in the wrong place is noticed, removed, and made again. Files are written beside and renamed, so
-runs at the same time see whole files only. Nothing in it is ever executed or unpickled.
+A file is named by the digest of the network and of the versions that determine the answer, so other versions use other
+files. It begins with the digest of its content and repeats its name: truncated, changed and misplaced files are
+detected, removed and written again. Files are written under another name and renamed, so concurrent runs see only
+complete files. Nothing in them is executed or unpickled.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from robochoc.solver.encoding import Codes, Network
 from robochoc.system.files import write_atomically
 
 FORMAT = 1
-"""Counts up when what is stored, or how networks are encoded, changes."""
+"""The version of the file format and the encoding of networks."""
 MAX_BYTES = 64 << 20
 SUFFIX = ".solutions"
 _DIGEST_BYTES = 32
 
 
 class _Entry(msgspec.Struct, frozen=True, array_like=True):
-    """`count` solutions of `width` codes each, four bytes a code."""
+    """`count` solutions with `width` codes each, four bytes for each code."""
 
     key: str
     width: int
@@ -36,14 +36,14 @@ class _Entry(msgspec.Struct, frozen=True, array_like=True):
 
 
 class SolutionCache:
-    """The cache in `folder` (made when it is needed). What it cannot read or write it does without."""
+    """The cache in `folder`, which is created when needed. Errors of reading and writing are ignored."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
 
     @cached_property
     def folder(self) -> Path:
-        """Return where its files are; looked up when it is needed first: most robots need no solver."""
+        """The folder of its files; determined on first use, since most robots need no solver."""
         return self._folder or cache_folder()
 
     @cached_property
@@ -51,11 +51,11 @@ class SolutionCache:
         return FORMAT, _solver_version()
 
     def key(self, network: Network) -> str:
-        """Return the name of `network`: equal for equal networks of any robot or team."""
+        """Return the key of `network`: equal for equal networks of any robot or team."""
         return _digest(msgspec.msgpack.encode((self._versions, network))).hex()
 
     def get(self, network: Network) -> tuple[Codes, ...] | None:
-        """Return all solutions of `network`, if they are known."""
+        """Return all solutions of `network`. None: they are not in the cache."""
         path = self._path(self.key(network))
         try:
             content = path.read_bytes()
@@ -68,7 +68,7 @@ class SolutionCache:
         return solutions
 
     def put(self, network: Network, solutions: tuple[Codes, ...]) -> None:
-        """Remember all solutions of `network`, unless they are too many, or the folder cannot be written."""
+        """Store all solutions of `network`, unless there are too many, or the folder is not writable."""
         key, width = self.key(network), len(network.domains)
         codes = array("i", (code for solution in solutions for code in solution)).tobytes()
         if len(codes) > MAX_BYTES:
@@ -84,7 +84,7 @@ class SolutionCache:
             yield from sorted(path for path in self.folder.glob(f"*{SUFFIX}") if path.is_file())
 
     def clear(self) -> int:
-        """Remove all files; returns how many there were. Raises `OSError` when one cannot be removed."""
+        """Remove all files, and return their number. Raises `OSError` if a file cannot be removed."""
         gone = 0
         for path in self.files():
             path.unlink(missing_ok=True)
@@ -96,14 +96,14 @@ class SolutionCache:
 
 
 def cache_folder() -> Path:
-    """Return where the user's cache is (`~/.cache/robochoc` on Linux; `XDG_CACHE_HOME` is respected)."""
+    """Return the user's cache folder (`~/.cache/robochoc` on Linux; `XDG_CACHE_HOME` is respected)."""
     from platformdirs import user_cache_path  # noqa: PLC0415 - only solvers have a cache
 
     return user_cache_path("robochoc")
 
 
 def _read(content: bytes, key: str, width: int) -> tuple[Codes, ...] | None:
-    """Return the solutions in a cache file; None if it is not what it should be."""
+    """Return the solutions in a cache file. None: the file is invalid."""
     digest, body = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
     if _digest(body) != digest:
         return None
@@ -126,7 +126,7 @@ def _digest(content: bytes) -> bytes:
 
 
 def _solver_version() -> str:
-    """Return what pycsp3 says it is, without importing it (it patches built-in types), or package metadata (slow)."""
+    """Return pycsp3's version without importing it (it patches built-in types) or package metadata (slow)."""
     from importlib.util import find_spec  # noqa: PLC0415 - start-up: the same
 
     found = find_spec("pycsp3")

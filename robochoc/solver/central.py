@@ -1,8 +1,8 @@
-"""The central solver: solves, counts or minimises a whole team's problem at once. Large problems go to ACE.
+"""The central solver: solves a whole team's problem, counts its solutions or minimises its cost, by ACE if it is large.
 
-It sees every file, which no robot does. It confirms or refutes the verdict of a team, and counts solutions. Components
-that share no constraint are solved apart. The rest goes to ACE with cliques made explicit (`solver/cliques.py`). Two
-strategies run at once, and the first answer counts.
+Unlike robots, it reads every file. It confirms or refutes the verdict of a team, and counts solutions. Components
+without common constraints are solved separately. Large ones go to ACE with explicit cliques (`solver/cliques.py`). Two
+strategies run in parallel, and the first answer counts.
 """
 
 from __future__ import annotations
@@ -17,27 +17,26 @@ from typing import Protocol
 
 from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.ace import AceProcess
+from robochoc.solver.ace import AceProcess, SolvedBy, SolverAnswer
 from robochoc.solver.ace_messages import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, components
-from robochoc.solver.failures import SolverTimeoutError
-from robochoc.solver.query import SolvedBy, SolverAnswer
+from robochoc.solver.errors import SolverTimeoutError
 from robochoc.solver.symmetry import break_symmetries, orbits, symmetries
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 MAX_CLIQUE_ROWS = 20_000
-"""A clique with more solutions than this stays an allDifferent."""
+"""The maximum number of solutions of a clique that becomes a table; others become an allDifferent."""
 TABLE_PATIENCE_S = 20.0
 """The maximum time for all tables of cliques together."""
 MAX_ORBITS = 20_000
-"""The largest number of solutions, up to symmetry, that are listed to count all. If there are more, ACE counts."""
+"""The maximum number of solutions, up to symmetry, that are listed for counting. If there are more, ACE counts."""
 MANY_ROWS = 100_000
-"""The number of table rows from which ACE is started at once, while the first task is still prepared."""
+"""The number of table rows from which ACE is started immediately, while the first task is prepared."""
 HEDGE_S = 5.0
-"""Seconds without an answer after which the other strategy is tried in parallel."""
+"""The time without an answer, in seconds, after which the other strategy starts in parallel."""
 _TICK_S = 0.2
 NO_SOLUTIONS = SolverAnswer(0, complete=True, solutions=())
 
@@ -48,10 +47,10 @@ class CentralAnswer:
 
     Attributes:
         verdict: The answer to the problem.
-        assignment: A solution; where costs are minimised, the cheapest that was found.
-        count: The number of solutions, if it was asked for.
-        cost: The cost of the assignment, where costs are minimised.
-        bound: A lower bound on the cost of all assignments, where costs are minimised.
+        assignment: A solution; if costs are minimised, the cheapest one found.
+        count: The number of solutions, if requested.
+        cost: The cost of the assignment, if costs are minimised.
+        bound: A lower bound on the cost of all assignments, if costs are minimised.
     """
 
     verdict: Verdict
@@ -62,8 +61,8 @@ class CentralAnswer:
 
 
 @dataclass(frozen=True)
-class _Wanted:
-    """The task: find up to `limit` solutions, or their number. `in_order`: in the variables' order at first."""
+class _SearchRequest:
+    """Find up to `limit` solutions, or their number. `in_order`: first with the static variable order."""
 
     limit: int | None = None
     count_only: bool = False
@@ -75,21 +74,21 @@ class _Wanted:
 
 
 class TeamSolver(Protocol):
-    """What decides whole teams: `CentralSolver`, and `CpSatSolver` (`solver/cp_sat.py`)."""
+    """A solver of whole teams: `CentralSolver` or `CpSatSolver` (`solver/cp_sat.py`)."""
 
     @property
     def name(self) -> str:
-        """Its name in messages."""
+        """The name in messages."""
 
     def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
         """See `CentralSolver.solve`."""
 
 
 class CentralSolver:
-    """Decides teams, small ones by enumeration, others by ACE (with `always_ace` all).
+    """Solves teams: small ones by enumeration, others (with `always_ace` all) by ACE.
 
-    `deadline` is on the monotonic clock; `progress` is called while ACE works. A `solver` that is warm may be lent;
-    it is left running, and says itself whether small tasks go to ACE.
+    `deadline` is on the monotonic clock; `progress` is called while ACE works. A given warm `solver` is left running,
+    and its own setting determines whether it enumerates small tasks.
     """
 
     name = CENTRAL_SOLVER
@@ -114,16 +113,16 @@ class CentralSolver:
         """Solve `team`, or count its solutions.
 
         Args:
-            team: The team. Of a DisWCSP the cost is minimised.
+            team: The team. The cost of a DCOP is minimised.
             count: Whether to return the number of solutions instead of one.
             withdrawal_cost: The cost of withdrawing a robot of weight 1, if robots may withdraw. Costs and withdrawals
                 are then minimised together. Withdrawn robots have no values.
 
         Returns:
-            The answer. Its verdict is `unknown` when the time was over; then it has the best solution so far.
+            The answer. If the deadline passed, its verdict is `unknown`, with the best solution so far.
 
         Raises:
-            SolverMissingError: if ACE is needed, and there is no Java.
+            SolverMissingError: if ACE is needed, and Java is not available.
             SolverLostError: if the solver's process died.
             UnsupportedError: if a constraint or its costs are too large.
         """
@@ -157,7 +156,7 @@ class CentralSolver:
         return CentralAnswer(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
 
     def _minimum(self, team: Team, parts: list[WeightedComponent]) -> CentralAnswer:
-        """Return the cheapest solution of all `parts`, which do not depend on each other."""
+        """Return the cheapest solution of all `parts`, which are independent."""
         parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
         cost = bound = constant_costs(team)
         assignment: dict[str, int] | None = {}
@@ -181,7 +180,7 @@ class CentralSolver:
         return CentralAnswer(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
 
     def _cheapest(self, part: WeightedComponent, ace: AceProcess) -> tuple[Codes | None, bool]:
-        """Return a solution, and whether none is cheaper; without one, whether there is none."""
+        """Return the cheapest solution found, if any, and whether that is proven."""
         network = part.network
         if network.impossible:
             return None, True
@@ -191,7 +190,7 @@ class CentralSolver:
         if self._time_is_over:
             return None, False
         try:
-            if ace.begin(network, limit=1, costs=part.costs, deadline=self._deadline):
+            if ace.submit(network, limit=1, costs=part.costs, deadline=self._deadline):
                 self._watch(ace)
             answer = ace.answer(self._deadline)
         except SolverTimeoutError as over:
@@ -204,14 +203,14 @@ class CentralSolver:
             if self._progress:
                 self._progress()
             if self._time_is_over:
-                raise ace.give_up()
+                raise ace.abort()
 
     @property
     def _time_is_over(self) -> bool:
         return self._deadline is not None and time.monotonic() >= self._deadline
 
     def _solve(self, part: Component, ace: AceProcess, spare: AceProcess, *, count: bool) -> SolverAnswer:
-        """Return the number of solutions of one component, or its first one."""
+        """Return the number of solutions of one component, or its first solution."""
         network = part.network
         if network.impossible:
             return NO_SOLUTIONS
@@ -222,20 +221,20 @@ class CentralSolver:
         if group:
             smaller = computed_by(self._deadline, break_symmetries, network, group)
             if not count:
-                return self._search(smaller, ace, spare, _Wanted(limit=1, in_order=True))
-            first = self._search(smaller, ace, spare, _Wanted(limit=MAX_ORBITS, in_order=True))
+                return self._search(smaller, ace, spare, _SearchRequest(limit=1, in_order=True))
+            first = self._search(smaller, ace, spare, _SearchRequest(limit=MAX_ORBITS, in_order=True))
             if first.complete:
                 images = computed_by(self._deadline, orbits, first.solutions, group, network)
                 return SolverAnswer(len(images), complete=True, solutions=())
-        wanted = _Wanted(count_only=True, in_order=True) if count else _Wanted(limit=1)
-        return self._search(network, ace, spare, wanted)
+        request = _SearchRequest(count_only=True, in_order=True) if count else _SearchRequest(limit=1)
+        return self._search(network, ace, spare, request)
 
-    def _search(self, network: Network, ace: AceProcess, spare: AceProcess, wanted: _Wanted) -> SolverAnswer:
+    def _search(self, network: Network, ace: AceProcess, spare: AceProcess, request: _SearchRequest) -> SolverAnswer:
         strong = computed_by(self._deadline, with_cliques, network, lambda clique: self._table(ace, clique))
-        return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, wanted)
+        return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, request)
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
-        """Return all solutions of a clique; None when there are too many, or it takes too long."""
+        """Return all solutions of a clique. None: there are too many, or it takes too long."""
         if clique not in self._tables:
             self._tables[clique] = self._known_or_solved(ace, clique)
         return self._tables[clique]
@@ -258,11 +257,11 @@ class CentralSolver:
             self._cache.put(clique, answer.solutions)
         return answer.solutions
 
-    def _race(self, network: Network, first: AceProcess, second: AceProcess, wanted: _Wanted) -> SolverAnswer:
-        """Return the answer of the faster of two strategies. The second starts when the first takes long."""
-        usual, other = wanted.strategies
-        limit, count_only, deadline = wanted.limit, wanted.count_only, self._deadline
-        if not first.begin(network, limit=limit, count_only=count_only, strategy=usual, deadline=deadline):
+    def _race(self, network: Network, first: AceProcess, second: AceProcess, request: _SearchRequest) -> SolverAnswer:
+        """Return the answer of the faster of two strategies; the second starts if the first takes long."""
+        usual, other = request.strategies
+        limit, count_only, deadline = request.limit, request.count_only, self._deadline
+        if not first.submit(network, limit=limit, count_only=count_only, strategy=usual, deadline=deadline):
             return first.answer()
         running = [first]
         hedge = time.monotonic() + HEDGE_S
@@ -272,7 +271,7 @@ class CentralSolver:
             if self._time_is_over:
                 break
             if second not in running and time.monotonic() >= hedge:
-                second.begin(network, limit=limit, count_only=count_only, strategy=other, deadline=deadline)
+                second.submit(network, limit=limit, count_only=count_only, strategy=other, deadline=deadline)
                 running.append(second)
         for ace in running:
             if ace not in ready[:1]:

@@ -1,8 +1,8 @@
-"""Makes a network say outright what its binary tables say between the lines.
+"""Makes cliques in the binary tables of a network explicit.
 
-ACE prunes a table at a time. Where tables forbid equal values between all pairs of some variables, one allDifferent
-sees more; where they forbid more than that, as between the queens of a row, the solutions of the clique as one table
-see everything. Nothing is added to the problem: every solution stays one, and nothing else becomes one.
+ACE prunes one table at a time. If tables forbid equal values between all pairs of some variables, an allDifferent
+prunes more; if they forbid more than that, as between the queens of a row, one table of the clique's solutions prunes
+most. The solutions of the network stay the same.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Demand(StrEnum):
 
 
 def demands(network: Network) -> list[Demand]:
-    """Return what each table of `network` demands."""
+    """Return the demand of each table of `network`."""
     known: dict[Hashable, Demand] = {}
     found = []
     for table in network.tables:
@@ -48,7 +48,7 @@ def _demand(network: Network, table: Table) -> Demand:
 
 
 def cliques(pairs: Iterable[Codes]) -> list[Codes]:
-    """Return cliques that together cover all `pairs`, each grown as long as it covers something new."""
+    """Return cliques that cover all `pairs`; each is extended as long as it covers new pairs."""
     neighbours: dict[int, set[int]] = {}
     for left, right in pairs:
         neighbours.setdefault(left, set()).add(right)
@@ -65,11 +65,11 @@ def cliques(pairs: Iterable[Codes]) -> list[Codes]:
 
 
 def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
-    """Return `network` with allDifferent on cliques of `ne`, and with tables for the cliques with more constraints.
+    """Return `network` with an allDifferent for each clique of `ne`, and tables for cliques with more constraints.
 
-    Tables are for cliques that need every value there is: there they pay, as almost nothing is left to choose.
+    Only cliques that need all their values become tables: these pay off, since few combinations are left.
 
-    `solutions` gives all solutions of a sub-network, or None where there are too many to be a table.
+    `solutions` returns all solutions of a sub-network, or None if there are too many for a table.
     """
     demanded = demands(network)
     differ = {t.scope: d for t, d in zip(network.tables, demanded, strict=True) if d != Demand.OTHER}
@@ -78,7 +78,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
     compiled: list[Table] = []
     for clique in cliques(differ):
         edges = set(itertools.combinations(clique, 2))
-        if len(clique) == 2:  # noqa: PLR2004 - an edge, which its table covers
+        if len(clique) == 2:  # noqa: PLR2004 - an edge has a table already
             continue
         tight = len(clique) == len({code for place in clique for code in network.domains[place]})
         rows = solutions(_within(network, clique)) if tight and edges <= more else None
@@ -98,7 +98,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
 
 
 def _grown(clique: list[int], neighbours: dict[int, set[int]], open_still: dict[int, set[int]]) -> list[int]:
-    """Return `clique`, with more members as long as one covers new edges; the one that covers most comes first."""
+    """Return `clique`, extended as long as a member covers new edges; members that cover most are added first."""
     candidates = set.intersection(*(neighbours[name] for name in clique))
     while candidates:
         best = min(candidates, key=lambda name: (-len(open_still[name].intersection(clique)), name))

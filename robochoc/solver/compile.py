@@ -1,24 +1,26 @@
-"""Compiles the domains of a team's robots: what private constraints connect is enumerated, or goes to ACE."""
+"""Compiles the domains of a team's robots: solves their private constraints, by enumeration or by ACE."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import count
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from robochoc.model.problem import Robot
+from robochoc.model.problem import Robot, Team
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.domain import MAX_SOLUTIONS, CompiledDomain, TooManySolutionsError, compile_domain
+from robochoc.solver.compiled_domain import MAX_SOLUTIONS, CompiledDomain, TooManySolutionsError, compile_domain
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import Codes, Network, UnsupportedError
-from robochoc.solver.failures import SolverLostError, SolverTimeoutError
+from robochoc.solver.errors import SolverLostError, SolverTimeoutError
 from robochoc.system.errors import TransferableError
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 if TYPE_CHECKING:
-    from robochoc.solver.ace import AceProcess
-    from robochoc.solver.query import SolverAnswer
+    from robochoc.solver.ace import AceProcess, SolverAnswer
 
 PATIENCE_S = 60.0
 """The default maximum time for compiling one robot."""
@@ -26,9 +28,9 @@ PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of compiling one robot: a number of local solutions, and seconds of ACE's time.
+    """The limits of compiling one robot: the number of local solutions, and ACE's time in seconds.
 
-    With `always_ace`, ACE solves small local problems too.
+    With `always_ace`, ACE also solves small local problems.
     """
 
     solutions: int = MAX_SOLUTIONS
@@ -37,7 +39,7 @@ class Limits:
 
 
 class CompiledFrom(StrEnum):
-    """The source of a robot's local solutions; of several, the most expensive one."""
+    """The source of a robot's local solutions; if there are several, the most expensive one."""
 
     DIRECT = "direct"
     EQUAL = "equal"
@@ -47,18 +49,18 @@ class CompiledFrom(StrEnum):
 
 
 class CompileTimeoutError(TransferableError):
-    """A robot's local problem took too long."""
+    """The time limit for a robot's local problem was exceeded."""
 
     def __init__(self, robot: str, limit_s: float) -> None:
         super().__init__(
-            f"{robot}'s private constraints were not solved within {limit_s:g} s; give it more time (--local-timeout),"
-            " or give some of its variables to a robot of their own"
+            f"{robot}'s private constraints were not solved within {limit_s:g} s; increase --local-timeout,"
+            " or move some of its variables to another robot"
         )
         self.robot = robot
 
 
 class CompileError(TransferableError):
-    """The solver was lost over a robot's local problem."""
+    """The solver's process died while solving a robot's local problem."""
 
     def __init__(self, robot: str, why: str) -> None:
         super().__init__(f"{robot} could not be compiled: {why}")
@@ -66,9 +68,21 @@ class CompileError(TransferableError):
         self.why = why
 
 
+class NoLocalSolutionError(TransferableError):
+    """The private constraints of `robot` have no solution."""
+
+    def __init__(self, robot: str) -> None:
+        super().__init__(f"{robot} alone has none: its private constraints have no solution")
+        self.robot = robot
+
+
+class TeamCompileTimeoutError(Exception):
+    """The time limit of a run was exceeded before the robots could start."""
+
+
 @dataclass(frozen=True)
 class Compilation:
-    """One robot's compiled domain, where it came from, and how long that took."""
+    """One robot's compiled domain, its source, and the time of compiling."""
 
     robot: str
     domain: CompiledDomain
@@ -77,10 +91,10 @@ class Compilation:
 
 
 class Compiler:
-    """Compiles robots one after the other, with one solver's process (none, if none is needed) and one cache.
+    """Compiles robots one after the other, with one cache and at most one solver process.
 
-    Left as a context, the process is gone, unless it was given as `solver`. `deadline` is on the monotonic clock, and
-    for all together.
+    Leaving the context ends the process, unless it was given as `solver`. `deadline`, on the monotonic clock, is
+    common to all robots.
     """
 
     def __init__(
@@ -93,7 +107,7 @@ class Compiler:
         self._limits = limits or Limits()
         self._cache = cache
         self._deadline = deadline
-        self._lent = solver
+        self._given_solver = solver
         self._own: AceProcess | None = None
         self._known: dict[Network, tuple[Codes, ...]] = {}
         self._too_slow: set[Network] = set()
@@ -111,12 +125,12 @@ class Compiler:
         """Return the compiled domain of `robot`.
 
         Raises:
-            TooManySolutionsError: if it has more local solutions than the limit.
-            CompileTimeoutError: if its local problem takes too long.
+            TooManySolutionsError: if the robot has more local solutions than the limit.
+            CompileTimeoutError: if its local problem exceeds the time limit.
             CompileError: if the solver's process died.
-            SolverMissingError: if ACE is needed, and there is no Java.
+            SolverMissingError: if ACE is needed, and Java is not available.
             UnsupportedError: if a constraint is too large.
-            SolverTimeoutError: if the time for all robots is over.
+            SolverTimeoutError: if the deadline for all robots has passed.
         """
         began = time.monotonic()
         sources = [CompiledFrom.DIRECT]
@@ -155,7 +169,7 @@ class Compiler:
         deadline = limit if self._deadline is None else min(limit, self._deadline)
         solver = self._solver()
         try:
-            solver.begin(network, limit=self._limits.solutions + 1, strategy="static", deadline=self._deadline)
+            solver.submit(network, limit=self._limits.solutions + 1, strategy="static", deadline=self._deadline)
             return solver.answer(deadline)
         except SolverTimeoutError as timeout:
             if self._deadline is not None and self._deadline <= limit:
@@ -166,19 +180,72 @@ class Compiler:
             raise CompileError(robot, str(lost)) from lost
 
     def _solver(self) -> AceProcess:
-        """Return the solver that was lent, or one of our own, which is made when the first network asks for it."""
+        """Return the given solver, or one that is started on first use."""
         from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: most robots need no solver
 
-        if self._lent:
-            return self._lent
+        if self._given_solver:
+            return self._given_solver
         if self._own is None:
             self._own = AceProcess(always=self._limits.always_ace)
         return self._own
 
 
+class TeamCompiler:
+    """Compiles the teams of one run. `seconds` is the time of teams for which a solver was needed.
+
+    `deadline` is on the monotonic clock, and may be changed. `stage` is called with a description of the progress. See
+    `Compiler` for the other arguments.
+    """
+
+    seconds: float = 0.0
+
+    def __init__(
+        self,
+        limits: Limits | None,
+        cache: SolutionCache | None,
+        deadline: float | None,
+        solver: AceProcess | None,
+        stage: Callable[[str], None],
+    ) -> None:
+        self._limits, self._cache, self._solver = limits, cache, solver
+        self.deadline = deadline
+        self._stage = stage
+
+    def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
+        """Return `team`, compiled.
+
+        Raises:
+            NoLocalSolutionError: if a robot has no values, unless `every` robot is to be compiled.
+            TeamCompileTimeoutError: if the deadline has passed.
+            Exception: the other errors of `Compiler.compile`.
+        """
+        began = time.monotonic()
+        solved, number, name = False, count(1), ""
+
+        def compile_robot(robot: Robot) -> CompiledDomain:
+            nonlocal solved, name
+            name = robot.name
+            self._stage(f"compiling {name} ({next(number)} of {len(team.robots)})")
+            compilation = compiler.compile(robot)
+            solved = solved or compilation.source != CompiledFrom.DIRECT
+            if not (compilation.domain.values or every):
+                raise NoLocalSolutionError(robot.name)
+            return compilation.domain
+
+        try:
+            with Compiler(self._limits, self._cache, self.deadline, self._solver) as compiler:
+                return computed_by(self.deadline, CompiledTeam, team, compile_robot)
+        except (SolverTimeoutError, TimeLimitError):
+            name = name or next((robot.name for robot in team.robots), team.name)
+            raise TeamCompileTimeoutError(f"the time limit was exceeded while {name} was compiled") from None
+        finally:
+            if solved:
+                self.seconds += time.monotonic() - began
+
+
 def _source(answer: SolverAnswer) -> CompiledFrom:
-    """Return what the solver's `answer` comes from."""
-    from robochoc.solver.query import SolvedBy  # noqa: PLC0415 - start-up: most robots need no solver
+    """Return the source of the solver's `answer`."""
+    from robochoc.solver.ace import SolvedBy  # noqa: PLC0415 - start-up: most robots need no solver
 
     sources = {
         SolvedBy.PROPAGATION: CompiledFrom.DIRECT,

@@ -1,33 +1,41 @@
-"""A robot's local problem as protocols see it: one compiled variable, and the constraints it has to check.
+"""A robot's local problem for protocols: one compiled variable, and the constraints that it checks.
 
-Paper, Section 4.1: every robot is one variable to a protocol. Its values are the robot's local solutions, seen from
-the interface variables that neighbours know (`solver/domain.py`); the constraints it checks are those shared with
-its parents (`solver/shared_constraint.py`), and its parts of partially known ones (PKC), also with its children.
+Paper, Section 4.1: every robot is one variable to a protocol. Its values are the robot's local solutions, projected on
+the interface variables that neighbours know (`solver/compiled_domain.py`). It checks the constraints shared with its
+parents (`solver/shared_constraint.py`), and its parts of partially known constraints (PKC), also with its children.
 
-Constraint checks are counted here, and only here (CompAPO adds those in tables that others send it): one check is one
-evaluation of one shared constraint for one value of the own domain (Meisels, Kaplansky, Razgon and Zivan 2002). Private
-constraints are settled once, when the domain is compiled, and are not counted; nor are look-ups of nogoods and filters.
+Constraint checks are counted here, and only here (CompAPO adds checks of tables that others send): one check is one
+evaluation of one shared constraint for one value of this robot (Meisels, Kaplansky, Razgon and Zivan 2002). Private
+constraints, evaluated once when the domain is compiled, are not counted; nor are look-ups of nogoods and filters.
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, ProblemKind
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, WhenAbsent
+from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import Cost
-from robochoc.solver.local_constraints import LocalConstraints
+from robochoc.solver.explanation import KeyedConstraint, constraints_above, parts_below
+from robochoc.solver.filters import Filters
 from robochoc.solver.shared_constraint import (
     UNKNOWN,
     Conflict,
     Gap,
     OtherValues,
+    OwnValues,
     SharedConstraint,
+    by_robot,
+    sorted_by_lowest_agent,
 )
 
 if TYPE_CHECKING:
+    from robochoc.solver.conflict_table import ConflictTable
     from robochoc.solver.cost_table import CostTable
     from robochoc.solver.exclusions import Task
 
@@ -37,9 +45,13 @@ constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 
 class Charged(NamedTuple):
-    """The costs that one constraint charges in a view, of each own value, given what it sees of the `others`.
+    """The costs of the own values in one constraint.
 
-    `number` is the constraint's place in `LocalProblem`. Own values that it cannot tell apart have the same code.
+    Attributes:
+        number: The constraint's index in `LocalProblem`.
+        others: The values of the other robots' variables.
+        codes: A code for each own value, the same for values that the constraint does not distinguish.
+        costs: The cost of each own value.
     """
 
     number: int
@@ -48,38 +60,115 @@ class Charged(NamedTuple):
     costs: Sequence[Cost]
 
 
+MIN_TABLE_VALUES = 64
+"""The number of values from which conflicts are computed for all of them at once, by numpy."""
+
 MAX_BOUNDED_ROWS = 65_536
-"""A constraint with more combinations of values than this is not searched for the least that it charges."""
+"""The maximum number of combinations of values for which a constraint's minimum cost is computed."""
 
 
-class LocalProblem(LocalConstraints):
-    """The local problem of one robot: its compiled domain, its neighbours, and the constraints it has to check.
+class LocalProblem:
+    """The local problem of one robot: its compiled domain, its neighbours, and the constraints that it checks.
 
-    `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
-    `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint
-    that this robot knows; each in priority order. `pkc_parents` are the parents with whom a partially known constraint
-    is shared: they have to hear of the own value too. `checks` counts constraint checks so far.
+    Constraints are sorted by their lowest robot, the highest first, so those with the robots above a given rank are a
+    prefix. Where robots may withdraw, the last value means withdrawal: all its parts are None, and constraints with it
+    are restated or dropped (`model/absence.py`).
 
-    `charges[i]` is the private cost of the i-th value. Where robots may withdraw, the last value means withdrawal: all
-    its parts are None, and constraints with it are restated or dropped (`model/absence.py`).
+    Attributes:
+        values: The values of the interface variables. `solution(i)` has the values of all variables for `values[i]`.
+        charges: The private cost of each value.
+        parents: The parents in the file, in priority order.
+        children: The children in the file, in priority order.
+        neighbours: The parents, children, and all robots in a constraint known to this robot, in priority order.
+        pkc_parents: The parents with a common partially known constraint, which need this robot's value too.
+        checks: The number of constraint checks so far.
     """
+
+    def __init__(self, part: AgentProblem) -> None:
+        robot = part.robot
+        rank = part.known.rank
+        self.agent = robot.name
+        self.parents = tuple(sorted((parent.name for parent in robot.parents), key=rank.__getitem__))
+        self.children = tuple(sorted((child.name for child in robot.children), key=rank.__getitem__))
+        self._domain = part.domain
+        self.values: tuple[Value, ...] = self._domain.values
+        self.charges: tuple[Cost, ...] = self._domain.costs
+        # Values must be distinct: without interface variables, withdrawal is the same value, and never cheaper.
+        if part.parameters.withdrawal_cost is not None and (robot.interface or not self.values):
+            self.values = (*self.values, (None,) * len(robot.interface))
+            must_stay = any(one.when_absent == WhenAbsent.FAIL for one in robot.private)
+            aside = INFINITE if must_stay else part.parameters.withdrawal_cost * robot.weight
+            self.charges = (*self.charges, aside)
+        self.checks = 0
+        self._places: dict[Value, int] | None = None
+        self._rank = rank
+        self._part = part
+        self._set_constraints(part, OwnValues(robot.interface, self.values))
+
+    def _set_constraints(self, part: AgentProblem, own: OwnValues) -> None:
+        """Compile the constraints of `part` for the values `own`, and set all attributes that depend on them."""
+        robot, rank = part.robot, self._rank
+
+        def ready(known: KeyedConstraint) -> SharedConstraint:
+            constraint = SharedConstraint(known.key, known.constraint, part.known, self.agent)
+            constraint.compile(own)
+            return constraint
+
+        above = [(known.constraint.model, ready(known)) for known in constraints_above(robot)]
+        copies = [ready(known) for known in part.copies]
+        below = [ready(known) for _, known in parts_below(robot)]
+        shared = [*(constraint for _, constraint in above), *copies, *below]
+        if part.parameters.withdrawal_cost is not None:
+            for constraint in shared:
+                constraint.allow_absence()
+        self._constraints = sorted_by_lowest_agent(shared, rank)
+        self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
+        met = {agent for constraint in shared for agent in constraint.agents}
+        self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
+        self._table: ConflictTable | None = self._conflict_table() if len(self.values) >= MIN_TABLE_VALUES else None
+        self._below = by_robot(below)
+        parts_above = [constraint for model, constraint in above if model == ConstraintModel.PKC]
+        secretive = {*part.pkc_holders, *by_robot(parts_above)}
+        self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
+        self._parts = by_robot([*parts_above, *below])
+        self._filtering = by_robot([*copies, *below, *parts_above])
+        self._made_filters: Filters | None = None
+
+    def allow_undeclared(self) -> None:
+        """Evaluate constraints for undeclared values of others from now on: domains may have changed since."""
+        for constraint in self._constraints:
+            constraint.allow_undeclared()
+
+    def declared_count(self, robot: str) -> int:
+        """Return the number of values that `declared` returns, without computing them."""
+        domains, names = self._part.known.domains, self._part.known.interfaces[robot]
+        return math.prod(len(domains[name]) for name in names) + self._may_look_withdrawn(names)
+
+    def declared(self, robot: str) -> list[Value]:
+        """Return all declared values of `robot`; the last is withdrawal if robots may withdraw.
+
+        Its private constraints may forbid some of them.
+        """
+        names = self._part.known.interfaces[robot]
+        values: list[Value] = [*itertools.product(*(self._part.known.domains[name] for name in names))]
+        return [*values, (None,) * len(names)] if self._may_look_withdrawn(names) else values
 
     @property
     def behind(self) -> Sequence[int]:
-        """For each own value the number of local solutions of least private cost behind it; 1 for withdrawal."""
+        """The number of cheapest local solutions of each own value; 1 for withdrawal."""
         return (*self._domain.cheapest, *(1 for _ in self.values[len(self._domain.values) :]))
 
     def solution(self, index: int) -> dict[str, int]:
-        """Return the values of all own variables for `values[index]`. Empty if the robot is withdrawn."""
+        """Return the values of all variables of this robot for `values[index]`. Empty if the robot is withdrawn."""
         return self._domain.solution(index)
 
     def conflict(self, index: int, view: Mapping[str, Value], since: int = -1) -> Conflict | None:
-        """Return why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
+        """Return the conflict of `values[index]` with `view`, from the first violated constraint. None: no conflict.
 
-        Constraints whose other variables are not all known in `view` are passed over, and so are those whose lowest
-        robot stands higher in the order than place `since`: the caller knows that they hold. The order is that of their
-        lowest robot, the highest first, so the first conflict is also the one with the highest possible lowest
-        variable. Of each robot only what the constraint looks at is named (`None` elsewhere).
+        Constraints with unknown variables in `view` are skipped, and so are those whose lowest robot is above rank
+        `since`: the caller knows that they hold. The order is that of their lowest robot, the highest first, so the
+        first conflict also has the highest possible lowest variable. Of each robot, it contains only the variables in
+        the constraint (`None` for others).
         """
         broken = self._broken(index, view, since)
         return None if broken is None else broken.conflict_with(view)
@@ -87,10 +176,7 @@ class LocalProblem(LocalConstraints):
     def conflicts_of(
         self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1
     ) -> list[tuple[Conflict, list[int]]]:
-        """Return what `conflict` returns for those of `indices` that are against `view`, with as many checks.
-
-        Values with the same conflict come together.
-        """
+        """Return the conflicts of the values at `indices`, each with its values, with the checks of `conflict`."""
         if self._table is not None:
             found: dict[int, tuple[Conflict, list[int]]] = {}
             for index in indices:
@@ -101,7 +187,7 @@ class LocalProblem(LocalConstraints):
         left = sum([1 << index for index in indices])
         conflicts: list[tuple[Conflict, list[int]]] = []
         for constraint in self._since(since):
-            mask = constraint.look(view)
+            mask = constraint.mask_in(view)
             if mask == UNKNOWN:
                 continue
             self.checks += left.bit_count()
@@ -114,20 +200,20 @@ class LocalProblem(LocalConstraints):
         return conflicts
 
     def conflict_with_key(self, index: int, view: Mapping[str, Value], since: int = -1) -> tuple[Conflict, str] | None:
-        """Return what `conflict` returns, with the key of the violated constraint."""
+        """Return the result of `conflict`, with the key of the violated constraint."""
         broken = self._broken(index, view, since)
         return None if broken is None else (broken.conflict_with(view), broken.key)
 
     def conflicts(self, index: int, view: Mapping[str, Value]) -> list[tuple[Conflict, str]]:
-        """Return what `conflict_with_key` returns, for every constraint that `values[index]` violates."""
+        """Return the conflict and key of every constraint that `values[index]` violates."""
         known = self._known(view)
         return [(c.conflict(others), c.key) for c, others in known if not c.mask(others) >> index & 1]
 
     def gaps(self, index: int, sets: Mapping[str, Sequence[Value]]) -> Iterator[Gap]:
         """Yield the constraints that `values[index]` violates for some combination of the others' values in `sets`.
 
-        The order is that of `conflict`, and so is what is passed over. A check for each combination that a constraint
-        can tell apart. Robots do not withdraw here.
+        The order and the skipped constraints are those of `conflict`. One check for each combination that a constraint
+        distinguishes. Robots must not withdraw.
         """
         for constraint in self._constraints:
             broken: list[Conflict] = []
@@ -141,7 +227,7 @@ class LocalProblem(LocalConstraints):
     def part_conflict(self, index: int, child: str, value: Value) -> Conflict | None:
         """Return the conflict of `values[index]` with `value` of `child`, by this robot's parts of shared PKCs.
 
-        None: the parts allow the pair. The pair is named like a conflict, but with this robot's own value in it.
+        None: the parts allow the pair. Unlike other conflicts, it contains this robot's value.
         """
         for constraint in self._below.get(child, ()):
             others = constraint.other_values({child: value})
@@ -155,9 +241,9 @@ class LocalProblem(LocalConstraints):
     def filter(self, index: int, receiver: str) -> bytes:
         """Return the values of `receiver` that are consistent with `values[index]` in this robot's constraints.
 
-        That is, towards a child, what is totally known (where all robots of a scope know it) and the own parts;
-        towards a parent the own parts; for other robots all values. Every pair that a constraint can tell apart
-        is one check, so that the count says nothing of the answers. See `solver/filters.py`.
+        For a child: in totally known constraints (if all robots of a scope know them) and this robot's parts. For a
+        parent: in this robot's parts. For other robots: all values. Every pair that a constraint distinguishes is one
+        check, so that the count reveals nothing about the values. See `solver/filters.py`.
         """
         evaluated, allowed = self._filters.of(index, receiver)
         self.checks += evaluated
@@ -165,11 +251,11 @@ class LocalProblem(LocalConstraints):
 
     @property
     def filter_places(self) -> Sequence[int]:
-        """For each own value its place in filters. Raises `UnsupportedError` when there are too many for a filter."""
+        """The position of each own value in filters. Raises `UnsupportedError` if there are too many for a filter."""
         return self._filters.places
 
     def violation_count(self, index: int, view: Mapping[str, Value]) -> int:
-        """Return how many constraints `values[index]` violates. Those with unknown variables in `view` are left out."""
+        """Return the number of constraints without unknown variables in `view` that `values[index]` violates."""
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
     def cost(self, index: int, view: Mapping[str, Value]) -> Cost:
@@ -177,7 +263,7 @@ class LocalProblem(LocalConstraints):
         return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
 
     def costs(self, view: Mapping[str, Value]) -> list[Cost]:
-        """Return the `cost` of every own value: as many checks for each constraint as there are values."""
+        """Return the `cost` of every own value, with a check for each value and constraint."""
         known = self._paid(view)
         self.checks += len(known) * len(self.values)
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
@@ -192,17 +278,16 @@ class LocalProblem(LocalConstraints):
         return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def shares_parts_with(self, robot: str) -> bool:
-        """Return whether this robot has a part of a partially known constraint (PKC) with `robot`, or knows of its."""
+        """Return whether this robot, or `robot`, has a part of a common partially known constraint (PKC)."""
         return robot in self._parts or robot in self.pkc_parents
 
     def own_side(self, index: int, robot: str, value: Value) -> LexicographicCost:
-        """Return what `values[index]` pays for the own parts of constraints with `robot`, when that has `value`.
+        """Return the cost of `values[index]` in this robot's parts of constraints with `robot`, if it has `value`.
 
-        Only what is partially known (PKC) is counted, and of it the own parts: `robot` pays its own. One check for each
-        part.
+        These are parts of partially known constraints (PKC); `robot` pays for its own parts. One check for each part.
 
         Raises:
-            ValueError: when `robot` has no such value.
+            ValueError: if `robot` cannot have the value.
         """
         self.refuse_value(robot, value)
         known = [paid for part in self._parts.get(robot, ()) if (paid := part.costs_in({robot: value})) is not None]
@@ -210,27 +295,27 @@ class LocalProblem(LocalConstraints):
         return _lexicographic_cost([paid[index] for paid in known])
 
     def least_side(self, robot: str) -> list[Cost]:
-        """Return a lower bound, for each own value, on what `own_side` charges whatever value `robot` takes.
+        """Return a lower bound, for each own value, on the cost of `own_side` over all values of `robot`.
 
-        Broken parts are infinite. As in `lower_bounds`, it is 0 where robots may withdraw, or have too many values.
+        Violated parts are infinite. As in `lower_bounds`, it is 0 if robots may withdraw, or have too many values.
         """
         return self._at_least(self._parts.get(robot, ()))
 
     def refuse_value(self, robot: str, value: Value) -> None:
-        """Raise `ValueError` for a `value` that `robot`, as its files declare it, cannot have: others say anything."""
+        """Raise `ValueError` if `value`, which a message may contain, is not in the declared domains of `robot`."""
         names = self._part.known.interfaces.get(robot, ())
         if len(value) != len(names):
             raise ValueError(f"a value of {robot} has {len(names)} parts, not {len(value)}")
-        if any(part is not None for part in value):  # none at all: it is withdrawn
+        if any(part is not None for part in value):  # otherwise it is withdrawn
             domains = self._part.known.domains
             for name, part in zip(names, value, strict=True):
                 if part is None or part not in domains[name]:
                     raise ValueError(f"{name} of {robot} cannot be {part}")
 
     def charged(self, view: Mapping[str, Value]) -> list[Charged]:
-        """Return what each constraint whose other variables are all known charges, with the checks of `costs`.
+        """Return the costs in each constraint whose other variables are all known, with the checks of `costs`.
 
-        They add up to the `costs`, but for the private `charges`.
+        They add up to the `costs` without the private `charges`.
         """
         found = [
             Charged(number, others, constraint.codes, constraint.costs(others))
@@ -241,10 +326,10 @@ class LocalProblem(LocalConstraints):
         return found
 
     def least_and_most(self, number: int) -> tuple[Cost, Cost]:
-        """Return the least and the most that the constraint of this `number` charges, broken ones (infinite) included.
+        """Return the minimum and maximum cost of the constraint with this `number`, infinite ones included.
 
-        For the own values and all that files declare for the others; with more than `MAX_BOUNDED_ROWS` combinations,
-        what the constraint itself says: 0, and the most that it lists.
+        They are over the own values and all declared values of the others. With more than `MAX_BOUNDED_ROWS`
+        combinations, they are 0 and the maximum in the constraint's definition.
         """
         constraint = self._constraints[number]
         checks, least, most = constraint.least_and_most(self._part.known.domains, MAX_BOUNDED_ROWS)
@@ -254,45 +339,43 @@ class LocalProblem(LocalConstraints):
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], Cost]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
 
-        That is, short of being broken, and whatever values there are: nothing is checked. See `tables`.
+        The maximum is over finite costs, whatever the domains are: nothing is checked. See `tables`.
         """
         known = {*robots}
         return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
     def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
-        """Return what `tables` are made of for these `robots`, but for their domains: equal if the tables must be.
+        """Return the data that determine `tables` for these `robots`, except their domains: equal for equal tables.
 
-        That is, the own values and their charges, and the constraints whose other robots are all in `robots`.
+        The data are the own values and their charges, and the constraints whose other robots are all in `robots`.
         """
         known = {*robots}
         return self.values, self.charges, [c.definition for c in self._constraints if known.issuperset(c.agents)]
 
     def added(self, robot: str, view: Mapping[str, Value]) -> list[Cost] | None:
-        """Return the additional cost of each own value when `robot`, the lowest in `view`, is known too.
+        """Return the cost that `robot`, the lowest in `view`, adds to each own value: the increase of `costs`.
 
-        None: no constraint becomes complete.
-
-        So much are the `costs` in `view` more than without `robot`, if all others in it are higher. Checks are only
-        those of the constraints that come in.
+        None: no constraint becomes complete. All others in `view` must be higher. Checks are counted only for the
+        constraints that become complete.
         """
         depth = self._rank[robot]
         places = slice(bisect_left(self._depths, depth), bisect_right(self._depths, depth))
         return self._added(self._constraints[places], view) if self._depths[places] else None
 
     def added_by(self, robot: str, view: Mapping[str, Value]) -> list[Cost]:
-        """Return what `added` returns for a `robot` anywhere in the order; 0 where no constraint becomes complete."""
+        """Return the result of `added` for a `robot` anywhere in the order; 0 if no constraint becomes complete."""
         return self._added([constraint for constraint in self._constraints if robot in constraint.agents], view)
 
     def lower_bounds(self, robots: Container[str]) -> list[Cost]:
         """Return, for each own value, a lower bound on its cost in constraints whose other robots are all in `robots`.
 
-        These may take any values that their files declare. The bound is 0 where robots may withdraw, and for a
-        constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
+        The others may have all their declared values. The bound is 0 if robots may withdraw, and for a constraint
+        with more than `MAX_BOUNDED_ROWS` combinations of values.
         """
         return self._at_least([c for c in self._constraints if c.agents and all(a in robots for a in c.agents)])
 
     def _at_least(self, constraints: Sequence[SharedConstraint]) -> list[Cost]:
-        """Return a lower bound on what `constraints` charge each own value, over all that files declare for others."""
+        """Return a lower bound on the cost of each own value in `constraints`, over all declared values of others."""
         least: list[list[Cost]] = []
         for constraint in constraints if self._part.parameters.withdrawal_cost is None else ():
             checks, charged = constraint.lower_bounds(self._part.known.domains, MAX_BOUNDED_ROWS)
@@ -303,12 +386,12 @@ class LocalProblem(LocalConstraints):
     def tables(self, domains: Mapping[str, Sequence[Value]], lowest: str | None = None) -> list[CostTable]:
         """Return a cost table for each constraint whose other robots are all in `domains`.
 
-        With `lowest`, only of those among whose other robots that one is the lowest.
+        With `lowest`, only for constraints whose lowest other robot is this one.
 
-        A check for each combination that a constraint can tell apart. The own charges are not among them. Numpy's:
-        see `solver/cost_table.py`, also for how large a table may be.
+        One check for each combination that a constraint distinguishes. The tables, numpy arrays, do not include the
+        private charges. See `solver/cost_table.py`, also for the size limit.
         """
-        from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - numpy is for those who want tables only
+        from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - numpy, needed for tables only
 
         found = []
         for constraint in self._constraints:
@@ -322,19 +405,19 @@ class LocalProblem(LocalConstraints):
 
     @property
     def has_costs(self) -> bool:
-        """Whether something is minimised: costs, or robots that withdraw."""
+        """Whether costs or withdrawals are minimised."""
         return self._part.robot.kind == ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
 
     def allowed(
         self, domains: Mapping[str, Sequence[Value]], lowest: str
     ) -> list[tuple[tuple[str, ...], dict[tuple[int, ...], int]]]:
-        """Return what `tables` returns for `lowest`, where there are no costs.
+        """Return the result of `tables` for `lowest` as bit masks, for problems without costs.
 
-        For each constraint its other robots, and for each combination of places of their values the own values that
-        are consistent with these: bit i for the i-th. No robot may withdraw.
+        For each constraint: its other robots, and the own values (bit i for the i-th) that are consistent with each
+        combination of indices of their values. No robot may withdraw.
 
         Raises:
-            UnsupportedError: when these are too many.
+            UnsupportedError: if there are too many combinations.
         """
         found = []
         for constraint in self._constraints:
@@ -346,10 +429,10 @@ class LocalProblem(LocalConstraints):
         return found
 
     def look_ahead(self) -> None:
-        """Evaluate what `allowed` will be asked for, before other robots have told their values.
+        """Evaluate the constraints that `allowed` will need, before other robots have sent their values.
 
-        That is, the constraints in which one robot is lower than this one, for all values that files declare. Robots
-        do it at the same time. Where values are too many, nothing is done.
+        These are the constraints in which one robot is lower than this one, for all declared values. Robots do this
+        simultaneously. If there are too many values, nothing is evaluated.
         """
         own = self._rank[self.agent]
         declared = self._part.known.domains
@@ -362,7 +445,7 @@ class LocalProblem(LocalConstraints):
             self.checks += constraint.evaluate(combinations) * len(self.values)
 
     def tasks(self, *, congestion: bool = False) -> tuple[Task, ...]:
-        """Return what is done by one robot at most. Raises `UnsupportedError`. See `solver/exclusions.py`."""
+        """Return the tasks of the robot. Raises `UnsupportedError`. See `solver/exclusions.py`."""
         from robochoc.solver.exclusions import tasks_of  # noqa: PLC0415 - for auctions only
 
         checks, tasks = tasks_of(self._part, congestion=congestion)
@@ -370,9 +453,9 @@ class LocalProblem(LocalConstraints):
         return tasks
 
     def interchangeable(self, value: Value) -> Sequence[int]:
-        """Return the places of all own values that agree with `value` wherever that is not None.
+        """Return the indices of all own values that agree with `value` wherever that is not None.
 
-        Neighbours that see nothing else cannot tell them apart: neighbourhood partial interchangeability
+        Neighbours that see nothing else cannot distinguish them: neighbourhood partial interchangeability
         (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint
         reasoning", AAMAS workshop DCR 2006).
         """
@@ -382,8 +465,57 @@ class LocalProblem(LocalConstraints):
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
+    def _may_look_withdrawn(self, names: Sequence[str]) -> bool:
+        """Return whether withdrawal is a value of its own for a robot that shows `names`."""
+        return self._part.parameters.withdrawal_cost is not None and bool(names)
+
+    def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
+        """Return each constraint whose other variables are all known, and their values. Count a check for each."""
+        known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
+        self.checks += len(known)
+        return known
+
+    def _paid(self, view: Mapping[str, Value]) -> list[list[Cost]]:
+        """Return the costs of own values in each constraint whose other variables are all known. Count no checks."""
+        return [prices for c in self._constraints if (prices := c.costs_in(view)) is not None]
+
+    def _since(self, place: int) -> Sequence[SharedConstraint]:
+        """Return the constraints whose lowest robot is not higher in the order than `place`."""
+        return self._constraints if place < 0 else self._constraints[bisect_left(self._depths, place) :]
+
+    def _broken(self, index: int, view: Mapping[str, Value], since: int) -> SharedConstraint | None:
+        """Return the first constraint that `values[index]` violates in `view`."""
+        if self._table is not None:
+            checks, broken = self._table.first_broken(index, view, bisect_left(self._depths, since))
+            self.checks += checks
+            return broken
+        for constraint in self._since(since):
+            mask = constraint.mask_in(view)
+            if mask != UNKNOWN:
+                self.checks += 1
+                if not mask >> index & 1:
+                    return constraint
+        return None
+
+    @property
+    def _place_of(self) -> dict[Value, int]:
+        if self._places is None:
+            self._places = {value: index for index, value in enumerate(self.values)}
+        return self._places
+
+    @property
+    def _filters(self) -> Filters:
+        if self._made_filters is None:
+            self._made_filters = Filters(self._part, self.values, self._filtering)
+        return self._made_filters
+
+    def _conflict_table(self) -> ConflictTable:
+        from robochoc.solver.conflict_table import ConflictTable  # noqa: PLC0415 - numpy, needed for large domains only
+
+        return ConflictTable(self._constraints, len(self.values))
+
     def _added(self, waiting: Sequence[SharedConstraint], view: Mapping[str, Value]) -> list[Cost]:
-        """Return what each own value pays for those of `waiting` whose other variables are all known."""
+        """Return the cost of each own value in those constraints of `waiting` whose other variables are all known."""
         known = [(c, others) for c in waiting if (others := c.other_values(view)) is not None]
         self.checks += len(known) * len(self.values)
         return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])

@@ -1,8 +1,8 @@
 """Conflicts of all own values at once, for compiled domains of thousands of values.
 
-What `LocalProblem.conflict` finds by walking the constraints for one value, this finds for all values in a few numpy
-operations: per constraint a mask over the own domain, per robot (the constraints that look at the same others) the
-first constraint that each value breaks, and for a view the first of all, with the checks that a walk would count.
+Instead of checking the constraints for one value, as `LocalProblem.conflict` does, it computes all values in a few
+numpy operations: for each constraint a mask over the own domain, for each group of constraints with the same robots the
+first one that each value violates, and for a view the first of all, with the number of checks of the other method.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from numpy.typing import NDArray
 from robochoc.model.message import Value
 from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 
-REMEMBERED = 512
-"""Values of a neighbour, for each group of constraints, whose conflicts are kept."""
+MAX_CACHED = 512
+"""The maximum number of cached conflicts, by values of neighbours, for each group of constraints."""
 
 _Seen = tuple[OtherValues | None, ...]
 
 
 class _Broken(NamedTuple):
-    """For each own value the first constraint of a group that it breaks (their number, if none)."""
+    """The first constraint of a group that each own value violates (the number of constraints, if none)."""
 
     first: NDArray[np.int32]
     constraints: list[tuple[SharedConstraint, OtherValues]]
 
 
-class _Look(NamedTuple):
-    """For each own value what a walk over all constraints would count, and the conflict it would find (-1: none)."""
+class _BrokenConstraints(NamedTuple):
+    """The number of checks and the first violated constraint (-1: none) of each own value."""
 
     checks: list[int]
     broken: list[int]
@@ -40,7 +40,7 @@ class _Look(NamedTuple):
 
 
 class ConflictTable:
-    """Looks up conflicts of the `size` values of a compiled domain; one view at a time, the last one is kept."""
+    """Looks up conflicts of the `size` values of a compiled domain; caches those of the last view."""
 
     def __init__(self, constraints: Sequence[SharedConstraint], size: int) -> None:
         self._size = size
@@ -48,21 +48,23 @@ class ConflictTable:
         self._groups = [_Group(group) for group in grouped]
         self._firsts = list(itertools.accumulate((len(group) for group in grouped), initial=0))
         self._view: tuple[dict[str, Value], int] | None = None
-        self._last = _Look([], [], [])
+        self._last = _BrokenConstraints([], [], [])
 
-    def look(self, index: int, view: Mapping[str, Value], first: int = 0) -> tuple[int, SharedConstraint | None]:
-        """Return how many constraints are checked for the value at `index`, and which one it breaks in `view`, if any.
+    def first_broken(
+        self, index: int, view: Mapping[str, Value], first: int = 0
+    ) -> tuple[int, SharedConstraint | None]:
+        """Return the number of checks for the value at `index`, and the constraint that it violates in `view`, if any.
 
-        Constraints before the one numbered `first`, which begins a group, are left out.
+        Constraints before number `first`, which begins a group, are skipped.
         """
         if (view, first) != self._view:
             self._view = dict(view), first
-            self._last = self._look(view, self._firsts.index(first))
+            self._last = self._compute(view, self._firsts.index(first))
         checks, broken, constraints = self._last
         place = broken[index]
         return checks[index], None if place < 0 else constraints[place][0]
 
-    def _look(self, view: Mapping[str, Value], begin: int) -> _Look:
+    def _compute(self, view: Mapping[str, Value], begin: int) -> _BrokenConstraints:
         checks = np.zeros(self._size, np.int32)
         broken = np.full(self._size, -1, np.int32)
         constraints: list[tuple[SharedConstraint, OtherValues]] = []
@@ -73,26 +75,26 @@ class ConflictTable:
             hit = open_still & (first < len(known))
             broken[hit] = first[hit] + len(constraints)
             constraints += known
-        return _Look(checks.tolist(), broken.tolist(), constraints)
+        return _BrokenConstraints(checks.tolist(), broken.tolist(), constraints)
 
 
 class _Group:
-    """Constraints, in the order of checking, that look at the same robots."""
+    """Constraints with the same robots, in the order of checking."""
 
     def __init__(self, constraints: Sequence[SharedConstraint]) -> None:
         self._constraints = constraints
         self._codes = [np.array(constraint.codes, np.int32) for constraint in constraints]
         self._masks: list[dict[OtherValues, NDArray[np.bool_]]] = [{} for _ in constraints]
-        self._kept: OrderedDict[_Seen, _Broken] = OrderedDict()
+        self._cache: OrderedDict[_Seen, _Broken] = OrderedDict()
 
     def broken(self, view: Mapping[str, Value]) -> _Broken:
-        """Return the first constraint that each own value breaks, among those that `view` knows enough for."""
+        """Return the first constraint that each own value violates, of those without unknown variables in `view`."""
         seen = tuple([constraint.other_values(view) for constraint in self._constraints])
-        kept = self._kept.get(seen)
+        kept = self._cache.get(seen)
         if kept is None:
-            kept = self._kept[seen] = self._broken(seen)
-            if len(self._kept) > REMEMBERED:
-                self._kept.popitem(last=False)
+            kept = self._cache[seen] = self._broken(seen)
+            if len(self._cache) > MAX_CACHED:
+                self._cache.popitem(last=False)
         return kept
 
     def _broken(self, seen: _Seen) -> _Broken:

@@ -1,7 +1,7 @@
-"""The costs of a constraint for all combinations of values, as an array: for protocols that compute with tables.
+"""The costs of a constraint for all combinations of values as an array, for protocols that compute with tables.
 
-Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`exact.py`). A table
-has at most as many entries as a constraint may have tuples of values to be tried on (`MAX_TUPLES`).
+Costs are floats, since a violated hard constraint costs `inf`; integers up to 2^53 are exact (`exact_costs.py`). Tables
+have at most `MAX_TUPLES` entries.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 
 class CostTable(NamedTuple):
-    """The costs of the constraint called `key`: an axis for each of `agents`, then one for the own values.
+    """The costs of the constraint called `key`: one axis for each robot of `agents`, the last for the own values.
 
-    Axes are in the order of `agents`, places on an axis in the order of the values that were given for the robot.
+    The indices of an axis follow the order of the robot's values.
     """
 
     key: str
@@ -32,10 +32,10 @@ class CostTable(NamedTuple):
 def cost_table(
     constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]], size: int
 ) -> tuple[int, CostTable]:
-    """Return how many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
+    """Return the number of checks, and the table of `constraint` over `domains` and the `size` own values.
 
     Raises:
-        UnsupportedError: when that is too large.
+        UnsupportedError: if the table is too large.
     """
     combinations = [*constraint.combinations(domains, size)]
     charges = np.zeros([*(len(domains[agent]) for agent in constraint.agents), size], np.float64)

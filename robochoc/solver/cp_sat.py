@@ -1,8 +1,7 @@
-"""OR-Tools as a second central solver: CP-SAT decides the whole team's problem, in a process of its own.
+"""OR-Tools as a second central solver: CP-SAT solves the whole team's problem in a process of its own.
 
-It gets the tables over codes that ACE gets too (`solver/encoding.py`, `solver/weighted.py`), and shares nothing else
-with it: no cliques, no symmetries, no enumeration. The sum of costs is at most `weighted.MAX_TOTAL_COST`, far below
-64 bits.
+It receives the same tables over codes as ACE (`solver/encoding.py`, `solver/weighted.py`), but uses no cliques, no
+symmetries and no enumeration. The sum of costs is at most `weighted.MAX_TOTAL_COST`, far below 64 bits.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from robochoc.solver.cp_sat_messages import (
     FromCpSat,
 )
 from robochoc.solver.encoding import Costs, Network, UnsupportedError
-from robochoc.solver.failures import SolverLostError, SolverMissingError
+from robochoc.solver.errors import SolverLostError, SolverMissingError
 from robochoc.solver.linear import Formula, Junction
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.signals import signals_held
@@ -41,7 +40,7 @@ from robochoc.system.time_limit import TimeLimitError, computed_by
 
 NAME = "OR-Tools"
 INSTALL = "pip install 'robochoc[ortools]'"
-LAST_WORDS_S = 0.6
+REPORT_TIME_S = 0.6
 """The time after the deadline in which CP-SAT may report its best solution, in seconds."""
 _TICK_S = 0.2
 _LONGEST_WAIT_S = 1e6
@@ -49,14 +48,14 @@ _CHUNK = 1 << 20
 
 
 def is_installed() -> bool:
-    """Return whether OR-Tools is there. It is not imported."""
+    """Return whether OR-Tools is installed, without importing it."""
     return importlib.util.find_spec("ortools") is not None
 
 
 class CpSatSolver:
-    """Decides teams by CP-SAT. Its process ends with each task; as a context, it is kept for the next one.
+    """Solves teams by CP-SAT. Its process ends after each task; inside a context, it is reused for the next task.
 
-    `deadline` is on the monotonic clock; `progress` is called while it searches.
+    `deadline` is on the monotonic clock; `progress` is called during the search.
     """
 
     name = NAME
@@ -66,21 +65,21 @@ class CpSatSolver:
         self._progress = progress
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
-        self._kept = False
+        self._is_context = False
 
     def __enter__(self) -> Self:
-        self._kept = True
+        self._is_context = True
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._kept = False
+        self._is_context = False
         self.close()
 
     @property
     def pid(self) -> int | None:
-        """The process, while there is one."""
+        """The id of the process, if it is running."""
         return self._process.pid if self._process else None
 
     def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
@@ -89,18 +88,18 @@ class CpSatSolver:
         Raises:
             SolverMissingError: if OR-Tools is not installed.
             SolverLostError: if its process died.
-            UnsupportedError: if a constraint or its costs are too large, or solutions are to be counted.
+            UnsupportedError: if a constraint or its costs are too large, or `count` is true.
         """
         if count:
-            raise UnsupportedError("OR-Tools counts no solutions here; ACE does")
+            raise UnsupportedError("OR-Tools cannot count solutions; use ACE")
         if not is_installed():
-            raise SolverMissingError(f"OR-Tools is not installed; say: {INSTALL}")
+            raise SolverMissingError(f"OR-Tools is not installed; run: {INSTALL}")
         try:
             return self._solve(team, withdrawal_cost)
         except TimeLimitError:
             return CentralAnswer(Verdict.UNKNOWN)
         finally:
-            if not self._kept:
+            if not self._is_context:
                 self.close()
 
     @signals_held()
@@ -145,31 +144,31 @@ class CpSatSolver:
             return CpSatAnswer(None, proven=True)
         if self._deadline is not None and time.monotonic() >= self._deadline:
             return CpSatAnswer(None, proven=False)
-        return self._asked(_task(network, part.costs, self._deadline))
+        return self._solve_task(_task(network, part.costs, self._deadline))
 
     # The process
 
-    def _asked(self, task: CpSatTask) -> CpSatAnswer:
+    def _solve_task(self, task: CpSatTask) -> CpSatAnswer:
         connection = self._socket or self._start()
         body = msgspec.msgpack.encode(task)
         try:
             connection.settimeout(self._left_s())
             connection.sendall(LENGTH.pack(len(body)) + body)
-            word = self._hear(connection)
+            message = self._receive_message(connection)
         except TimeoutError:
-            word = None
+            message = None
         except OSError as error:
             self.close()
             raise SolverLostError(f"the process of OR-Tools was lost ({error})") from None
-        if isinstance(word, CpSatFailed):
+        if isinstance(message, CpSatFailed):
             self.close()
-            if word.missing:
-                raise SolverMissingError(f"OR-Tools cannot be used ({word.why}); say: {INSTALL}")
-            raise SolverLostError(f"OR-Tools failed: {word.why}")
-        if word is None:
+            if message.missing:
+                raise SolverMissingError(f"OR-Tools cannot be used ({message.why}); run: {INSTALL}")
+            raise SolverLostError(f"OR-Tools failed: {message.why}")
+        if message is None:
             self.close()
             return CpSatAnswer(None, proven=False)
-        return word
+        return message
 
     @signals_held()
     def _start(self) -> socket.socket:
@@ -190,13 +189,13 @@ class CpSatSolver:
         self._socket = ours
         return ours
 
-    def _hear(self, connection: socket.socket) -> FromCpSat | None:
-        """Return the answer; None when the time is over. Raises `OSError` where the process died."""
+    def _receive_message(self, connection: socket.socket) -> FromCpSat | None:
+        """Return the answer. None: the deadline has passed. Raises `OSError` if the process died."""
         buffer = bytearray()
         while True:
             if len(buffer) >= LENGTH.size and len(buffer) == LENGTH.size + LENGTH.unpack_from(buffer)[0]:
-                word: FromCpSat = msgspec.msgpack.decode(bytes(buffer[LENGTH.size :]), type=FromCpSat)
-                return word
+                message: FromCpSat = msgspec.msgpack.decode(bytes(buffer[LENGTH.size :]), type=FromCpSat)
+                return message
             left = self._left_s()
             if left is not None and left <= 0:
                 return None
@@ -206,13 +205,13 @@ class CpSatSolver:
                 continue
             chunk = connection.recv(_CHUNK)
             if not chunk:
-                raise OSError("it has hung up")
+                raise OSError("it hung up")
             buffer += chunk
 
     def _left_s(self) -> float | None:
         """Return the time to wait for an answer, in seconds. None: no limit."""
         return (
-            None if self._deadline is None else min(self._deadline + LAST_WORDS_S - time.monotonic(), _LONGEST_WAIT_S)
+            None if self._deadline is None else min(self._deadline + REPORT_TIME_S - time.monotonic(), _LONGEST_WAIT_S)
         )
 
 

@@ -1,4 +1,4 @@
-"""The messages between the process of OR-Tools and its parent: msgpack, each after its length."""
+"""The messages between the process of OR-Tools and its parent: msgpack, each after its length. Without its imports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LENGTH = struct.Struct("!Q")
 
 
 class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
-    """A table: the code tuples `rows`, that the variables at the places `scope` may have, or may not."""
+    """A table: the allowed, or forbidden, code tuples `rows` of the variables at positions `scope`."""
 
     scope: tuple[int, ...]
     allowed: bool
@@ -18,7 +18,7 @@ class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
 
 
 class CpSatComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """The sum of `terms` (places of variables with factors) compared by `sign` ("le", "eq", "ne") with `bound`."""
+    """The sum of `terms` (positions of variables with factors) compared by `sign` ("le", "eq", "ne") with `bound`."""
 
     terms: tuple[tuple[int, int], ...]
     sign: str
@@ -35,8 +35,8 @@ class CpSatJunction(msgspec.Struct, frozen=True, array_like=True, tag=True):
 class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Find one solution; with `costs`, one with the least sum of these codes.
 
-    A cost is the place of a variable, and the unit of its codes. `domains` holds each variable's codes, `deadline` the
-    end of the time on the monotonic clock, which all processes of a machine share (None: there is no limit).
+    A cost is the position of a variable and the unit of its codes. `domains` has the codes of each variable, `deadline`
+    is on the monotonic clock, which all processes of a machine share (None: no limit).
     """
 
     domains: tuple[tuple[int, ...], ...]
@@ -47,7 +47,7 @@ class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """The codes of a solution, if one was found; whether nothing is better (or there is none); a bound on its cost."""
+    """The codes of a solution, if found; whether it (or that there is none) is proven; a lower bound on the cost."""
 
     codes: tuple[int, ...] | None
     proven: bool
@@ -55,7 +55,7 @@ class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class CpSatFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """It went wrong; `missing`: because OR-Tools is not there."""
+    """An error; `missing` if OR-Tools is not installed."""
 
     why: str
     missing: bool = False

@@ -1,7 +1,7 @@
 """The process of OR-Tools: CP-SAT (https://developers.google.com/optimization/cp/cp_solver) solves tables of codes.
 
-Started by `solver/cp_sat.py`, never imported by anything else: a search in native code hears no signal and keeps its
-memory, and a process can be ended.
+Started by `solver/cp_sat.py`, never imported: a search in native code ignores signals and does not free its memory,
+but its process can be ended.
 
     python -m robochoc.solver.cp_sat_process SOCKET
 """
@@ -35,7 +35,7 @@ from robochoc.system.orphans import signal_when_orphaned
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 WORKERS = 1
-"""One thread: what is measured is a search, and robots beside it need the other cores."""
+"""One thread, for comparable measurements, and since robots need the other cores."""
 
 
 def main() -> None:
@@ -44,21 +44,21 @@ def main() -> None:
     leave_ctrl_c_to_the_parent()
     stream = socket.socket(fileno=int(sys.argv[1])).makefile("rwb")
     tasks: queue.SimpleQueue[CpSatTask] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(stream, tasks), daemon=True).start()
+    threading.Thread(target=_receive_tasks, args=(stream, tasks), daemon=True).start()
     while True:
-        _say(stream, _answer(tasks.get()))
+        _send(stream, _answer(tasks.get()))
 
 
-def _listen(stream: BufferedRWPair, tasks: queue.SimpleQueue[CpSatTask]) -> None:
-    """Hear tasks. End the process when the parent hangs up, also during a search."""
+def _receive_tasks(stream: BufferedRWPair, tasks: queue.SimpleQueue[CpSatTask]) -> None:
+    """Receive tasks. End the process when the parent hangs up, also during a search."""
     decoder = msgspec.msgpack.Decoder(CpSatTask)
     while len(head := stream.read(LENGTH.size)) == LENGTH.size:
         tasks.put(decoder.decode(stream.read(LENGTH.unpack(head)[0])))
     os._exit(0)
 
 
-def _say(stream: BufferedRWPair, word: FromCpSat) -> None:
-    body = msgspec.msgpack.encode(word)
+def _send(stream: BufferedRWPair, message: FromCpSat) -> None:
+    body = msgspec.msgpack.encode(message)
     stream.write(LENGTH.pack(len(body)) + body)
     stream.flush()
 
@@ -68,13 +68,13 @@ def _answer(task: CpSatTask) -> FromCpSat:
         return _solve(task)
     except ImportError as error:
         return CpSatFailed(str(error), missing=True)
-    except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
+    except Exception as error:  # noqa: BLE001 - any error is reported to the parent
         return CpSatFailed(f"{type(error).__name__}: {error}")
 
 
 def _solve(task: CpSatTask) -> CpSatAnswer:
     """Return the answer of CP-SAT."""
-    from ortools.sat.python import cp_model  # noqa: PLC0415 - here, so that its absence can be told
+    from ortools.sat.python import cp_model  # noqa: PLC0415 - here, so that its absence can be reported
 
     if any(table.allowed and not table.rows for table in task.tables):
         return CpSatAnswer(None, proven=True)
@@ -95,11 +95,11 @@ def _solve(task: CpSatTask) -> CpSatAnswer:
         return CpSatAnswer(None, proven=True)
     if status == cp_model.UNKNOWN:
         return CpSatAnswer(None, proven=False)
-    raise ValueError(f"CP-SAT refuses the model: {model.validate()}")
+    raise ValueError(f"CP-SAT rejected the model: {model.validate()}")
 
 
 def _model_of(task: CpSatTask, cp_model: Any) -> tuple[Any, list[Any]]:  # noqa: ANN401 - imported late
-    """Return a model, and its variables. It holds domains, tables, formulas and a sum of costs."""
+    """Return the model of a task, with domains, tables, formulas and the sum of costs, and its variables."""
     model = cp_model.CpModel()
     variables = [
         model.new_int_var_from_domain(cp_model.Domain.from_values(list(codes)), f"x{place}")
@@ -125,7 +125,7 @@ def _post(
     formula: CpSatComparison | CpSatJunction,
     given: tuple[Any, ...],
 ) -> None:
-    """Add `formula` to a model: it holds where the literals `given` do."""
+    """Add `formula` to a model, enforced if the literals `given` are true."""
     if isinstance(formula, CpSatComparison):
         total = sum(factor * variables[place] for place, factor in formula.terms)
         facts = {"le": total <= formula.bound, "eq": total == formula.bound, "ne": total != formula.bound}

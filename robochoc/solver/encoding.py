@@ -1,9 +1,9 @@
-"""Constraints as tables over codes: the form in which a solver is handed a problem.
+"""Encodes constraints as tables over codes, the input of the solvers.
 
-A solver that computes with the values of a problem may compute wrongly (ACE does, with negative ones; FINDINGS).
-So nothing is left to compute: values become codes 0, 1, ... in ascending order, every constraint becomes the list
-of code tuples that it allows or forbids, and unary constraints are folded into the domains first. Problems that
-differ by names and by a shift of values only become equal, which is what lets one solution serve them all.
+Solvers may compute wrong results from values (ACE does, from negative ones; FINDINGS). So they compute with codes only:
+values become codes 0, 1, ... in ascending order, every constraint becomes the list of its allowed or forbidden code
+tuples, and unary constraints are applied to the domains first. Problems that differ only in names and in a shift of
+values become equal, so that one solution can be reused for all of them.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from robochoc.solver.linear import FALSE, Formula, Operand, is_small, linear, op
 from robochoc.solver.splitting import MAX_TRIED, split
 
 Cost = int | float
-"""An integer stays one: what is declared as a `float`, mypyc makes one of, and 3.0 takes nine bytes on the wire."""
+"""Integers stay integers: mypyc would convert them to a declared `float`, and 3.0 takes nine bytes on the wire."""
 
 MAX_TUPLES = 4_000_000
-"""The maximum number of tuples of values that a constraint is tried on."""
+"""The maximum number of tuples of values for which a constraint is evaluated."""
 
 MAX_ALLOWED_ROWS = 100_000
-"""The largest number of combinations of values for which a constraint is always a table of allowed tuples."""
+"""The maximum number of combinations of values for which a constraint is always a table of allowed tuples."""
 
 Codes = tuple[int, ...]
 Costs = tuple[tuple[int, int], ...]
-"""The places of variables whose codes are costs, each with the unit of its codes."""
+"""The positions of variables whose codes are costs, each with the unit of its codes."""
 
 
 class UnsupportedError(Exception):
-    """The problem is well-formed, and this version (or this protocol) cannot take it; says why and what can."""
+    """The problem is valid, but not supported by this version or protocol. The message says what to do instead."""
 
 
 class TooLargeError(UnsupportedError):
-    """The problem is too much for this protocol, as could be seen during the search only; another may take it."""
+    """The problem is too large for this protocol, which was only detectable during the search."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A constraint on the variables at places `scope`: `rows` are the allowed code tuples, or the forbidden ones."""
+    """A constraint on the variables at positions `scope`: `rows` are the allowed, or the forbidden, code tuples."""
 
     scope: Codes
     allowed: bool
@@ -56,10 +56,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Network:
-    """A constraint network over codes: a domain for each variable, in ascending order, and tables.
+    """A constraint network over codes: an ascending domain for each variable, and tables.
 
     `different` lists scopes on which all values differ; it may repeat tables, but adds no constraint. `formulas` are
-    constraints over places that are not tables.
+    constraints over positions of variables without tables.
     """
 
     domains: tuple[Codes, ...]
@@ -69,21 +69,21 @@ class Network:
 
     @property
     def impossible(self) -> bool:
-        """Return whether it can be seen without a search that there is no solution."""
+        """Return whether it obviously has no solution, without a search."""
         return (
             not all(self.domains) or FALSE in self.formulas or any(one.allowed and not one.rows for one in self.tables)
         )
 
     @property
     def constrained(self) -> set[int]:
-        """Return the places of all variables with constraints."""
+        """Return the positions of all variables with constraints."""
         places = {place for table in self.tables for place in table.scope}.union(*self.different)
         return places.union(int(place) for formula in self.formulas for place in operands(formula))
 
 
 @dataclass(frozen=True)
 class Component:
-    """Variables that constraints connect, as a network; `values[code]` is the value that a code stands for.
+    """A connected component of variables as a network; `values[code]` is the value of a code.
 
     `names` are the variables in their given order, followed by additional ones of split constraints. If the network has
     formulas, `values` are ranges, so that codes can be added up.
@@ -94,7 +94,7 @@ class Component:
     network: Network
 
     def decoded(self, codes: Sequence[int]) -> tuple[int, ...]:
-        """Return the values behind a solution of the network."""
+        """Return the values of a solution of the network."""
         return tuple([self.values[code] for code in codes])
 
 
@@ -108,13 +108,13 @@ def components(
 ) -> list[Component]:
     """Return the connected components of `variables` under the hard part of `constraints`.
 
-    Components are in the order of their first variables, variables within in their given order. Constraints are on
-    `variables` only; so are the scopes in `together`, each of which is to be in one component. With `may_split`,
-    predicates that are too wide for a table become several, with further variables (`solver/splitting.py`). With
-    `may_add`, they become formulas where they compare sums (`solver/linear.py`).
+    Components are in the order of their first variables, the variables of each in their given order. All scopes contain
+    only `variables`. The variables of each scope in `together` are put into one component. With `may_split`, predicates
+    too wide for a table are split, with further variables (`solver/splitting.py`). With `may_add`, those that compare
+    sums become formulas (`solver/linear.py`).
 
     Raises:
-        UnsupportedError: when a constraint has too many tuples to be made a table.
+        UnsupportedError: if a constraint has too many tuples for a table.
     """
     variables, constraints = list(variables), list(constraints)
     domains = {variable.name: sorted(variable.domain) for variable in variables}
@@ -144,12 +144,12 @@ def components(
 
 
 def _is_small(part: Component) -> bool:
-    """Return whether codes of `part` are small enough for the solvers; always true without formulas."""
+    """Return whether the codes of `part` are small enough for the solvers; always true without formulas."""
     return all(is_small(formula, len(part.values)) for formula in part.network.formulas)
 
 
 def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
-    """Return `constraint` as a test of the values of the variables `names`; what is soft is allowed."""
+    """Return `constraint` as a test of the values of the variables `names`; soft violations are allowed."""
     definition = constraint.definition
     if not isinstance(definition, Predicate):
         price = cost_function(constraint, names)
@@ -177,7 +177,7 @@ def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Seq
 
 
 def max_cost(constraint: Constraint) -> Cost:
-    """Return the most that `constraint` charges short of being broken; of a function, what its expression says."""
+    """Return the maximum finite cost of `constraint`; of a function, the bound of its expression."""
     match constraint.definition:
         case Relation() as relation:
             prices: tuple[Cost, ...] = (*relation.costs, relation.default_cost)
@@ -189,7 +189,7 @@ def max_cost(constraint: Constraint) -> Cost:
 
 
 def is_soft(constraint: Constraint) -> bool:
-    """Return whether `constraint` may cost something without being broken."""
+    """Return whether `constraint` may have finite costs."""
     match constraint.definition:
         case Relation(semantics=semantics):
             return semantics == Semantics.SOFT
@@ -200,7 +200,7 @@ def is_soft(constraint: Constraint) -> bool:
 
 
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
-    """Return whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
+    """Return a test whether the predicate of `constraint` is true for values of `names`; undefined counts as false."""
     arguments = _arguments(constraint, names)
     body = _body(predicate)
 
@@ -214,7 +214,7 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
 
 
 def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -> Callable[[Sequence[int]], Cost]:
-    """Return the cost of values of `names`; where the function is undefined, it is `INFINITE`."""
+    """Return the cost as a function of values of `names`; undefined counts as `INFINITE`."""
     arguments = _arguments(constraint, names)
     body = _body(function)
 
@@ -228,11 +228,11 @@ def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -
 
 
 _bodies: dict[int, tuple[weakref.ref[Predicate | Function], Closure]] = {}
-"""Compiled bodies, by the `id` of what they are of. To hash an expression would take as long as to look at it."""
+"""Compiled bodies, by the `id` of their definition: hashing an expression would take as long as visiting it."""
 
 
 def _body(definition: Predicate | Function) -> Closure:
-    """Return the body of `definition` as a function: one for all constraints, and all robots, that have it."""
+    """Return the body of `definition` as a function, shared by all constraints and robots with this definition."""
     key = id(definition)
     if key not in _bodies:
         body = compile_expression(definition.body, definition.parameters)
@@ -241,7 +241,7 @@ def _body(definition: Predicate | Function) -> Closure:
 
 
 def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], tuple[int, ...]]:
-    """Return what the definition of `constraint` receives, of values of the variables `names`."""
+    """Return a function that selects the arguments of the definition of `constraint` from values of `names`."""
     place = {name: index for index, name in enumerate(names)}
     terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
     places = [index for index, _ in terms if index is not None]
@@ -255,7 +255,7 @@ def _forbids_something(constraint: Constraint) -> bool:
 
 
 def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
-    """Take from a domain what a unary constraint forbids; a false one on constants only leaves no domain a value."""
+    """Remove the values that a unary constraint forbids; a false constraint on constants empties all domains."""
     test = allows_function(constraint, constraint.variables)
     if constraint.variables:
         (name,) = constraint.variables
@@ -265,7 +265,7 @@ def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
 
 
 def _connected(names: Iterable[str], scopes: Iterable[Sequence[str]]) -> list[list[str]]:
-    """Return the connected components of the graph that `scopes` make, in the order of `names`."""
+    """Return the connected components of the graph of `scopes`, in the order of `names`."""
     root = {name: name for name in names}
 
     def find(name: str) -> str:
@@ -284,7 +284,7 @@ def _connected(names: Iterable[str], scopes: Iterable[Sequence[str]]) -> list[li
 
 @dataclass(frozen=True)
 class _Rows:
-    """A table over values: what `Table` is over codes."""
+    """A table over values, the counterpart of `Table` over codes."""
 
     scope: tuple[str, ...]
     allowed: bool
@@ -310,7 +310,7 @@ def _component(
 
 
 class _Coder:
-    """Turns tables over values into tables over codes; equal rows become one object."""
+    """Converts tables over values into tables over codes; equal rows become one object."""
 
     def __init__(self, place: Mapping[str, int], code: Mapping[int, int]) -> None:
         self._place = place
@@ -328,7 +328,7 @@ class _Coder:
 
 
 def _formulas(constraints: Iterable[Constraint], domains: Mapping[str, list[int]]) -> Iterator[tuple[int, Formula]]:
-    """Yield the numbers of those `constraints` that are too wide for a table and compare sums, as formulas."""
+    """Yield the formulas of those `constraints` that compare sums and are too wide for a table, with their numbers."""
     for number, constraint in enumerate(constraints):
         if math.prod(len(domains[name]) for name in constraint.variables) > MAX_ALLOWED_ROWS:
             formula = linear(constraint, domains)
@@ -337,7 +337,7 @@ def _formulas(constraints: Iterable[Constraint], domains: Mapping[str, list[int]
 
 
 def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *, may_split: bool) -> list[_Rows]:
-    """Return `constraints` as tables. With `may_split`, wide predicates are several: `domains` get their variables."""
+    """Return `constraints` as tables. With `may_split`, wide predicates are split: their variables enter `domains`."""
     tables = _Tables(domains)
     found: list[_Rows] = []
     budget = MAX_TRIED
@@ -357,14 +357,14 @@ def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *,
 
 
 class _Tables:
-    """Makes constraints tables; those that say the same of equal domains are tried once."""
+    """Converts constraints to tables; equal constraints over equal domains are evaluated once."""
 
     def __init__(self, domains: Mapping[str, list[int]]) -> None:
         self._domains = domains
         self._made: dict[Hashable, _Rows | None] = {}
 
     def of(self, constraint: Constraint) -> _Rows | None:
-        """Return the tuples that `constraint` allows (of a large one: or forbids); None when it allows everything."""
+        """Return the allowed tuples of `constraint`, or (if it is large) the forbidden ones. None: it allows all."""
         scope = constraint.variables
         terms = tuple([scope.index(term) if isinstance(term, str) else (term,) for term in constraint.parameters])
         alike = id(constraint.definition), terms, tuple([tuple(self._domains[name]) for name in scope])
@@ -384,8 +384,8 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
         return _Rows(scope, allows, listed) if allows or listed else None
     if size > MAX_TUPLES:
         raise UnsupportedError(
-            f"constraint {constraint.name} has {size:,} combinations of values to try, more than {MAX_TUPLES:,};"
-            " state it as a relation, or split it"
+            f"constraint {constraint.name} has {size:,} combinations of values, more than {MAX_TUPLES:,};"
+            " write it as a relation, or split it"
         )
     test = allows_function(constraint, scope)
     sorted_out: tuple[list[tuple[int, ...]], list[tuple[int, ...]]] = ([], [])
@@ -400,7 +400,7 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
 
 
 def _listed(constraint: Constraint, relation: Relation, domains: Mapping[str, list[int]]) -> Iterable[tuple[int, ...]]:
-    """Yield the tuples of `relation` as values of the scope: those that fit its constants, repetitions and domains."""
+    """Yield the tuples of `relation` that match its constants, repetitions and domains, as values of the scope."""
     scope = constraint.variables
     known = {name: set(domains[name]) for name in scope}
     for row in relation.tuples:

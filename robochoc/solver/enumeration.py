@@ -1,13 +1,13 @@
-"""Enumerates small networks in this process, so that no Java has to be started for them.
+"""Enumerates the solutions of small networks in this process, without starting Java.
 
-A depth-first search that keeps every table arc consistent: a table's rows are the bits of one integer, those of a
-value another, and what is left of the table is their conjunction (Demeulenaere, Hartert, Lecoutre, Perez, Perron,
-Regin and Schaus, "Compact-Table", CP 2016). The variable comes next that has the fewest values for the constraints
-that it stands in (dom/deg: Bessiere and Regin, "MAC and combined heuristics", CP 1996). Where costs are minimised, it
-is branch and bound: what the cost variables come to at least is the bound.
+A depth-first search that keeps every table arc consistent: the rows of a table are the bits of one integer, the rows
+with a value those of another, and the remaining rows are their conjunction (Demeulenaere, Hartert, Lecoutre, Perez,
+Perron, Regin and Schaus, "Compact-Table", CP 2016). The next variable is the one with the fewest values for its number
+of constraints (dom/deg: Bessiere and Regin, "MAC and combined heuristics", CP 1996). Costs are minimised by branch and
+bound; the bound is the sum of the minimum costs.
 
-How much may be done is counted in steps, never in seconds: the same network is settled here, or is not, on every
-machine. It is not predicted: the search starts, and stops when the steps are used up.
+The effort is limited in steps, not seconds: whether a network is solved here is the same on every machine. It is not
+predicted: the search starts, and stops when the steps are used up.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from typing import NamedTuple
 from robochoc.solver.encoding import Codes, Costs, Network, Table
 
 STEPS_EACH = 100_000
-"""The steps that every task may take: about as long as ACE takes where it runs already."""
+"""The maximum steps of every task: about as long as a query to a running ACE."""
 STEPS_BEFORE_ACE = 1_500_000
-"""The further steps of all tasks together before ACE is started: about as long as its start takes."""
+"""The further steps of all tasks together before ACE is started: about as long as its start."""
 
 ROWS_A_STEP = 256
 """The table rows that one step covers, for one value. Longer tables and wider domains take more steps."""
 PLACES_A_STEP = 4
-"""The number of domains and tables that one step copies at every node. This bounds the memory, too."""
+"""The number of domains and tables that one step copies at every node. This also bounds the memory."""
 
 
 class OutOfStepsError(Exception):
-    """The steps are used up, and the search has not seen everything."""
+    """The steps are used up before the search is complete."""
 
 
 class Budget:
-    """A number of steps, of which `used` are used up."""
+    """A maximum number of steps, of which `used` are used up."""
 
     def __init__(self, steps: int) -> None:
         self.steps = steps
         self.used = 0
 
     def spend(self, steps: int) -> None:
-        """Use `steps` more. Raises `OutOfStepsError` if fewer are left; then none are left."""
+        """Use `steps` more. Raises `OutOfStepsError` if fewer are left, and uses these up."""
         self.used += steps
         if self.used > self.steps:
             self.used = self.steps
@@ -48,7 +48,7 @@ class Budget:
 
 
 class Enumeration(NamedTuple):
-    """The number of solutions, whether there are no others, and (unless only counted) the solutions, in order."""
+    """The number of solutions, whether there are no others, and (unless only counted) the sorted solutions."""
 
     number: int
     complete: bool
@@ -56,12 +56,10 @@ class Enumeration(NamedTuple):
 
 
 def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Enumeration:
-    """Return the solutions of `network`, up to `limit`, in lexicographic order.
-
-    `network` is propagated.
+    """Return the solutions of a propagated `network`, up to `limit`, in lexicographic order.
 
     Raises:
-        OutOfStepsError: when the budget does not suffice.
+        OutOfStepsError: if the budget is too small.
     """
     search = _Search(network, budget)
     solutions: list[Codes] = []
@@ -73,24 +71,22 @@ def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, 
             solutions += several
         if limit is not None and count > limit:
             return Enumeration(limit, complete=False, solutions=sorted(solutions)[:limit])
-        if count == limit and limit == 1:  # for one solution it does not matter whether there are others
+        if count == limit and limit == 1:  # whether there are others does not matter
             return Enumeration(1, complete=False, solutions=solutions)
     return Enumeration(count, complete=True, solutions=sorted(solutions))
 
 
 def minimum_solution(network: Network, budget: Budget, costs: Costs) -> Codes | None:
-    """Return a solution of `network` with the least sum of `costs`, if there is one.
-
-    `network` is propagated.
+    """Return a solution of a propagated `network` with the least sum of `costs`, if there is one.
 
     Raises:
-        OutOfStepsError: when the budget does not suffice.
+        OutOfStepsError: if the budget is too small.
     """
     return _Search(network, budget).cheapest(costs)
 
 
 class _Search:
-    """One network, made ready: bit i of a domain stands for its i-th code, bit i of a table for its i-th row."""
+    """A search in one network: bit i of a domain stands for its i-th code, bit i of a table for its i-th row."""
 
     def __init__(self, network: Network, budget: Budget) -> None:
         self._budget = budget
@@ -99,7 +95,7 @@ class _Search:
         budget.spend(sum(len(domain) * (1 + len(domain) // ROWS_A_STEP) for domain in network.domains))
         self._code = [{1 << index: code for index, code in enumerate(domain)} for domain in network.domains]
         self._bit = [{code: 1 << index for index, code in enumerate(domain)} for domain in network.domains]
-        self._looking: list[list[tuple[int, int]]] = [[] for _ in network.domains]
+        self._tables_at: list[list[tuple[int, int]]] = [[] for _ in network.domains]
         self._apart: list[set[int]] = [set() for _ in network.domains]
         self._scopes = [table.scope for table in network.tables]
         self._weights = [1 + len(table.rows) // ROWS_A_STEP for table in network.tables]
@@ -107,7 +103,7 @@ class _Search:
         self._rows: list[list[dict[int, int]]] = []
         for number, table in enumerate(network.tables):
             for index, place in enumerate(table.scope):
-                self._looking[place].append((number, index))
+                self._tables_at[place].append((number, index))
             alike = id(table.rows), tuple([network.domains[place] for place in table.scope])
             if alike not in made:
                 made[alike] = self._by_value(table)
@@ -115,7 +111,7 @@ class _Search:
         for scope in network.different:
             for place in scope:
                 self._apart[place].update(other for other in scope if other != place)
-        seen = zip(self._looking, self._apart, strict=True)
+        seen = zip(self._tables_at, self._apart, strict=True)
         self._degrees = [max(1, len(tables) + len(others)) for tables, others in seen]
         self._node_steps = 1 + (len(network.domains) + len(network.tables)) // PLACES_A_STEP
         self._domains = [(1 << len(domain)) - 1 for domain in network.domains]
@@ -123,7 +119,7 @@ class _Search:
 
     def _by_value(self, table: Table) -> list[dict[int, int]]:
         """Return, for each variable of `table` and each bit of its domain, the rows with that value."""
-        if not table.allowed:  # propagation leaves only those with too many allowed rows
+        if not table.allowed:  # after propagation, these have too many allowed rows
             self._budget.spend(self._budget.steps + 1)
         weight = 1 + len(table.rows) // ROWS_A_STEP
         self._budget.spend(sum(len(table.rows) + weight * len(self._bit[place]) for place in table.scope))
@@ -142,7 +138,7 @@ class _Search:
         stack = [(self._domains, self._left, place, bit)]
         while stack:
             domains, left, place, bit = stack.pop()
-            domains, left = [*domains], [*left]  # the node's siblings have the same
+            domains, left = [*domains], [*left]  # the node's siblings share them
             domains[place] = bit
             if not self._propagates(domains, left, [place]):
                 continue
@@ -150,12 +146,12 @@ class _Search:
             bits = [*_bits(domains[place])]
             if others:
                 stack += [(domains, left, place, bit) for bit in reversed(bits)]
-            else:  # one variable is left at most, and every value that it has agrees with all others
+            else:  # at most one variable is left, and all its values are consistent
                 self._budget.spend(len(domains) * len(bits))
                 yield [self._codes(_with(domains, place, bit)) for bit in bits]
 
     def cheapest(self, costs: Costs) -> Codes | None:
-        """Return the first of the cheapest solutions. Raises `OutOfStepsError`."""
+        """Return the first cheapest solution. Raises `OutOfStepsError`."""
         best: Codes | None = None
         least: int | None = None
         stack = [(self._domains, self._left)]
@@ -174,7 +170,7 @@ class _Search:
         return best
 
     def _below(self, domains: list[int], left: list[int], costs: Costs, least: int) -> bool:
-        """Return whether something may cost less than `least`; what cannot is taken from the domains of the costs."""
+        """Return whether a solution may cost less than `least`; remove costs of other solutions from the domains."""
         spare = least - 1 - self._bound(domains, costs)
         if spare < 0:
             return False
@@ -195,7 +191,7 @@ class _Search:
         return sum([unit * self._code[place][domains[place] & -domains[place]] for place, unit in costs])
 
     def _next(self, domains: Sequence[int]) -> tuple[int, bool]:
-        """Return the variable to branch on (dom/deg; the first if all are assigned), and whether there are others."""
+        """Return the variable to branch on (dom/deg; the first if all are assigned), and whether others remain."""
         best, least, found = 0, 0.0, 0
         for place, domain in enumerate(domains):
             if domain & (domain - 1):
@@ -209,20 +205,20 @@ class _Search:
         return tuple([codes[domain] for codes, domain in zip(self._code, domains, strict=True)])
 
     def _propagates(self, domains: list[int], left: list[int], shrunk: Iterable[int]) -> bool:
-        """Take away what has no support any more, where the domains at `shrunk` are smaller; False: one is empty."""
+        """Remove values without support after the domains at `shrunk` shrank. Return False if a domain is empty."""
         self._budget.spend(self._node_steps)
         waiting = dict.fromkeys(shrunk)
         while waiting:
             place, _ = waiting.popitem()
-            if _is_one(domains[place]) and not self._told(domains, place, waiting):
+            if _is_one(domains[place]) and not self._removes_fixed_value(domains, place, waiting):
                 return False
-            for number, index in self._looking[place]:
+            for number, index in self._tables_at[place]:
                 if not self._revised(domains, left, number, index, waiting):
                     return False
         return True
 
-    def _told(self, domains: list[int], place: int, waiting: dict[int, None]) -> bool:
-        """Take the one value of the variable at `place` from those that differ from it."""
+    def _removes_fixed_value(self, domains: list[int], place: int, waiting: dict[int, None]) -> bool:
+        """Remove the single value of the variable at `place` from the variables that must differ from it."""
         code = self._code[place][domains[place]]
         for other in self._apart[place]:
             smaller = domains[other] & ~self._bit[other].get(code, 0)
@@ -234,7 +230,7 @@ class _Search:
         return True
 
     def _revised(self, domains: list[int], left: list[int], number: int, index: int, waiting: dict[int, None]) -> bool:
-        """Take from table `number` what its variable `index` has lost, and from the others what that supported."""
+        """Remove rows of table `number` without values of its variable `index`, then values without support."""
         rows, scope = self._rows[number], self._scopes[number]
         kept, steps = 0, 0
         values, domain = rows[index], domains[scope[index]]
@@ -271,7 +267,7 @@ def _is_one(domain: int) -> bool:
 
 
 def _bits(domain: int) -> Iterator[int]:
-    """Yield the bits of `domain`, the lowest first."""
+    """Yield the bits of `domain` from the lowest."""
     while domain:
         bit = domain & -domain
         domain ^= bit
@@ -279,7 +275,7 @@ def _bits(domain: int) -> Iterator[int]:
 
 
 def _with(domains: Sequence[int], place: int, bit: int) -> list[int]:
-    """Return `domains` with one value for the variable at `place`."""
+    """Return `domains` with a single value for the variable at `place`."""
     chosen = [*domains]
     chosen[place] = bit
     return chosen

@@ -1,14 +1,14 @@
-"""Costs that floats hold exactly. Without numpy: a check need not import what computes with tables."""
+"""The limit of costs that floats represent exactly. In a module without numpy, for a fast import."""
 
 from __future__ import annotations
 
 from robochoc.solver.encoding import TooLargeError
 
 EXACT = 1 << 53
-"""Below it, floats hold all integers."""
+"""Floats represent all integers below this exactly."""
 
 
 def check_exact(most: float) -> None:
-    """Raise `TooLargeError` where costs could add up to `most`, and floats do not hold all integers up to there."""
+    """Raise `TooLargeError` if `most`, the maximum sum of costs, is too large for exact floats."""
     if most >= EXACT:
-        raise TooLargeError("costs could add up to 2^53 or more, which tables do not hold exactly")
+        raise TooLargeError("costs may add up to 2^53 or more, too much for exact tables: use smaller costs")

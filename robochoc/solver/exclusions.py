@@ -1,17 +1,17 @@
-"""Exclusions: what is done by one robot at most, as a team's constraints say it.
+"""Exclusions and tasks in the constraints of a team: a task is done by at most one robot.
 
 A *choice* is a value of a variable. Two choices of two robots exclude each other if a constraint between these robots
-forbids them together: `V1 = 3` and `V2 = 3` where no two robots do task 3. A team is a *task allocation* if
+forbids them together: `V1 = 3` and `V2 = 3` if no two robots do task 3. A team is a *task allocation* if
 
-- all that robots share are such constraints, each over one variable of two robots, which cost nothing;
-- choices that exclude each other, directly or through others, all do, but for those of one robot: they are the ways to
-  do one thing, which is done by one robot at most (a *task*);
-- each variable that robots show each other has a value that is no such choice: a robot can leave all tasks to others.
+- all shared constraints are of this kind, each over one variable of each of two robots, without costs;
+- choices that exclude each other directly or indirectly all exclude each other, except choices of the same robot: they
+  are the ways of doing one *task*, which is done by at most one robot;
+- each interface variable has a value that is not such a choice, so that a robot can leave all tasks to others.
 
-With *congestion* several robots may do a task, each pair of them at a cost, the same for all pairs of the task. What
-excludes is the same at an infinite cost.
+With *congestion*, several robots may do a task; each pair of them has a cost, the same for all pairs of the task.
+Exclusion is the same with an infinite cost.
 
-A robot needs its own constraints alone to know its tasks, and who else can do them.
+A robot can determine its tasks, and the other robots that can do them, from its own constraints.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from robochoc.model.constraint import Definition
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Team
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import MAX_TUPLES, Cost, UnsupportedError, cost_function
-from robochoc.solver.explanation import held_above
+from robochoc.solver.explanation import constraints_above
 
 Choice = tuple[int, int]
-"""A variable's place among those that its robot shows, and one of its values."""
+"""The index of a variable in its robot's interface, and one of its values."""
 Pair = tuple[int, int]
 """Values of two variables."""
 Column = tuple[int, ...]
 """The values of a variable."""
 Partners = dict[tuple[str, Choice], Cost]
-"""Choices of other robots, and what they cost together with one of this robot."""
+"""Choices of other robots, and their costs together with one choice of this robot."""
 
 
 class Task(NamedTuple):
-    """Something that is done by one robot at most; or by several, each pair of them at a `cost`.
+    """A task that at most one robot does; or several, with a `cost` for each pair.
 
     Attributes:
         own: The choices of this robot that do it.
-        others: The choices of each other robot that do it. Robots stand in priority order.
-        cost: What each pair of robots that does it costs.
+        others: The choices of each other robot that do it. Robots are in priority order.
+        cost: The cost of each pair of robots that do it.
     """
 
     own: tuple[Choice, ...]
@@ -51,23 +51,23 @@ class Task(NamedTuple):
 
 
 def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tuple[Task, ...]]:
-    """Return the number of constraint checks, and the tasks of the robot of `part`, by their first own choices.
+    """Return the number of constraint checks, and the tasks of the robot of `part`, sorted by its first choices.
 
-    A check for each pair of values of each constraint. The constraints of lower robots have to be among `part.copies`.
+    One check for each pair of values of each constraint. `part.copies` must contain the constraints of lower robots.
 
     Args:
         part: The robot's problem.
         congestion: Whether several robots may do a task at a cost.
 
     Raises:
-        UnsupportedError: when a constraint that the robot shares is no exclusion.
+        UnsupportedError: if a shared constraint of the robot is not an exclusion.
     """
     known, own = part.known, part.robot.name
     place = {name: at for names in known.interfaces.values() for at, name in enumerate(names)}
     excluded: dict[Choice, Partners] = defaultdict(dict)
     choices: dict[Choice, Choice] = {}
     exclusions = _Exclusions(known.owners, known.domains, congestion=congestion)
-    for constraint in (one.constraint for one in (*held_above(part.robot), *part.copies)):
+    for constraint in (one.constraint for one in (*constraints_above(part.robot), *part.copies)):
         one, other = exclusions.scope(constraint, own)
         if known.owners[other] == own:
             one, other = other, one
@@ -96,11 +96,11 @@ def _task(
 
 
 def allocation_fault(team: Team, *, congestion: bool = False) -> str:
-    """Return why `team` is no task allocation, or with `congestion` none where that is allowed; empty if it is one."""
+    """Return why `team` is not a task allocation (with `congestion`, if allowed); empty if it is one."""
     variables = {name: variable.domain for name, variable in team.variables.items()}
     exclusions = _Exclusions(team.owner, variables, congestion=congestion)
     excluded: dict[tuple[str, int], dict[tuple[str, int], Cost]] = defaultdict(dict)
-    held = [(robot.name, one.constraint) for robot in team.robots for one in held_above(robot)]
+    held = [(robot.name, one.constraint) for robot in team.robots for one in constraints_above(robot)]
     try:
         scopes = [exclusions.scope(constraint, robot) for robot, constraint in held]
         for (_, constraint), (one, other) in zip(held, scopes, strict=True):
@@ -113,16 +113,13 @@ def allocation_fault(team: Team, *, congestion: bool = False) -> str:
         if all((name, value) in excluded for value in variables[name]):
             return (
                 f"{team.owner[name]} cannot leave all tasks to others: each value of {name} excludes another robot's,"
-                " as where a task asks for several robots"
+                " which may mean that a task requires several robots"
             )
     return _scattered(excluded, team.owner)
 
 
 def _scattered(excluded: Mapping[tuple[str, int], Mapping[tuple[str, int], Cost]], owner: Mapping[str, str]) -> str:
-    """Return which two choices do not exclude each other although others link them; empty if there are none.
-
-    Or which cost something else together than those that link them.
-    """
+    """Return an error if linked choices do not exclude each other, or at different costs; otherwise empty."""
     seen: set[tuple[str, int]] = set()
     for choice in excluded:
         if choice in seen:
@@ -140,14 +137,14 @@ def _scattered(excluded: Mapping[tuple[str, int], Mapping[tuple[str, int], Cost]
             missing = {other for other in linked - excluded[one].keys() if owner[other[0]] != owner[one[0]]}
             if missing:
                 pair = " and ".join(f"{name} = {value}" for name, value in (one, min(missing)))
-                return f"{pair} do not exclude each other, though both exclude what others do"
+                return f"{pair} do not exclude each other, although both exclude the same choices of others"
     return ""
 
 
 class _Exclusions:
-    """Finds what constraints forbid, and counts the checks. Constraints that say the same are evaluated once.
+    """Finds the forbidden pairs of constraints, and counts the checks. Equal constraints are evaluated once.
 
-    So they are in a process: robots whose files say the same evaluate it once together. Each counts its own checks.
+    Robots of one process share the evaluations; each counts its own checks.
     """
 
     def __init__(self, owners: Mapping[str, str], domains: Mapping[str, Domain], *, congestion: bool) -> None:
@@ -162,7 +159,7 @@ class _Exclusions:
         self._found: dict[tuple[object, ...], tuple[tuple[Pair, Cost], ...]] = {}
 
     def scope(self, constraint: Constraint, robot: str) -> tuple[str, str]:
-        """Return the two variables of a `constraint` that `robot` holds. Raises `UnsupportedError`."""
+        """Return the two variables of a `constraint` of `robot`. Raises `UnsupportedError`."""
         names = constraint.variables
         apart = {self._owners.get(name) for name in names}
         if constraint.model == ConstraintModel.PKC or not len(names) == len(apart) == len(("one", "other")):
@@ -170,10 +167,10 @@ class _Exclusions:
         return names[0], names[1]
 
     def pairs(self, constraint: Constraint, one: str, other: str) -> tuple[tuple[Pair, Cost], ...]:
-        """Return the values of `one` and `other` that cost something together, and how much: infinite, or congestion.
+        """Return the pairs of values of `one` and `other` with costs, infinite or of congestion, and the costs.
 
         Raises:
-            UnsupportedError: where there must be no congestion, or there are too many pairs.
+            UnsupportedError: if congestion is not allowed, or there are too many pairs.
         """
         columns = self._column(one), self._column(other)
         size = len(columns[0]) * len(columns[1])
@@ -190,7 +187,7 @@ class _Exclusions:
         return self._found[key]
 
     def _definition(self, constraint: Constraint) -> int:
-        """Return what stands for the definition of `constraint`: the same for all that say the same."""
+        """Return an id of the definition of `constraint`, the same for equal definitions."""
         known = id(constraint.definition)
         if known not in self._definitions:
             self._definitions[known] = id(
@@ -199,7 +196,7 @@ class _Exclusions:
         return self._definitions[known]
 
     def _column(self, name: str) -> Column:
-        """Return the values of a variable: the same object for variables of the same values."""
+        """Return the values of a variable, the same object for variables with equal values."""
         if name not in self._columns:
             column = tuple(self._domains[name])
             self._columns[name] = self._same.setdefault(column, column)
@@ -210,18 +207,18 @@ class _Exclusions:
         if finite and not self._congestion:
             (value, theirs), cost = min(finite)
             raise UnsupportedError(
-                f"{constraint.name!r} costs {cost} for {names[0]} = {value} and {names[1]} = {theirs}: it is more than"
+                f"{constraint.name!r} costs {cost} for {names[0]} = {value} and {names[1]} = {theirs}: it is not only"
                 " an exclusion"
             )
 
 
 class _Row(NamedTuple):
-    """The costs of one value of a variable with values of another one, as far as they were evaluated.
+    """The costs of one value of a variable with the evaluated values of another.
 
     Attributes:
         columns: The numbers of the columns whose values were all evaluated.
-        evaluated: The values that were.
-        costs: What they cost, if they cost something.
+        evaluated: The evaluated values of the other variable.
+        costs: Their costs, if not 0.
     """
 
     columns: set[int]
@@ -230,10 +227,10 @@ class _Row(NamedTuple):
 
 
 class Evaluations:
-    """The costs of definitions, kept for the robots of a process: the same constraint stands in many files.
+    """A cache of costs for the robots of a process, since equal constraints occur in many files.
 
     Args:
-        most: Of more pairs of values nothing is kept.
+        most: The number of pairs of values at which the cache is cleared.
     """
 
     def __init__(self, most: int) -> None:
@@ -249,7 +246,7 @@ class Evaluations:
         terms: tuple[object, ...],
         columns: tuple[Column, Column],
     ) -> tuple[tuple[Pair, Cost], ...]:
-        """Return the pairs of values of `columns` that cost something, and how much."""
+        """Return the pairs of values of `columns` with costs, and the costs."""
         rows = self._rows.setdefault((constraint.definition, constraint.cost, terms), {})
         others, cost_of = columns[1], cost_function(constraint, names)
         number, wanted = self._columns.setdefault(others, len(self._columns)), frozenset(others)
@@ -278,7 +275,7 @@ def _by_robot(
     rank: Mapping[str, int],
     same: dict[frozenset[Choice], frozenset[Choice]],
 ) -> dict[str, frozenset[Choice]]:
-    """Return the choices by robot, in priority order. Sets of the same choices are the same object."""
+    """Return the choices by robot, in priority order. Equal sets of choices are the same object."""
     found: dict[str, set[Choice]] = {}
     for robot, choice in partners:
         found.setdefault(robot, set()).add(choice)

@@ -1,7 +1,7 @@
-"""Explanations of nogoods, and what a change of the problem invalidates.
+"""Explanations of nogoods, and their invalidation by changes of the problem.
 
-A nogood that was derived from some constraints and domains holds as long as these stand (DynABT: Omomowo, Arana and
-Ahriz 2008). Constraints and domains are named by keys, the same in every robot.
+A nogood derived from some constraints and domains holds as long as these are unchanged (DynABT: Omomowo, Arana and
+Ahriz 2008). Constraints and domains are identified by keys, the same in every robot.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ class Invalidated(NamedTuple):
     """The explanations that a change has invalidated.
 
     Attributes:
-        keys: The keys of constraints and domains that no longer rule out what they did.
-        agents: The agents whose values mean something else: they have left, or have other interface variables.
+        keys: The keys of removed constraints and of domains with new values.
+        agents: The agents that have left or have other interface variables.
     """
 
     keys: frozenset[str]
     agents: frozenset[str]
 
 
-def held_above(robot: Robot) -> Iterator[KeyedConstraint]:
-    """Yield the constraints that `robot` holds towards its parents.
+def constraints_above(robot: Robot) -> Iterator[KeyedConstraint]:
+    """Yield the constraints of `robot` with its parents.
 
     Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
     """
@@ -41,20 +41,20 @@ def held_above(robot: Robot) -> Iterator[KeyedConstraint]:
             yield KeyedConstraint(f"{robot.name}<{parent.name}:{constraint.name}", constraint)
 
 
-def held_below(robot: Robot) -> Iterator[tuple[str, KeyedConstraint]]:
-    """Yield the parts of partially known constraints that `robot` holds, each with the child's name."""
+def parts_below(robot: Robot) -> Iterator[tuple[str, KeyedConstraint]]:
+    """Yield the parts of `robot` in partially known constraints with children, each with the child's name."""
     for child in robot.children:
         for constraint in child.constraints:
             yield child.name, KeyedConstraint(f"{robot.name}>{child.name}:{constraint.name}", constraint)
 
 
 def domain_key(agent: str) -> str:
-    """Return the key of an agent's domain: that it has no other values than those it has."""
+    """Return the key of an agent's domain, which explains that other values are impossible."""
     return f"{agent}="
 
 
 def invalidated_by(old: Team, new: Team) -> Invalidated:
-    """Return what `new` invalidates of `old`: constraints that are gone, domains that have grown, robots that left."""
+    """Return the explanations in `old` that `new` invalidates: removed constraints, grown domains, removed robots."""
     keys = set()
     agents = set()
     for robot in old.robots:
@@ -69,7 +69,7 @@ def invalidated_by(old: Team, new: Team) -> Invalidated:
 
 
 def _all_held(robot: Robot) -> list[KeyedConstraint]:
-    return [*held_above(robot), *(part for _, part in held_below(robot))]
+    return [*constraints_above(robot), *(part for _, part in parts_below(robot))]
 
 
 def _has_grown(old: Robot, new: Robot) -> bool:

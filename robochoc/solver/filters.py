@@ -1,8 +1,8 @@
-"""Filters: which values of another robot are consistent with an own value, without naming values.
+"""Filters: the values of another robot that are consistent with a value of this robot, without naming values.
 
-A filter is a bitmap over the values that the other robot could have by common knowledge: the product of its
-interface variables' declared domains, in ascending order. Bit 0 of byte 0 is the first (Brito, Meisels, Meseguer
-and Zivan, Constraints 14, 2009: the "filtered domain" that DisFC sends instead of the own value).
+A filter is a bitmap over the possible values of the other robot by common knowledge: the product of its interface
+variables' declared domains, in ascending order. Bit 0 of byte 0 is the first (Brito, Meisels, Meseguer and Zivan,
+Constraints 14, 2009: the "filtered domain" that DisFC sends in place of the robot's value).
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.shared_constraint import SharedConstraint
 
 MAX_FILTER_BITS = 65_536
-"""Bits in a filter: combinations of a robot's interface values, as its domains are declared."""
+"""The maximum number of bits in a filter: combinations of the declared values of a robot's interface variables."""
 
 
 class Filters:
-    """Makes the filters that one robot sends, and says where its own values stand in those that it gets.
+    """Computes the filters that one robot sends, and the positions of its own values in received filters.
 
-    `constraints` are those with each receiver; robots that are not in it get a full filter.
+    `constraints` are those with each receiver; other robots get a full filter.
 
     Raises:
-        UnsupportedError: when the robot's own values are too many for a filter.
+        UnsupportedError: if the robot has too many values for a filter.
     """
 
     def __init__(
@@ -38,15 +38,15 @@ class Filters:
         size = math.prod(len(column) for column in columns)
         if size > MAX_FILTER_BITS:
             raise UnsupportedError(
-                f"{part.robot.name} shows its neighbours {size:,} combinations of values, and a filter has a bit for"
-                f" each, {MAX_FILTER_BITS:,} at most; make its domains smaller, or take another protocol"
+                f"{part.robot.name} has {size:,} combinations of interface values, more than the {MAX_FILTER_BITS:,}"
+                " bits of a filter; make its domains smaller, or use another protocol"
             )
         ranks: list[dict[int | None, int]] = [{value: rank for rank, value in enumerate(column)} for column in columns]
         self.places = [_place(value, ranks) for value in values]
-        """For each own value its bit in a filter."""
+        """The position of each own value in filters."""
 
     def of(self, index: int, receiver: str) -> tuple[int, bytes]:
-        """Return how many pairs were evaluated, and the filter of `receiver` under the own value at `index`."""
+        """Return the number of evaluated pairs, and the filter of `receiver` for the own value at `index`."""
         made = self._made.get((index, receiver))
         if made is None:
             made = self._made[index, receiver] = self._filter(index, receiver)
@@ -75,5 +75,5 @@ def _place(value: Value, ranks: Sequence[Mapping[int | None, int]]) -> int:
 
 
 def allows(allowed: bytes, place: int) -> bool:
-    """Return whether the filter `allowed` has the bit at `place`; one that is too short has no more bits."""
+    """Return whether the filter `allowed` contains `place`; bits beyond its end are 0."""
     return place >> 3 < len(allowed) and bool(allowed[place >> 3] >> (place & 7) & 1)

@@ -1,7 +1,7 @@
-"""Predicates as comparisons of sums, for solvers, instead of tables that would be too large.
+"""Predicates as comparisons of sums for solvers, in place of tables that would be too large.
 
 A predicate on two tasks of a job shop, `or(le(add(x,50),y),le(add(y,61),x))`, has as many rows as the square of the
-horizon. Solvers handle its comparisons quickly. They get only comparisons of sums with a constant, joined by `and`
+horizon. Solvers handle its comparisons quickly. They receive only comparisons of sums with a constant, joined by `and`
 and `or`, without products and negative numbers, for which ACE computes wrong results.
 """
 
@@ -18,7 +18,7 @@ from robochoc.model.expression.bounds import Interval
 from robochoc.solver.splitting import collect_terms, largest_value, with_arguments
 
 LARGEST = 2**29
-"""The maximum of all intermediate results, so that solvers with 32 bits are correct."""
+"""The maximum of all intermediate results, for the correctness of solvers with 32 bits."""
 MAX_PARTS = 1000
 """The maximum number of comparisons in one predicate."""
 
@@ -54,7 +54,7 @@ class _NotLinearError(Exception):
 
 
 def linear(constraint: Constraint, domains: Mapping[str, Sequence[int]]) -> Formula | None:
-    """Return a hard predicate as comparisons of sums; None where that is not possible.
+    """Return a hard predicate as comparisons of sums. None: not possible.
 
     Args:
         constraint: The predicate.

@@ -1,9 +1,9 @@
-"""Generalised arc consistency on tables: what is left is smaller, and safe for ACE to have.
+"""Generalised arc consistency on tables, which makes them smaller and safe for ACE.
 
-ACE 2.6 counts wrongly where a table of forbidden tuples meets a domain of one value, fails an assertion where its own
-first filtering empties a table, and trips over small permutations (`tests/unit/solver/test_ace.py`;
-docs/explanation/design.md, "ACE"). So it gets none of these: values without support go, variables with one value leave
-their tables, tables that say nothing any more are dropped, and small permutations are spelt out.
+ACE 2.6 counts wrongly if a table of forbidden tuples has a variable with one value, fails an assertion if its first
+propagation empties a table, and fails on small permutations (`tests/unit/solver/test_ace.py`;
+docs/explanation/design.md, "ACE"). So these are removed: values without support, variables with one value, tables
+without effect; small permutations become tables.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, Network, Table
 from robochoc.solver.linear import FALSE, Formula, Operand, conjuncts, holds, operands, renamed
 
 LARGEST_PERMUTATION = 5
-"""The largest allDifferent over as many values that becomes a table (120 rows). ACE does so up to 4 variables."""
+"""The largest permutation that becomes a table (120 rows). ACE's own limit is 4 variables."""
 
 
 def propagate(network: Network) -> Network:
-    """Return `network` with the same variables and the same solutions, arc consistent; impossible, if that shows it.
+    """Return an equivalent arc consistent network; `impossible` if that shows that there is no solution.
 
-    Every domain has at least two values wherever a table or a `different` looks at it, and of forbidden tuples there
-    are tables only where those allowed would be more than `MAX_ALLOWED_ROWS`.
+    Every variable in a table or a `different` has at least two values. Tables of forbidden tuples remain only if there
+    are more than `MAX_ALLOWED_ROWS` allowed ones.
     """
     filtered = _Filter(network)
     if not filtered.run():
         return Network(tuple(() for _ in network.domains))
     domains = tuple(tuple(sorted(domain)) for domain in filtered.domains)
     left = [_without_fixed(table, domains) for table in filtered.tables]
-    tables = [_allowing(table, domains) for table in left if not _says_nothing(table, domains)]
+    tables = [_allowing(table, domains) for table in left if not _allows_everything(table, domains)]
     chosen = [tuple([place for place in scope if len(domains[place]) > 1]) for scope in network.different]
     scopes = [scope for scope in chosen if len(scope) > 1]
     spelt_out = [_spelt_out(scope, domains) for scope in scopes if is_small_permutation(scope, domains)]
@@ -40,7 +40,7 @@ def propagate(network: Network) -> Network:
     if FALSE in formulas:
         return Network(tuple(() for _ in domains))
     result = Network(domains, (*tables, *spelt_out, *unary), kept, formulas)
-    # A table that was made of something else may have more to say.
+    # New tables may allow further propagation.
     forbidding = sum(not table.allowed for table in filtered.tables)
     fewer = forbidding > sum(not table.allowed for table in tables)
     return propagate(result) if spelt_out or unary or fewer else result
@@ -68,10 +68,10 @@ class _Filter:
         self.tables = [_allowing(table, network.domains) for table in network.tables]
         self._different = network.different
         self._waiting = dict.fromkeys(range(len(self.tables)))
-        self._looking: list[list[int]] = [[] for _ in network.domains]
+        self._tables_at: list[list[int]] = [[] for _ in network.domains]
         for number, table in enumerate(self.tables):
             for place in table.scope:
-                self._looking[place].append(number)
+                self._tables_at[place].append(number)
 
     def run(self) -> bool:
         """Remove values without support. Return False when a domain is empty."""
@@ -82,7 +82,7 @@ class _Filter:
                 number, _ = self._waiting.popitem()
                 if not self._revise(number):
                     return False
-            if not self._tell_fixed_values():
+            if not self._remove_fixed_values():
                 return False
             if not self._waiting:
                 return True
@@ -110,10 +110,10 @@ class _Filter:
         """Restrict the domain at `place` to `values`, and check its tables again."""
         if not self.domains[place] <= values:
             self.domains[place] &= values
-            self._waiting.update(dict.fromkeys(self._looking[place]))
+            self._waiting.update(dict.fromkeys(self._tables_at[place]))
 
-    def _tell_fixed_values(self) -> bool:
-        """Return where all values differ, one that is taken is taken from the others."""
+    def _remove_fixed_values(self) -> bool:
+        """Remove fixed values from the variables that must differ from them. Return False if a domain is empty."""
         before = -1
         while before != (before := sum(map(len, self.domains))):
             for scope in self._different:
@@ -129,9 +129,9 @@ class _Filter:
 
 
 def is_small_permutation(scope: Codes, domains: Sequence[Codes]) -> bool:
-    """Return whether variables that all differ are few, and need every value there is.
+    """Return whether variables that all differ are few, and need all their values.
 
-    ACE makes a table of these itself, and fails where a variable lacks one of the values.
+    ACE converts these to tables itself, and fails if a variable lacks one of the values.
     """
     values = {code for place in scope for code in domains[place]}
     return len(scope) == len(values) <= LARGEST_PERMUTATION
@@ -143,7 +143,7 @@ def _spelt_out(scope: Codes, domains: Sequence[Codes]) -> Table:
 
 
 def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
-    """Return `table` by its allowed tuples, unless they are too many."""
+    """Return `table` as a table of allowed tuples, unless there are too many."""
     if table.allowed or math.prod(len(domains[place]) for place in table.scope) > MAX_ALLOWED_ROWS:
         return table
     forbidden = set(table.rows)
@@ -152,7 +152,7 @@ def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
 
 
 def _without_fixed(table: Table, domains: Sequence[Codes]) -> Table:
-    """Return `table` on those of its variables that have a choice; all its rows agree with the values of the others."""
+    """Return `table` without variables that have one value, with which all its rows agree."""
     kept = [index for index, place in enumerate(table.scope) if len(domains[place]) > 1]
     if len(kept) == len(table.scope):
         return table
@@ -160,7 +160,7 @@ def _without_fixed(table: Table, domains: Sequence[Codes]) -> Table:
     return Table(tuple([table.scope[index] for index in kept]), table.allowed, tuple(rows))
 
 
-def _says_nothing(table: Table, domains: Sequence[Codes]) -> bool:
+def _allows_everything(table: Table, domains: Sequence[Codes]) -> bool:
     if not table.allowed:
         return not table.rows
     return len(table.rows) == math.prod(len(domains[place]) for place in table.scope)

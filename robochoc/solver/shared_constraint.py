@@ -1,4 +1,4 @@
-"""A constraint shared with other robots, as its owner checks it: compiled once, remembered by what the others say."""
+"""A constraint shared with other robots, compiled for its checks; results are cached by the others' values."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from robochoc.solver.encoding import (
 )
 
 Conflict = Mapping[str, Value]
-"""Assignments of other robots that rule out an own value: the left side of a nogood."""
+"""Assignments of other robots that exclude an own value: the left side of a nogood."""
 
 UNKNOWN = -1
-"""No mask: a value in the scope is unknown, or the constraint is dropped because a robot is withdrawn."""
+"""The value of a missing mask: a value in the scope is unknown, or a withdrawn robot drops the constraint."""
 
 OtherValues = tuple[int | None, ...]
-"""The values of other robots' variables in a constraint, in its order. None: the robot is withdrawn."""
+"""The values of other robots' variables in a constraint, in its order. None: withdrawn."""
 
 
 class Gap(NamedTuple):
-    """The combinations of others' values that an own value violates a constraint with, and those that it goes with."""
+    """The combinations of others' values that violate a constraint with an own value, and those that satisfy it."""
 
     broken: Sequence[Conflict]
     allowed: Sequence[Conflict]
 
 
 class OwnValues:
-    """The own compiled domain: `values` of the variables `names`, and what constraints can tell apart in it.
+    """The own compiled domain: `values` of the variables `names`, and the codes by which constraints distinguish them.
 
-    A constraint looks at some of the variables; values that agree there get one code. Many constraints look at the
-    same ones.
+    A constraint contains some of the variables; values that agree on these have the same code. Many constraints share
+    their codes.
     """
 
     def __init__(self, names: Sequence[str], values: Sequence[Value]) -> None:
@@ -51,12 +51,12 @@ class OwnValues:
         self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
-        """Return the places and names of the own variables in `scope`."""
+        """Return the indices and names of the own variables in `scope`."""
         places = tuple([place for place, name in enumerate(self._names) if name in scope])
         return places, [self._names[place] for place in places]
 
     def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[Value]]:
-        """Return the code of each value, and the values of `places` that each code stands for."""
+        """Return the code of each value, and the values at `places` of each code."""
         if places not in self._coded:
             codes: dict[Value, int] = {}
             coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
@@ -64,24 +64,27 @@ class OwnValues:
         return self._coded[places]
 
     def shown(self, index: int, places: Container[int]) -> Value:
-        """Return the value at `index`, where only `places` matter."""
+        """Return the value at `index`, with None outside `places`."""
         return tuple([part if place in places else None for place, part in enumerate(self._values[index])])
 
 
 def _plain(domain: Domain) -> Domain | range:
-    """Return the range that `domain` is, if it is a single one: that is asked faster."""
+    """Return `domain` as a range, which is faster, if it is a single one."""
     return domain.ranges[0] if len(domain.ranges) == 1 else domain
 
 
 class SharedConstraint:
     """A constraint on the own compiled variable and those of `agents` (in priority order).
 
-    `known` is what all robots know of each other, `own` the robot that checks; `key` is the constraint's name in
-    explanations.
+    After `compile` it returns the own values that are consistent with values of the others. Answers are computed on
+    first use and cached: one for each combination of the others' variables in the constraint, however many values
+    their robots have.
 
-    After `compile` it answers which own values go with what the others say. Made at the first look, then kept:
-    there is one answer for each combination of the others' variables that the constraint looks at, however many
-    values their owners have.
+    Args:
+        key: The constraint's name in explanations.
+        constraint: The constraint.
+        known: The common knowledge of all robots.
+        own: The robot that checks.
     """
 
     def __init__(self, key: str, constraint: Constraint, known: TeamKnowledge, own: str) -> None:
@@ -97,26 +100,26 @@ class SharedConstraint:
         ]
         self._names = [interfaces[agent][place] for agent, place in self._seen]
         self._domains: list[Domain | range] | None = [_plain(known.domains[name]) for name in self._names]
-        """Of what it sees; None: any value is evaluated."""
+        """The domains of the others' variables. None: any value is evaluated."""
         self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
         self._only = self._seen[0] if len(self._seen) == 1 else None
-        self._looks: dict[int, int] = {}
-        """Where it sees one variable of others: `mask`, by its value."""
+        self._masks_by: dict[int, int] = {}
+        """If the others have one variable: `mask`, by its value."""
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[Cost]] = {}
         self._costs_by: dict[int, list[Cost]] = {}
-        """Where it sees one variable of others: `costs`, by its value."""
+        """If the others have one variable: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
         self._counts_when_absent = False
         self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
-        """The costs of the constraint when the owners of these variables are absent; None: it is dropped."""
+        """The costs of the constraint if the owners of these variables are absent. None: it is dropped."""
 
     def allow_absence(self) -> None:
-        """Treat values that are None as those of withdrawn robots from now on: see `model/absence.py`."""
+        """Accept None as the value of withdrawn robots from now on (`model/absence.py`)."""
         self._counts_when_absent = may_count_when_absent(self._constraint)
 
     def compile(self, own: OwnValues) -> None:
-        """Get ready for the own compiled domain."""
+        """Compile the constraint for the own domain."""
         self._own = own
         self._places, names = own.seen(self._scope)
         self._test = allows_function(self._constraint, [*self._names, *names])
@@ -125,7 +128,7 @@ class SharedConstraint:
         self.codes, self._distinct = own.codes(self._places)
 
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
-        """Return the values of the scope in `view`; None: one is unknown, or the constraint is dropped."""
+        """Return the values of the scope in `view`. None: a value is unknown, or the constraint is dropped."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
@@ -135,9 +138,9 @@ class SharedConstraint:
         return None if None in seen and not self._counts_when_absent else tuple(seen)
 
     def combined(self, sets: Mapping[str, Sequence[Value]]) -> Iterator[OtherValues]:
-        """Yield all that the constraint may see where each other robot has any of its values in `sets`.
+        """Yield all combinations of the others' variables for values of each other robot in `sets`.
 
-        Nothing, if it cannot see a robot there. Values that look alike to it come once.
+        Nothing, if a robot has no values there. Equal combinations are yielded once.
         """
         columns = []
         for agent in self.agents:
@@ -148,13 +151,13 @@ class SharedConstraint:
             yield tuple(itertools.chain.from_iterable(parts))
 
     def allow_undeclared(self) -> None:
-        """From now on evaluate whatever values others have."""
+        """Evaluate undeclared values of others from now on."""
         self._domains = None
 
     def _refuse_undeclared(self, others: OtherValues) -> None:
-        """Raise `ValueError` for a value that its robot, as its file declares it, cannot have: others say anything.
+        """Raise `ValueError` if a value, which a message may contain, is not in the declared domain of its robot.
 
-        It is called when `others` is evaluated, and so once for each combination.
+        Called when `others` is evaluated, and so once for each combination.
         """
         if self._domains is None:
             return
@@ -163,7 +166,7 @@ class SharedConstraint:
                 raise ValueError(f"{self._names[place]} of {self._seen[place][0]} cannot be {others[place]}")
 
     def _refusal_of_width(self, view: Mapping[str, Value]) -> ValueError:
-        """Return the error for a value in `view` that has too few parts."""
+        """Return the error for a value in `view` with too few parts."""
         short = [agent for agent, width in self._widths.items() if agent in view and len(view[agent]) < width]
         return ValueError(f"a value of {short[0]} has {self._widths[short[0]]} parts, not {len(view[short[0]])}")
 
@@ -181,7 +184,7 @@ class SharedConstraint:
         return self._cost_for_some(values) if None in values else self._price(values)  # type: ignore[arg-type]
 
     def _cost_for_some(self, values: Sequence[int | None]) -> Cost:
-        """Return the cost of the constraint when robots are withdrawn; 0 if it is dropped."""
+        """Return the cost of the constraint with withdrawn robots; 0 if it is dropped."""
         if not self._counts_when_absent:
             return 0
         paired = list(zip(self._all_names, values, strict=True))
@@ -195,16 +198,16 @@ class SharedConstraint:
 
     @property
     def definition(self) -> object:
-        """The constraint as the files have it: equal ones charge the same."""
+        """The constraint of the files: equal constraints have equal costs."""
         return self._constraint
 
     @property
     def max_cost(self) -> Cost:
-        """The most that it charges short of being broken."""
+        """The maximum finite cost."""
         return max_cost(self._constraint)
 
     def costs(self, others: OtherValues) -> list[Cost]:
-        """Return what each own value pays when the others are as `others` says."""
+        """Return the cost of each own value for the values `others`. Raises `ValueError`."""
         prices = self._costs.get(others)
         if prices is None:
             self._refuse_undeclared(others)
@@ -213,7 +216,7 @@ class SharedConstraint:
         return prices
 
     def costs_in(self, view: Mapping[str, Value]) -> list[Cost] | None:
-        """Return the cost of each own value in `view`; None: a value is unknown, or the constraint is dropped."""
+        """Return the cost of each own value in `view`. None: a value is unknown, or the constraint is dropped."""
         if self._only is None:
             others = self.other_values(view)
             return None if others is None else self.costs(others)
@@ -235,7 +238,7 @@ class SharedConstraint:
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[Cost]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
-        With more than `wide` combinations the bound is 0 without a look.
+        With more than `wide` combinations, the bound is 0 without checks.
         """
         least: list[Cost] = [0] * len(self.codes)
         columns = [list(domains[name]) for name in self._names]
@@ -251,9 +254,9 @@ class SharedConstraint:
         return checks, least
 
     def least_and_most(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, Cost, Cost]:
-        """Return the number of checks, and the least and the most that it charges over the others' `domains`.
+        """Return the number of checks, and the minimum and maximum cost over the others' `domains`.
 
-        With more than `wide` combinations, nothing is looked at: they are 0 and what the constraint lists.
+        With more than `wide` combinations, nothing is checked: they are 0 and the constraint's maximum.
         """
         columns = [list(domains[name]) for name in self._names]
         entries = math.prod(map(len, columns)) * len(self.codes)
@@ -265,19 +268,19 @@ class SharedConstraint:
     def combinations(
         self, domains: Mapping[str, Sequence[Value]], size: int
     ) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
-        """Yield the places of the others' values in `domains`, for each combination, and what the constraint sees.
+        """Yield the indices of the others' values in `domains`, for each combination, and the values in the scope.
 
-        Combinations for which it is dropped are left out; `size` is the number of own values.
+        Combinations that drop the constraint are skipped; `size` is the number of own values.
 
         Raises:
-            UnsupportedError: when there are too many.
+            UnsupportedError: if there are too many combinations.
         """
         columns = [domains[agent] for agent in self.agents]
         entries = math.prod(map(len, columns)) * size
         if entries > MAX_TUPLES:
             raise UnsupportedError(
                 f"the table of constraint {self.key} has {entries:,} entries, more than {MAX_TUPLES:,}; split the"
-                " constraint, or choose a protocol that computes without tables"
+                " constraint, or choose a protocol without tables"
             )
         for place in itertools.product(*(range(len(column)) for column in columns)):
             chosen = (column[index] for column, index in zip(columns, place, strict=True))
@@ -286,7 +289,7 @@ class SharedConstraint:
                 yield place, others
 
     def mask(self, others: OtherValues) -> int:
-        """Return the own values that go with `others`: bit i for the i-th."""
+        """Return the own values that are consistent with `others`: bit i for the i-th."""
         mask = self._masks.get(others)
         if mask is None:
             holds = self.holds(others)
@@ -295,19 +298,19 @@ class SharedConstraint:
         return mask
 
     def declared(self, domains: Mapping[str, Iterable[int]], most: int) -> Iterable[OtherValues]:
-        """Return all that the constraint may see of the others, by their declared `domains`; nothing if over `most`."""
+        """Return all combinations of the others' declared `domains`; none if there are more than `most`."""
         columns = [list(domains[name]) for name in self._names]
         return itertools.product(*columns) if math.prod(map(len, columns)) <= most else ()
 
     def evaluate(self, combinations: Iterable[OtherValues]) -> int:
-        """Evaluate `combinations`, and return how many there are that were not known before."""
+        """Evaluate `combinations`, and return the number of those that were not evaluated before."""
         before = len(self._masks)
         for others in combinations:
             self.mask(others)
         return len(self._masks) - before
 
-    def look(self, view: Mapping[str, Value]) -> int:
-        """Return the own values that go with `view`: bit i for the i-th. `UNKNOWN` where `other_values` is None."""
+    def mask_in(self, view: Mapping[str, Value]) -> int:
+        """Return `mask` for the values in `view`. `UNKNOWN` if `other_values` is None."""
         if self._only is None:
             others = self.other_values(view)
             return UNKNOWN if others is None else self.mask(others)
@@ -321,26 +324,27 @@ class SharedConstraint:
             raise self._refusal_of_width(view) from None
         if part is None:
             return self.mask((None,)) if self._counts_when_absent else UNKNOWN
-        mask = self._looks.get(part)
+        mask = self._masks_by.get(part)
         if mask is None:
-            mask = self._looks[part] = self.mask((part,))
+            mask = self._masks_by[part] = self.mask((part,))
         return mask
 
     def conflict_with(self, view: Mapping[str, Value]) -> Conflict:
-        """Return what the constraint sees in `view`, which knows all of it, as a nogood's left side."""
+        """Return `conflict` for the values in `view`, which must be known."""
         others = self.other_values(view)
-        assert others is not None  # noqa: S101 - for mypy: it has just been looked at
+        assert others is not None  # noqa: S101 - for mypy
         return self.conflict(others)
 
     def own_part(self, index: int) -> Value:
-        """Return what the constraint looks at of the own value at `index`; None elsewhere."""
+        """Return the variables of the constraint in the own value at `index`; None for others."""
         return self._own.shown(index, self._places)
 
     def row(self, index: int, columns: Sequence[Sequence[int]]) -> tuple[int, list[bool]]:
-        """Return which values of the one other robot go with the own value at `index`, and the number of checks.
+        """Return which values of the single other robot are consistent with the own value at `index`.
 
-        `columns` are the values of that robot's variables; the answers follow their product, as `itertools` makes it.
-        Every pair that the constraint can tell apart is evaluated once, whatever the answers are.
+        `columns` are the values of that robot's variables; the answers follow their product, as in `itertools`. Every
+        pair that the constraint distinguishes is evaluated once, whatever the answers are. Also return the number of
+        checks, first.
         """
         own = self._distinct[self.codes[index]]
         places = [place for _, place in self._seen]
@@ -350,7 +354,7 @@ class SharedConstraint:
         return len(holds), [holds[tuple([value[place] for place in places])] for value in values]
 
     def conflict(self, others: OtherValues) -> Conflict:
-        """Return `others` as a nogood's left side: one object for one combination, not to be changed."""
+        """Return `others` as the left side of a nogood. Equal calls share one object, which must not be modified."""
         conflict = self._conflicts.get(others)
         if conflict is None:
             parts: dict[str, list[int | None]] = {agent: [None] * self._widths[agent] for agent in self.agents}
@@ -370,7 +374,7 @@ def sorted_by_lowest_agent(
 
 
 def by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:
-    """Return those that are shared with one other robot, by its name."""
+    """Return the constraints with a single other robot, by its name."""
     found: dict[str, list[SharedConstraint]] = {}
     for constraint in constraints:
         if len(constraint.agents) == 1:

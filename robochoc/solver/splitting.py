@@ -1,11 +1,10 @@
-"""Predicates over many variables as small tables, for solvers that are handed nothing but tables.
+"""Splits predicates over many variables into small tables, for solvers that accept only tables.
 
-A predicate with too many combinations of values to try is taken apart along its expression: what a part of it is worth
-becomes a further variable, and a table says how that follows from the part's variables. Sums that are compared with
-something are added up term by term (Trick, "A dynamic programming approach for consistency and propagation for
-knapsack constraints", Annals of OR 118, 2003): each partial sum is a variable, and sums from which the rest cannot
-change the outcome any more are one value. Every further variable follows from the others, so that there are neither
-more nor fewer solutions.
+A predicate with too many combinations of values is split along its expression: the value of a subexpression becomes a
+further variable, and a table relates it to the subexpression's variables. Sums in comparisons are added up term by term
+(Trick, "A dynamic programming approach for consistency and propagation for knapsack constraints", Annals of OR 118,
+2003): each partial sum is a variable, and sums for which the rest cannot change the outcome share one value. Every
+further variable is determined by the others, so the number of solutions stays the same.
 """
 
 from __future__ import annotations
@@ -30,13 +29,13 @@ from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.tree import BOUND
 
 SMALL = 256
-"""So many combinations of values at most are put into one table where they could be in two."""
+"""The maximum number of combinations of values for which parts are joined in one table."""
 MAX_COMBINATIONS = 1_000_000
-"""The maximum number of combinations of values that one table is made of."""
+"""The maximum number of evaluated combinations of values for one table."""
 MAX_TRIED = 3_000_000
-"""The maximum number of combinations of values that all tables of the split predicates of a problem are made of."""
+"""The maximum number of evaluated combinations of values for all split predicates of a problem."""
 LARGEST = BOUND >> 20
-"""What is computed on the way is no larger, so that in no order it leaves the bounds of an expression."""
+"""The maximum of intermediate results, so that sums in any order stay within the bounds of expressions."""
 
 Row = tuple[int, ...]
 _COMPARISONS = {"le": "le", "ge": "ge", "lt": "le", "gt": "ge", "eq": "eq", "ne": "ne"}
@@ -46,13 +45,13 @@ _MAY_BE_UNDEFINED = {"div", "mod", "pow"}
 
 @dataclass
 class Split:
-    """Tables that say together what a predicate says: the scope and the allowed rows of each.
+    """Tables that are together equivalent to a predicate: the scope and the allowed rows of each.
 
     Attributes:
         tables: The tables.
-        domains: The values of all variables that may stand in scopes, in ascending order: `given` and further ones.
+        domains: The values of all variables in scopes, in ascending order: given and further ones.
         prefix: The beginning of the names of further variables.
-        budget: So many combinations of values may be tried yet.
+        budget: The number of combinations of values that may still be evaluated.
     """
 
     domains: dict[str, Sequence[int]]
@@ -65,7 +64,7 @@ class Split:
     # Truth
 
     def require(self, expression: Expression) -> None:
-        """Add tables that say that a Boolean expression is true."""
+        """Add tables that are equivalent to a Boolean expression."""
         if isinstance(expression, Apply) and expression.operator == "and":
             for part in expression.arguments:
                 self.require(part)
@@ -84,7 +83,7 @@ class Split:
     # Sums
 
     def _compare(self, operator: str, left: Expression, right: Expression) -> None:
-        """Add tables that say that a comparison is true: of a sum of terms with zero."""
+        """Add tables that are equivalent to a comparison, as a sum of terms compared with zero."""
         terms: dict[Expression, int] = {}
         target = -collect_terms(left, 1, terms) - collect_terms(right, -1, terms) + _STRICT.get(operator, 0)
         kept = [(term, factor) for term, factor in terms.items() if factor or _may_be_undefined(term)]
@@ -98,12 +97,12 @@ class Split:
         except NotSplitError:
             del self.tables[before[0] :]
             _, self.domains, self.budget = before
-            # With the largest terms first, few partial sums can still be made good by the rest.
+            # With the largest terms first, few partial sums can be completed.
             ends = {term: self._ends(term) for term in reduced}
             self._add_up(sorted(reduced, key=lambda term: ends[term].low - ends[term].high), window)
 
     def _add_up(self, reduced: Sequence[Expression], window: _Window) -> None:
-        """Add tables that say that the sum of terms over few variables is in a window."""
+        """Add tables that restrict the sum of terms over few variables to a window."""
         ends = [self._ends(term) for term in reduced]
         state: Name | None = None
         place = 0
@@ -125,7 +124,7 @@ class Split:
             place = after
 
     def _complete(self, state: Name, group: Expression, target: int) -> None:
-        """Add the table that says that `state` and `group` add up to `target`: of each sum, the rows that fit."""
+        """Add the table of `state` + `group` = `target`: for each partial sum, the matching rows."""
         scope = names(group)
         fitting: dict[int, list[Row]] = {}
         for row, value in self._worth(group, scope):
@@ -135,7 +134,7 @@ class Split:
         self.tables.append(((state.name, *scope), tuple(rows)))
 
     def _group(self, terms: Sequence[Expression], place: int, state: Name | None) -> tuple[Expression, int]:
-        """Return the sum of the terms from `place` on that fit into one table with `state`, and where it ends."""
+        """Return the sum of the terms from `place` that fit into one table with `state`, and the index after them."""
         before = [state] if state else []
         after = place + 1
         while after < len(terms) and self._size(*before, *terms[place : after + 1]) <= SMALL:
@@ -145,12 +144,12 @@ class Split:
     # Values
 
     def _reduced(self, expression: Expression) -> Expression:
-        """Return an expression of the same value over few variables, further ones among them."""
+        """Return an equal expression over few variables, including further ones."""
         if not isinstance(expression, Apply) or self._size(expression) <= SMALL:
             return expression
         operator = expression.operator
         if operator == "if" and _may_be_undefined(expression):
-            raise NotSplitError  # an argument that is not chosen may be undefined
+            raise NotSplitError  # the other argument may be undefined
         parts = [self._reduced(part) for part in expression.arguments]
         if OPERATORS[operator].variadic and not OPERATORS[operator].whole:
             first, *others = parts
@@ -163,7 +162,7 @@ class Split:
         return self._joined(operator, parts)
 
     def _joined(self, operator: str, parts: Sequence[Expression]) -> Expression:
-        """Return `operator` applied to `parts`, of which the widest become variables as long as it is needed."""
+        """Return `operator` applied to `parts`; the widest parts become variables as long as necessary."""
         chosen = list(parts)
         widest_first = sorted(range(len(parts)), key=lambda place: -self._size(parts[place]))
         for place in widest_first:
@@ -173,7 +172,7 @@ class Split:
         return Apply(operator, tuple(chosen))
 
     def _named(self, expression: Expression) -> Expression:
-        """Return a variable that has the value of `expression`."""
+        """Return a variable with the value of `expression`."""
         if not isinstance(expression, Apply):
             return expression
         if expression not in self._made:
@@ -182,7 +181,7 @@ class Split:
         return self._made[expression]
 
     def _variable(self, scope: tuple[str, ...], rows: Iterable[tuple[Row, int]]) -> Name:
-        """Return a further variable, whose value follows from those of `scope`."""
+        """Return a further variable, whose value is determined by `scope`."""
         name = f"{self.prefix}{self._further}"
         self._further += 1
         table = tuple([(*row, value) for row, value in rows])
@@ -222,13 +221,13 @@ class NotSplitError(Exception):
 def split(
     constraint: Constraint, domains: Mapping[str, Sequence[int]], prefix: str, budget: int = MAX_TRIED
 ) -> Split | None:
-    """Return a hard predicate as small tables; None where that is not possible.
+    """Return a hard predicate as small tables. None: not possible.
 
     Args:
         constraint: The predicate.
         domains: The values of its variables, in ascending order.
-        prefix: How the names of further variables begin; no other name does.
-        budget: So many combinations of values may be tried.
+        prefix: The beginning of the names of further variables, and of no other names.
+        budget: The maximum number of evaluated combinations of values.
     """
     definition = constraint.definition
     if not isinstance(definition, Predicate):
@@ -253,16 +252,16 @@ def split(
 
 @dataclass(frozen=True)
 class _Window:
-    """What a partial sum has to be told apart for: whether the sum is at most, at least, equal or not equal `target`.
+    """The distinctions between partial sums that matter for a comparison of the sum with `target`.
 
-    Sums that are true, or false, whatever the rest adds are one.
+    Sums for which the comparison is true, or false, whatever the rest is, share one state.
     """
 
     operator: str
     target: int
 
     def state(self, value: int, low: int, high: int) -> int | None:
-        """Return what `value` is as a state, where the rest adds from `low` to `high`. None: it cannot be true."""
+        """Return the state of a partial sum if the rest is from `low` to `high`. None: the comparison must be false."""
         least, most = value + low, value + high
         match self.operator:
             case "le":
@@ -278,7 +277,7 @@ class _Window:
 
 
 def collect_terms(expression: Expression, factor: int, terms: dict[Expression, int]) -> int:
-    """Add the terms of `factor` times `expression` to `terms`; return what is constant in it."""
+    """Add the terms of `factor` times `expression` to `terms`, and return its constant part."""
     match expression:
         case Constant(value):
             return factor * value
@@ -305,7 +304,7 @@ def _times(term: Expression, factor: int) -> Expression:
 
 
 def with_arguments(expression: Expression, actual: Mapping[str, Expression]) -> Expression:
-    """Return `expression` with what its names stand for."""
+    """Return `expression` with its names replaced by `actual` expressions."""
     match expression:
         case Name(name):
             return actual[name]
@@ -322,7 +321,7 @@ def _may_be_undefined(expression: Expression) -> bool:
 
 
 def largest_value(expression: Expression, limits: Mapping[str, Interval]) -> float:
-    """Return a bound on all that is computed on the way: how far it can be from zero."""
+    """Return a bound on the absolute values of all intermediate results."""
     if not isinstance(expression, Apply):
         return 0
     parts = [largest_value(part, limits) for part in expression.arguments]

@@ -1,9 +1,9 @@
 """Symmetries of a network: guessed from the variables' names, verified on its tables, and broken.
 
-A symmetry exchanges variables, and may turn the order of the values around, in such a way that every table becomes
-a table of the network again. Solutions then come in orbits, and of each orbit it is enough to find the first one in
-lexicographic order (lex-leader; Crawford, Ginsberg, Luks and Roy, KR 1996). A guess that is no symmetry is dropped;
-nothing depends on names but the guessing: `V3.1` stands for row 3, column 1 of a board that may be mirrored or turned.
+A symmetry permutes variables, and may reverse the order of the values, such that every table becomes a table of the
+network. It is enough to find the lexicographically first solution of each orbit (lex-leader; Crawford, Ginsberg, Luks
+and Roy, KR 1996). Wrong guesses are dropped. Only the guesses depend on names: `V3.1` is row 3, column 1 of a board
+that may be mirrored or rotated.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"[0-9]+")
 
 
 class Symmetry(NamedTuple):
-    """The value of variable i becomes that of variable `image[i]`, turned around if `reflects`."""
+    """Maps the value of variable i to variable `image[i]`, in reverse order of values if `reflects`."""
 
     image: Codes
     reflects: bool
@@ -31,7 +31,7 @@ class Symmetry(NamedTuple):
         return Symmetry(tuple([other.image[place] for place in self.image]), self.reflects != other.reflects)
 
     def applied(self, solution: Codes, highest: int) -> Codes:
-        """Return what `solution` becomes; `highest` is the largest code of the network."""
+        """Return the image of `solution`; `highest` is the largest code of the network."""
         moved = [0] * len(solution)
         for place, code in zip(self.image, solution, strict=True):
             moved[place] = highest - code if self.reflects else code
@@ -39,7 +39,7 @@ class Symmetry(NamedTuple):
 
 
 def symmetries(part: Component) -> tuple[Symmetry, ...]:
-    """Return a group of symmetries of the network of `part`, without the identity; empty when none was found."""
+    """Return a group of symmetries of the network of `part`, without the identity; empty if none were found."""
     network = part.network
     if network.formulas:
         return ()
@@ -57,10 +57,10 @@ def symmetries(part: Component) -> tuple[Symmetry, ...]:
 
 
 def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
-    """Return `network` without most of those solutions that are not the first of their orbit.
+    """Return `network` without most of the solutions that are not the first of their orbit.
 
-    x is the first if x <= g(x) for every g. Of that the first place where g may change something is demanded: all
-    before it are equal, whatever x is.
+    x is the first if x <= g(x) for every g. For each g, this is required only at the first position that g may change:
+    all before it are equal for every x.
     """
     highest = _highest(network)
     demanded: dict[Hashable, Table] = {}
@@ -92,7 +92,7 @@ def _highest(network: Network) -> int:
 
 
 def _guesses(names: Sequence[str]) -> Iterator[Symmetry]:
-    """Yield symmetries that a problem whose variables are called `names` might have."""
+    """Yield possible symmetries of a problem whose variables are called `names`."""
     yield Symmetry(tuple(range(len(names))), reflects=True)
     coordinates = [tuple(map(int, _NUMBER.findall(name)[:3])) for name in names]
     place = {coordinate: index for index, coordinate in enumerate(coordinates)}
@@ -104,7 +104,7 @@ def _guesses(names: Sequence[str]) -> Iterator[Symmetry]:
 
 
 def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, ...]]]:
-    """Yield every axis turned around, and every two exchanged."""
+    """Yield the coordinates with each axis reversed, and with each two axes exchanged."""
     axes = range(len(coordinates[0]))
     for axis in axes:
         seen = {coordinate[axis] for coordinate in coordinates}
@@ -116,7 +116,7 @@ def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, .
 
 
 def _verifier(network: Network) -> Callable[[Symmetry], bool]:
-    """Yield a test whether a guess turns `network` into itself."""
+    """Return a test whether a guess maps `network` to itself."""
     highest = _highest(network)
     content: dict[Hashable, frozenset[Codes]] = {}
 

@@ -1,4 +1,4 @@
-"""A whole team's problem as one network over values: what is written for other solvers to read."""
+"""A whole team's problem as one network over values, for export to other solvers."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from robochoc.solver.propagation import propagate
 from robochoc.solver.weighted import MAX_CODE, constant_costs, costs_by_scope
 
 MIN_VALUE, MAX_VALUE = -(2**31) + 10, 2**31 - 11
-"""Values that ACE 2.6 reads: of 32 bits, but for a few that it keeps for itself (tried with ACE, one by one)."""
+"""The values that ACE 2.6 reads: 32 bits, except a few that it reserves (found by tests with ACE)."""
 MAX_SPREAD = 2**31 - 1
-"""So far apart may the values of one domain be; ACE counts what is between them, too."""
+"""The maximum difference of two values of a domain, since ACE counts the values between them."""
 
 
 def team_network(team: Team) -> tuple[Network, Codes]:
     """Return all variables of `team`, in its order, with all its constraints; codes are values.
 
-    Unary constraints are folded into domains, cliques of `ne` are made explicit. Behind the team's variables come those
-    that wide predicates are split by (`solver/splitting.py`). What soft constraints charge are variables too, after the
-    others: those at the places that are returned, whose sum is what the problem costs.
+    Unary constraints are applied to domains, cliques of `ne` are explicit. After the team's variables come those of
+    split predicates (`solver/splitting.py`), then those of the costs of soft constraints. The positions of the last are
+    returned; their sum is the cost of the problem.
 
     Raises:
-        UnsupportedError: for a team that changes over time, and when a constraint is too large to be a table, or
-            charges too much, or a value is none that XCSP3's solvers take.
+        UnsupportedError: if the team changes over time, a constraint is too large for a table, costs are too high, or
+            XCSP3's solvers do not support a value.
     """
     if team.dynamic:
-        raise UnsupportedError(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")
+        raise UnsupportedError(f"{team.name} has a scenario.xml, but an XCSP3 file cannot contain changes")
     place = {name: index for index, name in enumerate(team.variables)}
     domains = {name: tuple(sorted(variable.domain)) for name, variable in team.variables.items()}
     tables: list[Table] = []
@@ -66,17 +66,17 @@ def _cost_domains(team: Team, charges: Sequence[Table]) -> list[Codes]:
         domains.append((constant,))
     if sum(map(max, domains)) > MAX_CODE:
         raise UnsupportedError(
-            f"{team.name} has costs that add up to more than {MAX_CODE:,}, too much for XCSP3's solvers"
+            f"the costs of {team.name} may add up to more than {MAX_CODE:,}, the maximum for XCSP3's solvers"
         )
     return domains
 
 
 def _readable(network: Network, *, impossible: bool) -> Network:
-    """Return `network` such that ACE takes it: with the same variables, domains and solutions.
+    """Return `network` in a form that ACE can read, with the same variables, domains and solutions.
 
-    ACE 2.6 dies where its first propagation empties a table, miscounts where forbidden tuples meet a domain of one
-    value (see `solver/propagation.py`), refuses an instance without constraints, and leaves out variables that stand
-    in none.
+    ACE 2.6 crashes if its first propagation empties a table, miscounts if forbidden tuples contain a variable with one
+    value (see `solver/propagation.py`), rejects an instance without constraints, and omits variables without
+    constraints.
     """
     if impossible or (safe := propagate(network)).impossible:
         nothing = tuple([(value,) for value in network.domains[0]])
@@ -90,20 +90,20 @@ def _readable(network: Network, *, impossible: bool) -> Network:
 
 
 def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
-    """Raise `UnsupportedError` when values of `domains` are none that ACE reads."""
+    """Raise `UnsupportedError` if ACE cannot read values of `domains`."""
     for name, values in domains.items():
         far = [f"{value:,}" for value in (values[0], values[-1]) if not MIN_VALUE <= value <= MAX_VALUE]
         if far or values[-1] - values[0] > MAX_SPREAD:
             shown = far[0] if far else f"{values[0]:,} and {values[-1]:,}"
             raise UnsupportedError(
                 f"{team.name} has a variable {name} with the value {shown}; XCSP3's solvers compute with 32 bits: ACE"
-                f" takes values from {MIN_VALUE:,} to {MAX_VALUE:,}, and in one domain no further apart than"
-                f" {MAX_SPREAD:,}; shift the problem's values, or scale them"
+                f" supports values from {MIN_VALUE:,} to {MAX_VALUE:,}, which differ by at most {MAX_SPREAD:,} in a"
+                " domain; shift or scale the values"
             )
 
 
 def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[Table]:
-    """Return tables of values and their costs, the latter in a column whose variable is not there yet."""
+    """Return tables of values with a last column of costs, whose variable is added later."""
     for scope, prices in costs_by_scope(part, part.network, soft).items():
         if prices:
             rows = tuple((*part.decoded(codes), int(price)) for codes, price in prices.items())
@@ -111,7 +111,7 @@ def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint])
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Return names as XCSP3 takes them (letters, digits, `_`, a letter first), each a different one."""
+    """Return different valid names of XCSP3 (a letter, then letters, digits, `_`) for `names`."""
     taken: set[str] = set()
     found = []
     for name in names:

@@ -1,8 +1,8 @@
-"""Problems with costs, as the solver gets them: costs are a column of tables, never an expression.
+"""Problems with costs for solvers: costs are a column of tables, never an expression.
 
-For each scope with costs there is one more variable, whose codes are the costs, and a table that relates them to the
-codes of the scope. The solver only minimises the sum of these variables, none of which is negative; the minimum is
-checked again with the original problem.
+For each scope with costs there is a further variable, whose codes are the costs, and a table that relates them to the
+codes of the scope. The solver only minimises the sum of these non-negative variables; the minimum is checked with the
+original problem.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ DIGIT = 2**27
 """The unit of the higher code of a cost."""
 
 CostRows = dict[Codes, float]
-"""The costs of combinations of codes. Combinations that are not in it are forbidden."""
+"""The costs of combinations of codes. Other combinations are forbidden."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,11 @@ class WeightedComponent:
     unit: int
 
     def cost(self, codes: Sequence[int]) -> int:
-        """Return what a solution of `network` costs."""
+        """Return the cost of a solution of `network`."""
         return self.base + self.unit * sum(unit * codes[place] for place, unit in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
-        """Return the values of the variables behind a solution of `network`; withdrawn ones have none."""
+        """Return the values of the variables in a solution of `network`, without those of withdrawn robots."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
@@ -83,7 +83,7 @@ def priced_components(team: Team, withdrawal_cost: int | None = None) -> list[We
         withdrawal_cost: The cost of withdrawing a robot of weight 1. None: no robot may withdraw.
 
     Raises:
-        UnsupportedError: when a constraint has too many tuples, or costs are too high.
+        UnsupportedError: if a constraint has too many tuples, or costs are too high.
     """
     try:
         if withdrawal_cost is not None:
@@ -93,18 +93,18 @@ def priced_components(team: Team, withdrawal_cost: int | None = None) -> list[We
         units = replace(team.told_in, constant=0)
         total, limit = (cost_shown(units.told(cost)) for cost in (error.total, error.limit))
         raise UnsupportedError(
-            f"costs may add up to {total}, and central solvers minimise sums up to {limit}: round costs to fewer"
-            " decimals, or write those that stand for 'never' as infinity"
+            f"costs may add up to {total}, but central solvers minimise sums up to {limit}: round costs to fewer"
+            " decimals, or replace costs that mean 'never' by infinity"
         ) from None
 
 
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
-    """Return the problem of `variables` and `constraints`, split into what does not depend on each other.
+    """Return the independent components of the problem of `variables` and `constraints`.
 
-    What constraints on constants charge is left out.
+    The costs of constraints on constants are left out.
 
     Raises:
-        UnsupportedError: when a constraint has too many tuples, or charges are too high.
+        UnsupportedError: if a constraint has too many tuples, or costs are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     scopes = [constraint.variables for constraint in soft]
@@ -117,7 +117,7 @@ def weighted_components(variables: Iterable[Variable], constraints: Sequence[Con
 
 
 def constant_costs(team: Team) -> int:
-    """Return what soft constraints on constants only charge."""
+    """Return the cost of soft constraints on constants."""
     fixed = (cost_function(constraint, ())(()) for constraint in team.constraints() if not constraint.variables)
     return int(sum(price for price in fixed if price < INFINITE))
 
@@ -130,7 +130,7 @@ def _priced(part: Component, soft: Iterable[Constraint]) -> WeightedComponent:
 
 
 def costs_by_scope(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, CostRows]:
-    """Return what `soft` constraints on variables of `part` charge, by scope, for the codes that `network` leaves."""
+    """Return the costs of `soft` constraints on variables of `part`, by scope, for the codes in `network`."""
     together = _by_scope(part, soft)
     _join_unary(together)
     return {scope: _prices(part, network, scope, held) for scope, held in together.items()}
@@ -145,12 +145,12 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 
 
 def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
-    """Return `network`, which is that of `part`, with a variable for every scope that is charged.
+    """Return `network`, that of `part`, with a cost variable for every scope with costs.
 
-    Combinations of codes that a scope has no price for are forbidden.
+    Combinations of codes without a price are forbidden.
 
     Raises:
-        _CostSumError: when they are too high.
+        _CostSumError: if the costs are too high.
     """
     least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
@@ -173,18 +173,16 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
 
 
 def _cost_rows(prices: Mapping[Codes, int]) -> tuple[tuple[Codes, ...], Codes]:
-    """Return the rows of a cost table, each with one or two codes of its cost at the end, and their units."""
+    """Return the rows of a cost table, which end with one or two codes of the cost, and the units of these codes."""
     if max(prices.values()) <= MAX_CODE:
         return tuple(sorted((*row, price) for row, price in prices.items())), (1,)
     return tuple(sorted((*row, *divmod(price, DIGIT)) for row, price in prices.items())), (DIGIT, 1)
 
 
 def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[WeightedComponent]:
-    """Return the components of `team`, where robots may withdraw, with all their constraints.
+    """Return the components of `team`, with all their constraints, if robots may withdraw.
 
-    `withdrawal_cost` is the cost of withdrawing a robot of weight 1.
-
-    Its variables then have a code that stands for no value.
+    `withdrawal_cost` is the cost of withdrawing a robot of weight 1. Variables have an additional code without value.
     """
     constraints = list(team.constraints())
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
@@ -222,14 +220,14 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
 
 
 def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table:
-    """Return `table` without effect on tuples in which a variable has the code `absent`."""
+    """Return `table`, extended to allow all tuples in which a variable has the code `absent`."""
     if not table.allowed:
         return table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
 
 
 def _forbidden_by_absence(part: Component, network: Network, constraint: Constraint) -> Table:
-    """Return the rows that a hard constraint forbids when robots are absent (`model/absence.py`)."""
+    """Return the rows that a hard constraint forbids if robots are absent (`model/absence.py`)."""
     scope = tuple(sorted(part.names.index(name) for name in constraint.variables))
     prices = _prices_in_absence(part, network, scope, [constraint])
     allowed = set(prices)
@@ -263,7 +261,7 @@ def _absences(domains: Sequence[Codes], absent: int) -> Iterable[Codes]:
 
 
 def _all_or_none(network: Network, first: int, others: Iterable[int], absent: int) -> Iterable[Table]:
-    """Yield the variables of one robot are absent together."""
+    """Yield tables that require the variables of one robot to be absent together."""
     for other in others:
         rows = itertools.product(network.domains[first], network.domains[other])
         alike = tuple(row for row in rows if (row[0] == absent) == (row[1] == absent))
@@ -271,20 +269,20 @@ def _all_or_none(network: Network, first: int, others: Iterable[int], absent: in
 
 
 def _join_unary(together: dict[Codes, list[Constraint]]) -> None:
-    """Let what one variable is charged for be charged with others, where it has a charge with others."""
+    """Add unary costs to the costs of a wider scope with the same variable, if there is one."""
     wider = {place: scope for scope in together if len(scope) > 1 for place in scope}
     for scope in [scope for scope in together if len(scope) == 1 and scope[0] in wider]:
         together[wider[scope[0]]] += together.pop(scope)
 
 
 def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[Constraint]) -> CostRows:
-    """Return what constraints on variables at places of `scope` charge for each combination of their codes."""
+    """Return the sum of the costs of constraints on `scope` for each combination of codes."""
     size = math.prod(len(network.domains[place]) for place in scope)
     if size > MAX_COST_ROWS:
         names = ", ".join(constraint.name for constraint in charging)
         raise UnsupportedError(
-            f"constraint {names} has a price for {size:,} combinations of values, more than {MAX_COST_ROWS:,} that the"
-            " central solver can list; split it"
+            f"constraint {names} has costs for {size:,} combinations of values, more than the {MAX_COST_ROWS:,} that"
+            " the central solver can list; split it"
         )
     prices = [cost_function(constraint, [part.names[place] for place in scope]) for constraint in charging]
     found = {}

@@ -42,8 +42,8 @@ from robochoc.solver.agent_problem import (
     TeamKnowledge,
     agent_problems,
 )
+from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
-from robochoc.solver.domain import CompiledDomain
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team

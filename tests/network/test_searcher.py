@@ -39,7 +39,7 @@ from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.awc import AWC
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.explanation import held_above
+from robochoc.solver.explanation import constraints_above
 from tests.support.problems import team_of
 from tests.support.sparse_teams import profiles_of
 
@@ -132,7 +132,7 @@ def test_where_all_know_a_constraint_its_holder_tells_and_waits_to_be_told() -> 
     assert [record.scope for record in msgspec.msgpack.decode(word.content, type=list[SharedRecord])] == [("A", "B")]
     one.start(0)
     assert len(around.sent) == 1  # not ready: there is nothing to begin
-    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, constraints_above(chain()["RC"])))))
     one.learn("RC", b"\x90")
     assert around.said == [Ready(1)]
 
@@ -308,7 +308,7 @@ def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.Monkey
     around = Around()
     one = searcher(around.context(), AWC)
     one.prepare()
-    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(chain()["RC"])))))
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, constraints_above(chain()["RC"])))))
     one.start(0)
     copy = Charge("RC", ("B", "C"), 1, 0)
     assert one.check_constraints({"A": 2, "C": 2}).copies == (copy,)
@@ -322,7 +322,7 @@ def test_a_master_that_recalls_does_not_get_all_cycles() -> None:
     team = chain(cost=1)
     one = searcher(around.context(), DSA, team=team)
     one.prepare()
-    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(team["RC"])))))
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, constraints_above(team["RC"])))))
     one.start(0)
     one.report_snapshot(1)
     one.recall(Recall(1, 2))

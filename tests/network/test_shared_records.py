@@ -23,7 +23,7 @@ from robochoc.communication.network.constraint_records import (
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Semantics, Team
-from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
+from robochoc.solver.explanation import KeyedConstraint, constraints_above, parts_below
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
@@ -56,7 +56,7 @@ def sent(known: KeyedConstraint) -> KeyedConstraint:
 @examples(80)
 def test_constraints_come_as_they_were_sent(make: Callable[[Random], Team], seed: int) -> None:
     for robot in make(Random(seed)).robots:
-        for known in chain(held_above(robot), (part for _, part in held_below(robot))):
+        for known in chain(constraints_above(robot), (part for _, part in parts_below(robot))):
             assert sent(known) == known
             assert repr(sent(known)) == repr(known)  # an integer stays one
 
@@ -64,7 +64,7 @@ def test_constraints_come_as_they_were_sent(make: Callable[[Random], Team], seed
 @looped("model", ["planar", "full"])
 def test_queens_come_as_they_were_sent(model: str) -> None:
     for robot in queens3d(3, model).robots:
-        for known in held_above(robot):
+        for known in constraints_above(robot):
             assert sent(known) == known
 
 

@@ -20,9 +20,9 @@ from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.options import Preprocess
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import agent_problems
+from robochoc.solver.compile import TeamCompiler, TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.team_compiler import OutOfTimeError, TeamCompiler
 from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.cases import looped
 from tests.support.examples import count
@@ -213,7 +213,7 @@ def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytes
 
     def in_time(compiler: TeamCompiler, team: Team, *, every: bool = False) -> CompiledTeam:
         if len(teams) == 2:  # for the run, and for the robots that make their domains consistent
-            raise OutOfTimeError("the time was over while RA was compiled")
+            raise TeamCompileTimeoutError("the time limit was exceeded while RA was compiled")
         teams.append(team)
         return compiled(compiler, team, every=every)
 
@@ -222,7 +222,7 @@ def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytes
     journal = record(chain(1, 2, 3, 4), replace(AC, protocol="abt"))
     outcome = journal.outcome
     assert outcome is not None
-    assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, "the time was over while RA was compiled")
+    assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, "the time limit was exceeded while RA was compiled")
     assert outcome.preprocessing is not None
     assert outcome.preprocessing.removed == 6
     assert not replay(journal).contradictions

@@ -252,7 +252,7 @@ def test_pairs_that_cost_different_amounts_are_refused() -> None:
 def test_congestion_is_for_grape_alone() -> None:
     team = team_of_three((9, 5), (8, 4), (7, 3), cost=3)
     for other in ("ssi", "cbaa", "cbba"):
-        with pytest.raises(UnsupportedError, match="costs 3 for A = 1 and B = 1: it is more than an exclusion"):
+        with pytest.raises(UnsupportedError, match="costs 3 for A = 1 and B = 1: it is not only an exclusion"):
             solve(team, Options(protocol=other, runtime=Runtime.SIMULATOR))
 
 

@@ -60,7 +60,7 @@ class AceStable:
 
     @contextmanager
     def _cp_sat_lent(self) -> Iterator[None]:
-        start, asked, close = vars(CpSatSolver)["_start"], vars(CpSatSolver)["_asked"], CpSatSolver.close
+        start, asked, close = vars(CpSatSolver)["_start"], vars(CpSatSolver)["_solve_task"], CpSatSolver.close
 
         def take_over(solver: CpSatSolver) -> object:
             if not self._idle_cp_sat:
@@ -82,7 +82,7 @@ class AceStable:
                 parts.update(dict.fromkeys(_CP_SAT))
             close(solver)
 
-        with patch.multiple(CpSatSolver, _start=take_over, _asked=ask, close=leave):
+        with patch.multiple(CpSatSolver, _start=take_over, _solve_task=ask, close=leave):
             yield
 
     def warm(self) -> None:

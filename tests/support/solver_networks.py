@@ -9,9 +9,9 @@ import pytest
 
 from robochoc.model.problem import Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_messages import FromSolver
+from robochoc.solver.ace_messages import FromAce
+from robochoc.solver.compiled_domain import compile_domain
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.domain import compile_domain
 from robochoc.solver.encoding import Codes, Network, Table
 
 SMALL_NETWORK = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 0),)),))
@@ -56,15 +56,15 @@ def random_network(chance: Random) -> Network:
 SMALL_SOLUTIONS: tuple[Codes, ...] = ((0, 1), (1, 0), (1, 1))
 
 
-def misheard(patch: pytest.MonkeyPatch, word: FromSolver) -> None:
+def misheard(patch: pytest.MonkeyPatch, word: FromAce) -> None:
     """Whatever ACE answers, `word` is what is heard."""
-    hear = vars(AceProcess)["_hear"]
+    hear = vars(AceProcess)["_receive_message"]
 
-    def hear_another(solver: AceProcess, deadline: float | None) -> FromSolver:
+    def hear_another(solver: AceProcess, deadline: float | None) -> FromAce:
         hear(solver, deadline)
         return word
 
-    patch.setattr(AceProcess, "_hear", hear_another)
+    patch.setattr(AceProcess, "_receive_message", hear_another)
 
 
 def compiled_by_brute_force(team: Team) -> CompiledTeam:

@@ -11,7 +11,7 @@ from robochoc.app.sketch.palette import Applied, Links, PaletteRule
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import SketchRule
 from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
-from robochoc.solver.domain import MAX_SOLUTIONS
+from robochoc.solver.compiled_domain import MAX_SOLUTIONS
 
 MAX_PAIRS = 10_000
 """Pairs of values that are tried for two robots; what has more is left to solving."""

@@ -16,7 +16,7 @@ from robochoc.cli.reports.failures import LIMIT, Failure, errors_as_failures, wo
 if TYPE_CHECKING:
     from robochoc.solver.cache import SolutionCache
     from robochoc.solver.compile import CompileTimeoutError, Limits
-    from robochoc.solver.domain import TooManySolutionsError
+    from robochoc.solver.compiled_domain import TooManySolutionsError
 
 
 @click.command("compile")
@@ -73,7 +73,7 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     from robochoc.formats import read_team
     from robochoc.model.costs import normalized
     from robochoc.solver.compile import Compilation, Compiler, CompileTimeoutError
-    from robochoc.solver.domain import TooManySolutionsError
+    from robochoc.solver.compiled_domain import TooManySolutionsError
 
     began = time.monotonic()
     team = normalized(read_team(folder))

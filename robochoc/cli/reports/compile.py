@@ -13,7 +13,7 @@ from robochoc.cli.reports.table import print_table
 from robochoc.formats import encodable, on_one_line
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.compile import Compilation, CompileTimeoutError
-from robochoc.solver.domain import TooManySolutionsError
+from robochoc.solver.compiled_domain import TooManySolutionsError
 
 CompileResult = Compilation | TooManySolutionsError | CompileTimeoutError
 """A robot's compilation, or the limit that was reached."""

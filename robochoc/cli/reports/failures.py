@@ -74,9 +74,9 @@ def _status(error: Exception) -> int | None:
     from robochoc.formats import InvalidInputError
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError
-    from robochoc.solver.domain import TooManySolutionsError
+    from robochoc.solver.compiled_domain import TooManySolutionsError
     from robochoc.solver.encoding import UnsupportedError
-    from robochoc.solver.failures import SolverLostError, SolverMissingError
+    from robochoc.solver.errors import SolverLostError, SolverMissingError
     from robochoc.verification.checker import RefutedError
 
     statuses: dict[int, tuple[type[Exception], ...]] = {

@@ -42,10 +42,10 @@ from robochoc.protocols.findings import NOTHING, Findings, Trail
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, TeamKnowledge
+from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.explanation import KeyedConstraint, held_above
+from robochoc.solver.explanation import KeyedConstraint, constraints_above
 
 _Values = dict[str, int]
 
@@ -133,7 +133,7 @@ class Searcher(RobotLoop):
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
         if self._protocol.traits.shared_scopes:
-            known = [one for one in held_above(self._robot) if one.constraint.model != ConstraintModel.PKC]
+            known = [one for one in constraints_above(self._robot) if one.constraint.model != ConstraintModel.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
                 copies = Copies(self.epoch, msgspec.msgpack.encode(list(map(record_of, theirs))))

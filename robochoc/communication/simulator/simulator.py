@@ -24,8 +24,8 @@ from robochoc.model.problem import Team
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
+from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.team_compiler import OutOfTimeError
 from robochoc.system.compiling import answer_signals, mypyc_attr
 from robochoc.system.garbage import collection_paused, collection_seldom, garbage_frozen
 from robochoc.system.stopping import stop_requested
@@ -72,7 +72,7 @@ class Simulation(Session):
         losses: Draws which messages are lost; None if no message is.
 
     Raises:
-        OutOfTimeError: if the deadline comes before all robots are set up; `change` raises it as well.
+        TeamCompileTimeoutError: if the deadline comes before all robots are set up; `change` raises it as well.
     """
 
     def __init__(  # noqa: PLR0913 - keyword options
@@ -111,7 +111,7 @@ class Simulation(Session):
                 computed_by(deadline, self._set_up, parts)
             except TimeLimitError:
                 late = next((name for name in parts if name not in self._hosts), "the last robot")
-                raise OutOfTimeError(f"the time was over before {late} knew its problem") from None
+                raise TeamCompileTimeoutError(f"the time was over before {late} knew its problem") from None
         if losses is not None:
             losses.follow(self.compiled.team, self._values_of)
 
@@ -165,9 +165,9 @@ class Simulation(Session):
         """Do nothing: a simulation has no resources to release."""
 
     def _check_time(self, name: str) -> None:
-        """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
+        """Raise `TeamCompileTimeoutError` if the time was over before the robot `name` could be set up."""
         if is_past(self._deadline):
-            raise OutOfTimeError(f"the time was over before {name} knew its problem")
+            raise TeamCompileTimeoutError(f"the time was over before {name} knew its problem")
 
     def _set_up(self, parts: Mapping[str, AgentProblem]) -> None:
         """Set up all robots."""

@@ -26,7 +26,7 @@ from robochoc.model.problem import Constraint, Domain, Predicate, Team, Variable
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver import encoding
-from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.verification.checker import violations
 from tests.support.growth import kept_bytes, operations
 from tests.support.limits import HANG_S
@@ -116,13 +116,13 @@ def test_a_constraint_of_many_robots_is_compiled_once(monkeypatch: pytest.Monkey
 
 
 def test_time_ends_the_setting_up_too() -> None:
-    with pytest.raises(OutOfTimeError, match="the time was over before R0 knew its problem"):
+    with pytest.raises(TeamCompileTimeoutError, match="the time was over before R0 knew its problem"):
         Simulation(wide(3), protocol_named("dsa"), Concurrent(0), deadline=0)
     # The limit may be a timeout or a deadline: no option is named that was not given.
     for limited in (Options(timeout=1e-9), Options(deadline=1e-9)):
         outcome = solve(wide(3), replace(limited, runtime=Runtime.SIMULATOR, protocol="dsa"))
         assert outcome.verdict is Verdict.UNKNOWN
-        assert outcome.reason == "the time was over while R0 was compiled"
+        assert outcome.reason == "the time limit was exceeded while R0 was compiled"
 
 
 GIB = 1 << 30

@@ -30,7 +30,7 @@ from robochoc.solver import central, propagation
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import Strategy
 from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Network, Table
-from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
+from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
 from tests.support.complex_problems import complex_team
 from tests.support.faults import open_descriptors
 from tests.support.limits import HANG_S, wait_until
@@ -55,7 +55,7 @@ WATCHED = """
 from tests.support.solver_networks import queens_network
 from robochoc.solver.ace import AceProcess
 ace = AceProcess(always=True)
-ace.begin(queens_network(15))
+ace.submit(queens_network(15))
 print(ace.pid, flush=True)
 ace.answer()
 """
@@ -226,7 +226,7 @@ def test_what_is_plainly_impossible_needs_no_process(*, count_only: bool) -> Non
 def test_what_is_plain_needs_no_process() -> None:
     network = Network(((0, 1), (3,), (0, 2)), (Table((0, 1), allowed=True, rows=((1, 3),)),))
     with AceProcess(always=True) as solver:
-        assert not solver.begin(network)
+        assert not solver.submit(network)
         assert solver.answer().solutions == ((1, 3, 0), (1, 3, 2))
         assert solver.pid is None
 
@@ -254,7 +254,7 @@ def test_processes_go_and_the_next_task_has_another(temporary: Path, monkeypatch
         assert pids[0] == pids[1] != pids[2]
         assert not alive(pids[0])
 
-        solver.begin(queens_network(15))
+        solver.submit(queens_network(15))
         wait_for_the_search(temporary)
         with pytest.raises(SolverTimeoutError):
             solver.answer(time.monotonic())
@@ -263,7 +263,7 @@ def test_processes_go_and_the_next_task_has_another(temporary: Path, monkeypatch
         assert not list(temporary.iterdir())
 
         assert solver.solve(SMALL_NETWORK).found == 3
-        solver.begin(queens_network(15))
+        solver.submit(queens_network(15))
         wait_for_the_search(temporary)
         pid = pid_of(solver)
         os.kill(pid, signal.SIGKILL)

@@ -18,11 +18,11 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Predicate, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_messages import Solved
+from robochoc.solver.ace_messages import AceSolutions
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.cliques import cliques, with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, Table
-from robochoc.solver.failures import SolverLostError
+from robochoc.solver.errors import SolverLostError
 from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetries
 from robochoc.solver.team_network import identifiers
 from robochoc.verification.checker import RefutedError
@@ -249,7 +249,7 @@ def test_choco_reads_what_is_exported(name: str, answer: str, tmp_path: Path) ->
 @pytest.mark.usefixtures("warm_ace")
 def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """ACE says so in one line of many; a broken-off search without solutions is no `no-solution`."""
-    misheard(monkeypatch, Solved(found=0, complete=False, solutions=b""))
+    misheard(monkeypatch, AceSolutions(found=0, complete=False, solutions=b""))
     for options in ({"count": True}, {"count": False}):
         with pytest.raises(SolverLostError, match="stopped before"):
             CentralSolver(always_ace=True).solve(queens3d(7), **options)

@@ -22,10 +22,10 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.ace_messages import Solved
+from robochoc.solver.ace_messages import AceSolutions
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.failures import SolverLostError
+from robochoc.solver.errors import SolverLostError
 from robochoc.verification.checker import RefutedError, robots_without_values, violations
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import contradiction
@@ -165,7 +165,7 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
 
 @pytest.mark.usefixtures("warm_ace")
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
-    misheard(monkeypatch, Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
+    misheard(monkeypatch, AceSolutions(found=1, complete=False, solutions=b"\0" * 4 * 6))
     with pytest.raises(SolverLostError, match="stopped before"):
         CentralSolver(always_ace=True).solve(coloring(3, 2, 2))
 

@@ -24,7 +24,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import BEST
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import Network, Table
-from robochoc.solver.failures import SolverTimeoutError
+from robochoc.solver.errors import SolverTimeoutError
 from robochoc.solver.weighted import weighted_components
 from robochoc.verification.checker import assignment_cost, robots_without_values, violations
 from tests.support.compiled import plain_python_only
@@ -121,7 +121,7 @@ def test_compilation_without_an_end_ends_with_the_time(monkeypatch: pytest.Monke
     monkeypatch.setattr("robochoc.solver.compile.compile_domain", endless)
     outcome = solve(small(), Options(protocol="dpop", timeout=SOON_S))
     assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.reason == "the time was over while Robot1 was compiled"
+    assert outcome.reason == "the time limit was exceeded while Robot1 was compiled"
 
 
 @plain_python_only
@@ -153,7 +153,7 @@ def test_a_process_that_does_not_read_its_task_is_given_up(tmp_path: Path, monke
 def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
     """And it is no solution of the task before."""
     (part,) = weighted_components(hard().variables.values(), list(hard().constraints()))
-    warm.begin(part.network, costs=part.costs)
+    warm.submit(part.network, costs=part.costs)
     wait_for_a_best(warm)
     with pytest.raises(SolverTimeoutError) as over:
         warm.answer(time.monotonic())
@@ -165,11 +165,11 @@ def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -
 def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
     rows = tuple((a, b, (a + b) % 3) for a in range(3) for b in range(3))
     network = Network(((0, 1, 2), (0, 1, 2), (0, 1, 2)), (Table((0, 1, 2), allowed=True, rows=rows),))
-    assert warm.begin(network, costs=((2, 1),))
+    assert warm.submit(network, costs=((2, 1),))
     assert warm.answer().solutions[0] in rows
     (part,) = weighted_components(hard().variables.values(), list(hard().constraints()))
-    assert warm.begin(part.network, costs=part.costs)
-    best = warm.give_up().best
+    assert warm.submit(part.network, costs=part.costs)
+    best = warm.abort().best
     assert best is None or part.cost(best) < INFINITE
 
 

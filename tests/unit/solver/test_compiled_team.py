@@ -25,8 +25,8 @@ from robochoc.replay.steps import RecordedRun
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, agent_problems
+from robochoc.solver.compiled_domain import CompiledDomain, compile_domain
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
-from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import Objective
 from tests.support.cost_problems import with_costs

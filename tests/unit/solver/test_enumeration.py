@@ -16,11 +16,11 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Team
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import ace as front
-from robochoc.solver.ace import AceProcess
+from robochoc.solver.ace import AceProcess, SolvedBy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import CompiledFrom, Compiler, Limits
-from robochoc.solver.domain import TooManySolutionsError
+from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.encoding import Costs, Network, Table
 from robochoc.solver.enumeration import (
     STEPS_BEFORE_ACE,
@@ -31,7 +31,6 @@ from robochoc.solver.enumeration import (
     minimum_solution,
 )
 from robochoc.solver.propagation import propagate
-from robochoc.solver.query import SolvedBy
 from robochoc.solver.weighted import WeightedComponent, weighted_components
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
@@ -170,8 +169,8 @@ def test_ace_has_nothing_cheaper(batch: int, ace: AceProcess) -> None:
     with AceProcess() as here:
         for _ in range(100 if batch else 20):
             for part in parts_of(chance):
-                here.begin(part.network, costs=part.costs)
-                ace.begin(part.network, costs=part.costs)
+                here.submit(part.network, costs=part.costs)
+                ace.submit(part.network, costs=part.costs)
                 ours, theirs = here.answer(), ace.answer()
                 assert [part.cost(one) for one in ours.solutions] == [part.cost(one) for one in theirs.solutions]
                 asked += theirs.means is SolvedBy.ACE

@@ -84,17 +84,17 @@ def test_a_team_that_shares_exclusions_alone_has_no_fault() -> None:
         ({"A": (0, 1), "B": (0, 1), "C": (0, 1)}, [conflicts("A", "B", "C", rows=[(1, 1, 1)])],
          "RC shares 'r', which is not over one variable of two robots"),
         ({"A": (0, 1), "B": (0, 1)}, [soft("A", "B", rows={(1, 1): 4})],
-         "'s' costs 4 for A = 1 and B = 1: it is more than an exclusion"),
+         "'s' costs 4 for A = 1 and B = 1: it is not only an exclusion"),
         (
             {"A": (1, 2), "B": (0, 1, 2)},
             [not_the_same("A", "B")],
             (
-                "RA cannot leave all tasks to others: each value of A excludes another robot's, as where a task asks"
-                " for several robots"
+                "RA cannot leave all tasks to others: each value of A excludes another robot's, which may mean"
+                " that a task requires several robots"
             ),
         ),
         ({"A": (0, 1), "B": (0, 1), "C": (0, 1)}, [not_the_same("A", "B"), not_the_same("B", "C")],
-         "A = 1 and C = 1 do not exclude each other, though both exclude what others do"),
+         "A = 1 and C = 1 do not exclude each other, although both exclude the same choices of others"),
     ],
     ids=["n-ary", "soft", "no idle value", "no clique"],
 )  # fmt: skip
@@ -117,7 +117,7 @@ def test_too_many_pairs_of_values_are_refused_before_any_is_looked_at() -> None:
 
 def test_the_finite_cost_that_is_told_does_not_depend_on_what_was_looked_at_before() -> None:
     crowd = soft("A", "B", rows={(3, 3): 1, (2, 2): 5})
-    fault = "'s' costs 5 for A = 2 and B = 2: it is more than an exclusion"
+    fault = "'s' costs 5 for A = 2 and B = 2: it is not only an exclusion"
     allocation_fault(team_of({"A": (0, 3), "B": (0, 3)}, [crowd]))
     for _ in range(2):
         assert allocation_fault(team_of({"A": (0, 2, 3), "B": (0, 2, 3)}, [crowd])) == fault

@@ -83,7 +83,7 @@ def test_ace_accepts_what_is_exported(batch: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize("values", [(LEAST - 1,), (MOST + 1,), (10**17, 10**17 + 1), (-(10**17), 0), (0, LEAST, MOST)])
 def test_integers_that_ace_cannot_read_are_refused(values: tuple[int, ...]) -> None:
     team = team_of({"A": tuple(sorted(values)), "B": (1, 2)}, [])
-    with pytest.raises(UnsupportedError, match=r"has a variable A with the value .* ACE takes values from"):
+    with pytest.raises(UnsupportedError, match=r"has a variable A with the value .* ACE supports values from"):
         xcsp3(team)
 
 
@@ -93,7 +93,7 @@ def test_what_is_refused_is_not_half_written(tmp_path: Path) -> None:
     done = robochoc_within("export", tmp_path / "far", "-o", tmp_path / "far.xml")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert "ACE takes values from -2,147,483,638 to 2,147,483,637" in line
+    assert "ACE supports values from -2,147,483,638 to 2,147,483,637" in line
     assert not (tmp_path / "far.xml").exists()
 
 

@@ -18,11 +18,11 @@ from robochoc.model.problem import (
     Semantics,
     Team,
 )
-from robochoc.solver import compiled, local_constraints
+from robochoc.solver import compiled
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.loose_problems import loosened
@@ -143,7 +143,7 @@ def test_the_first_conflict_is_the_one_that_is_explained(monkeypatch: pytest.Mon
     for _ in range(60):
         team = random_complex_team(chance)
         for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
-            monkeypatch.setattr(local_constraints, "MIN_TABLE_VALUES", chance.choice((1, 1000)))
+            monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", chance.choice((1, 1000)))
             _compare(part, chance)
 
 
@@ -152,7 +152,7 @@ def test_conflicts_of_several_values_are_those_of_each_with_as_many_checks(
     few: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where robots are unknown or withdrawn, and from any place in the order on."""
-    monkeypatch.setattr(local_constraints, "MIN_TABLE_VALUES", few)
+    monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", few)
     chance = Random("conflicts of several")
     seen = Counter[int]()
     for _ in range(30):

@@ -1,8 +1,8 @@
-"""Compiled domains: all local solutions of a robot, grouped by what its neighbours can see of them.
+"""Compiled domains: all local solutions of a robot, grouped by the values of its interface variables.
 
 Paper, Section 4.1: a complex agent "can easily address and solve its local sub-problem and use solutions as a
-compiled domain". Neighbours see the interface variables only, so local solutions that agree there are one value to
-them; of each such group one representative and the number of its members are kept.
+compiled domain". Neighbours see only the interface variables, so local solutions that agree on these are one value; a
+representative and the number of solutions are stored for each value.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from robochoc.solver.encoding import (
 from robochoc.system.errors import TransferableError
 
 MAX_SOLUTIONS = 100_000
-"""The default maximum of local solutions of a robot."""
+"""The default maximum number of local solutions of a robot."""
 
 SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
-"""All solutions of a network of several variables, in codes; `solver/ace.py` has one."""
+"""Returns all solutions of a network of several variables, in codes, such as `AceProcess` in `solver/ace.py`."""
 
 
 class TooManySolutionsError(TransferableError):
@@ -38,7 +38,7 @@ class TooManySolutionsError(TransferableError):
 
     def __init__(self, robot: str, limit: int) -> None:
         super().__init__(
-            f"{robot} has more than {limit:,} local solutions; raise the limit (--local-solutions), or constrain its"
+            f"{robot} has more than {limit:,} local solutions; increase --local-solutions, or constrain its"
             " variables more"
         )
         self.robot = robot
@@ -46,12 +46,15 @@ class TooManySolutionsError(TransferableError):
 
 @dataclass(frozen=True)
 class CompiledDomain:
-    """A robot's values as neighbours see them.
+    """The values of a robot that its neighbours see.
 
-    `values[i]` holds the interface variables' values; `solutions[i]` one local solution behind it (the values of
-    `variables`: of the cheapest, the lexicographically first), `counts[i]` the number of local solutions that look
-    like it, `cheapest[i]` the number of those that are as cheap as the cheapest, and `costs[i]` what the private
-    constraints charge for that.
+    Attributes:
+        variables: The names of all variables.
+        values: The values of the interface variables, for each value of the robot.
+        solutions: The values of `variables` in the cheapest local solution (the lexicographically first) of each value.
+        counts: The number of local solutions of each value.
+        costs: The private cost of the cheapest local solution of each value.
+        cheapest: The number of cheapest local solutions of each value.
     """
 
     variables: tuple[str, ...]
@@ -67,17 +70,17 @@ class CompiledDomain:
         return sum(self.counts)
 
     def solution(self, index: int) -> dict[str, int]:
-        """Return the values of all variables for the value at `index`. Empty for the last index: withdrawal."""
+        """Return the values of all variables for the value at `index`. Empty for the last index, withdrawal."""
         return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
 
     def behind(self, value: Value) -> dict[str, int]:
-        """Return the same for `value`, as neighbours see it. A value that the robot does not have means withdrawal."""
+        """Return the same for a value of the interface variables. An unknown value means withdrawal."""
         return self.solution(self.values.index(value) if value in self.values else len(self.values))
 
 
 @dataclass
 class _Group:
-    """Local solutions that look alike: the first of the cheapest, its cost, how many there are, and as cheap ones."""
+    """Local solutions with the same interface values: the first of the cheapest, its cost, and their numbers."""
 
     solution: tuple[int, ...]
     cost: Cost
@@ -95,12 +98,12 @@ def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int =
 
     Args:
         robot: The robot.
-        solve: Returns all solutions of a network. It is called for variables that private constraints connect.
+        solve: Returns all solutions of a network. Called for variables connected by private constraints.
         limit: The maximum number of local solutions.
 
     Raises:
         TooManySolutionsError: if there are more.
-        UnsupportedError: if a network has to be solved, and there is no `solve`.
+        UnsupportedError: if a network must be solved, and `solve` is missing.
     """
     soft = [constraint for constraint in robot.private if is_soft(constraint)]
     parts = components(robot.variables, robot.private, [constraint.variables for constraint in soft])
@@ -124,20 +127,20 @@ def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None, limit:
         return itertools.product(*part.network.domains)
     if solve is None:
         raise UnsupportedError(
-            f"{robot.name} has private constraints among its variables, and no solver to compile them"
+            f"{robot.name} has private constraints among its variables, which require a solver to compile them"
         )
     return solve(part.network)
 
 
 def _is_paid_in(constraint: Constraint, part: Component, first: Component) -> bool:
-    """Return whether `constraint` is on variables of `part`; one that is on constants only is paid in the `first`."""
+    """Return whether `constraint` is on variables of `part`; constraints on constants only belong to the `first`."""
     return part is first if not constraint.variables else constraint.variables[0] in part.names
 
 
 def _grouped(
     part: Component, seen: set[str], soft: Iterable[Constraint], solutions: Iterable[Sequence[int]]
 ) -> list[_Group]:
-    """Return solutions of one part that agree on its variables in `seen`, joined."""
+    """Return the solutions of one component, grouped by the values of its variables in `seen`."""
     shown = [place for place, name in enumerate(part.names) if name in seen]
     prices = [cost_function(constraint, part.names) for constraint in soft]
     groups: dict[Codes, _Group] = {}
@@ -150,7 +153,7 @@ def _grouped(
 
 
 def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequence[_Group]]) -> CompiledDomain:
-    """Return every combination of the parts' groups."""
+    """Return all combinations of the components' groups."""
     variables = tuple(variable.name for variable in robot.variables)
     place = {name: index for index, name in enumerate(itertools.chain.from_iterable(names))}
     order = [place[name] for name in variables]
