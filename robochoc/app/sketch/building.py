@@ -1,4 +1,4 @@
-"""A sketch as a `robochoc.Model`, and with it as a team, its files, and its solution."""
+"""Conversion of a sketch to a `robochoc.Model` and a team, and of a solution to the sketch's values."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from robochoc.modelling.team_builder import build_team, saved_order
 from robochoc.modelling.terms import ModelVariable, Term
 
 WAYPOINT = "waypoint"
-"""The topic that says where a robot is to go, after the robot's name: ROS wants one for each."""
+"""The topic of a robot's target, after the robot's name."""
 
 
 def model_of(sketch: Sketch) -> Model:
-    """Return the model of a sketch. `checks.troubles` says first what keeps it from being one.
+    """Return the model of a sketch, which must have no errors (`checks.errors_of`).
 
-    Constraints are called by their rule and its robots, such as `R1.North.South`.
+    Constraints are named after their rule and its robots, such as `R1.North.South`.
 
     Raises:
-        ModelError: if the sketch has a mistake.
+        ModelError: if the sketch has an error.
     """
     model = Model(sketch.name)
     for drawn in sketch.robots:
@@ -32,7 +32,7 @@ def model_of(sketch: Sketch) -> Model:
         for name in sketch.deciders(decision):
             model.robots[name].variable(decision.name, [*sketch.values(decision)])
     for drawn in sketch.robots:
-        tell_where(sketch, model.robots[drawn.name])
+        add_topic(sketch, model.robots[drawn.name])
     for rule in sketch.rules:
         if rule.on:
             _add(model, sketch, rule)
@@ -42,72 +42,72 @@ def model_of(sketch: Sketch) -> Model:
 def decided(
     sketch: Sketch, assignment: Mapping[str, int | str], model: Model | None = None
 ) -> dict[tuple[str, str], int | str]:
-    """Return what robots have decided, in the words of the sketch.
+    """Return the robots' decisions as values of the sketch.
 
     Args:
         sketch: The sketch.
-        assignment: Values by variables as commands tell them (`solve --json`): a text is a name without blanks there.
-        model: The model that was solved, if it is another one than the sketch's own.
+        assignment: Values by variables in the form of `solve --json`, in which names have no blanks.
+        model: The model that was solved, if it is not that of the sketch.
 
     Returns:
-        Values of the sketch, by robot and decision. What the sketch does not have is left out.
+        Values of the sketch, by robot and decision. Unknown values are left out.
     """
     model = model_of(sketch) if model is None else model
     found: dict[tuple[str, str], int | str] = {}
     for decision in sketch.decisions:
         for name in sketch.deciders(decision):
             variable = model.robots[name].variables[decision.name]
-            told = assignment.get(variable.name)
+            label = assignment.get(variable.name)
             words = {model.symbols.all[code] if variable.codes.symbolic else code: code for code in variable.codes.ever}
-            if told in words:
-                value = variable.codes.value(words[told])
+            if label in words:
+                value = variable.codes.value(words[label])
                 found[name, decision.name] = value if isinstance(value, (int, str)) else str(value)
     return found
 
 
 def saved_team(sketch: Sketch) -> Team:
-    """Return the team of a sketch as its files say it. Raises `ModelError` if the sketch has a mistake."""
+    """Return the team in the files of a sketch. Raises `ModelError` if the sketch has an error."""
     model = model_of(sketch)
     order = saved_order(model.team)
     return model.team if order == model.team.order else build_team(model, order)
 
 
 def applied(sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each constraint that a rule becomes: its name, and its robots."""
+    """Yield the name and the robots of each constraint of a rule."""
     for robots in PALETTE[rule.kind].groups(sketch, rule):
         yield name_of(rule, robots), robots
 
 
 def name_of(rule: SketchRule, robots: Sequence[str]) -> str:
-    """Return the name of the constraint that `rule` becomes for these robots, as the palette links them."""
+    """Return the name of the constraint of `rule` for the robots of one link."""
     few = 3
     return ".".join([rule.id, *robots]) if len(robots) < few else rule.id
 
 
 def _add(model: Model, sketch: Sketch, rule: SketchRule) -> None:
     for name, robots in applied(sketch, rule):
-        state(model, rule, name, term_of(model, sketch, rule, robots), robots)
+        add_constraint(model, rule, name, term_of(model, sketch, rule, robots), robots)
 
 
 def term_of(model: Model, sketch: Sketch, rule: SketchRule, robots: Sequence[str]) -> Term:
-    """Return what a rule says of the robots of one link, over the variables of a model."""
+    """Return the condition of a rule for the robots of one link, over the variables of a model."""
     term = PALETTE[rule.kind].condition(Applied(sketch, rule), [model.robots[robot][rule.decision] for robot in robots])
     assert isinstance(term, Term), "variables of a model make terms"  # noqa: S101
     return term
 
 
-def state(model: Model, rule: SketchRule, name: str, term: Term, robots: Sequence[str]) -> None:
-    """Add the constraint that a rule becomes for the robots of one link."""
+def add_constraint(model: Model, rule: SketchRule, name: str, term: Term, robots: Sequence[str]) -> None:
+    """Add the constraint of a rule for the robots of one link."""
     if PALETTE[rule.kind].graded:
         model.minimize(term)
-    elif rule.private and len(robots) > 1:  # partially known: the other one has no part, and never learns this one
+    elif rule.private and len(robots) > 1:  # partially known: the other robot has no part in it, and never learns it
         model.robots[robots[0]].knows(term, cost=rule.cost, name=name)
     else:
         model.add(term, cost=rule.cost, name=name)
 
 
-def tell_where(sketch: Sketch, robot: ModelRobot) -> None:
-    """Let a robot say where its decisions send it: to a cell, and to a height."""
+def add_topic(sketch: Sketch, robot: ModelRobot) -> None:
+    """Add the topic for a robot's target, if it decides a place or a level."""
     variables: dict[Kind, ModelVariable] = {}
     for decision in _decided_by(sketch, robot.name):
         variables.setdefault(decision.kind, robot.variables[decision.name])

@@ -1,4 +1,4 @@
-"""Rules that must hold and never can: seen cheaply, for robots alone and for two of them. The rest, solving finds."""
+"""Cheap checks for hard rules that can never be satisfied, for one or two robots. Others are found by solving."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
 from robochoc.solver.compiled_domain import MAX_SOLUTIONS
 
 MAX_PAIRS = 10_000
-"""Pairs of values that are tried for two robots; what has more is left to solving."""
+"""The maximum number of pairs of values that are checked for two robots."""
 MAX_TRIED = 100_000
-"""Pairs of values that are tried for a sketch."""
-MAX_LOOKED_AT = 5_000
-"""Links of two robots that are looked at."""
+"""The maximum number of pairs of values that are checked for a sketch."""
+MAX_CHECKED_LINKS = 5_000
+"""The maximum number of links of two robots that are checked."""
 
 Values = frozenset[int | str]
 Own = dict[tuple[str, str], Values]
-"""The values that rules about one robot alone leave it, by robot and decision."""
+"""The values that rules of a single robot allow, by robot and decision."""
 _Link = tuple[str, str, str]
 """A decision, and two robots."""
 
 
 def hopeless(facts: Facts) -> Iterator[Trouble]:
-    """Yield rules that cannot hold."""
+    """Yield rules that cannot be satisfied."""
     hard = [rule for rule in facts.sound if rule.cost is None and not PALETTE[rule.kind].graded]
     own: Own = {}
     found = [*_alone(facts, [rule for rule in hard if PALETTE[rule.kind].links == Links.EACH], own)]
@@ -44,18 +44,18 @@ def hopeless(facts: Facts) -> Iterator[Trouble]:
 
 
 def _alone(facts: Facts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
-    """Take from `own` what each rule forbids. Yield the rules that leave a robot nothing."""
+    """Remove from `own` the values that each rule forbids. Yield the rules that leave a robot no values."""
     for rule in rules:
         given, entry = Applied(facts.sketch, rule), PALETTE[rule.kind]
         for (robot,) in entry.groups(facts.sketch, rule):
             left = _left(facts, own, robot, rule.decision)
-            own[robot, rule.decision] = kept = _kept(entry, given, left)
-            if left and not kept:
+            own[robot, rule.decision] = allowed = _allowed(entry, given, left)
+            if left and not allowed:
                 yield _hint(rule, "alone", robot=shortened(robot), decision=shortened(rule.decision))
                 break
 
 
-def _kept(entry: PaletteRule, given: Applied, left: Values) -> Values:
+def _allowed(entry: PaletteRule, given: Applied, left: Values) -> Values:
     return frozenset(value for value in left if entry.holds(given, (value,)))
 
 
@@ -65,17 +65,17 @@ def _left(facts: Facts, own: Own, robot: str, decision: str) -> Values:
 
 
 def _of_two(facts: Facts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
-    """Yield the last rule of those that two robots cannot keep together."""
+    """Yield the last one of rules that two robots cannot satisfy together."""
     links: dict[_Link, list[tuple[int, bool]]] = {}
     for place, rule in enumerate(rules):
         entry = PALETTE[rule.kind]
         if entry.links not in {Links.EACH, Links.GROUP}:
             for one, other in entry.groups(facts.sketch, rule):
                 links.setdefault((rule.decision, *sorted((one, other))), []).append((place, one > other))  # type: ignore[arg-type] # two
-                if len(links) > MAX_LOOKED_AT:
+                if len(links) > MAX_CHECKED_LINKS:
                     return
     tried: dict[object, bool] = {}
-    told: set[str] = set()
+    reported: set[str] = set()
     budget = MAX_TRIED
     for (decision, one, other), applied in links.items():
         left = _left(facts, own, one, decision), _left(facts, own, other, decision)
@@ -85,15 +85,15 @@ def _of_two(facts: Facts, rules: list[SketchRule], own: Own) -> Iterator[Trouble
             if size > min(MAX_PAIRS, budget):
                 continue
             budget -= size
-            tried[key] = _can_hold(facts, left, [(rules[place], turned) for place, turned in applied])
+            tried[key] = _is_satisfiable(facts, left, [(rules[place], turned) for place, turned in applied])
         last = rules[applied[-1][0]]
-        if not tried[key] and last.id not in told:
-            told.add(last.id)
+        if not tried[key] and last.id not in reported:
+            reported.add(last.id)
             others = ", ".join(rules[place].id for place, _ in applied)
             yield _hint(last, "two", one=shortened(one), other=shortened(other), rules=others)
 
 
-def _can_hold(facts: Facts, left: tuple[Values, Values], applied: list[tuple[SketchRule, bool]]) -> bool:
+def _is_satisfiable(facts: Facts, left: tuple[Values, Values], applied: list[tuple[SketchRule, bool]]) -> bool:
     asked = [(PALETTE[rule.kind], Applied(facts.sketch, rule), turned) for rule, turned in applied]
     return any(
         all(entry.holds(given, pair[::-1] if turned else pair) for entry, given, turned in asked)
@@ -102,7 +102,7 @@ def _can_hold(facts: Facts, left: tuple[Values, Values], applied: list[tuple[Ske
 
 
 def _of_all(facts: Facts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
-    """Yield a rule that asks too much of all of its robots together."""
+    """Yield a rule that its robots cannot satisfy together."""
     robots = facts.sketch.bound(rule)
     left = [_left(facts, own, robot, rule.decision) for robot in robots]
     if rule.kind == "different":
@@ -117,13 +117,13 @@ def _of_all(facts: Facts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
 
 
 def large(facts: Facts) -> Iterator[Trouble]:
-    """Yield robots whose decisions together have too many combinations, one of those that decide the same."""
-    told: dict[tuple[str, ...], list[str]] = {}
+    """Yield one robot of each group with equal decisions that have too many combinations."""
+    groups: dict[tuple[str, ...], list[str]] = {}
     for robot in facts.sketch.robots:
         decisions = tuple(name for name, robots in facts.deciders.items() if robot.name in robots)
         if prod(len(facts.values[name]) for name in decisions) > MAX_SOLUTIONS:
-            told.setdefault(decisions, []).append(robot.name)
-    for decisions, robots in told.items():
+            groups.setdefault(decisions, []).append(robot.name)
+    for decisions, robots in groups.items():
         named: dict[str, str | int] = {
             "robot": shortened(robots[0]),
             "robots": len(robots),

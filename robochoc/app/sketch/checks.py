@@ -1,4 +1,4 @@
-"""All that is wrong with a sketch."""
+"""All errors of a sketch, and hints on problems."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from robochoc.app.sketch.troubles import Trouble
 
 
 def troubles(sketch: Sketch) -> list[Trouble]:
-    """Return what is wrong with a sketch, errors first. Where there is no error, `building.model_of` makes its model.
+    """Return the errors of a sketch, followed by hints. Without errors, `building.model_of` returns its model.
 
-    Hints tell what is a team, but can hardly be meant: rules that can never hold, or too many combinations.
+    Hints are on probable mistakes: rules that can never be satisfied, or too many combinations.
     """
-    found, facts = _looked_at(sketch)
+    found, facts = _checked(sketch)
     if facts and not any(trouble.is_error for trouble in found):
         found += [*chances.hopeless(facts), *chances.large(facts)]
     return sorted(found, key=lambda trouble: not trouble.is_error)
 
 
 def errors_of(sketch: Sketch) -> list[Trouble]:
-    """Return what keeps a sketch from being a team, sooner than `troubles`: hints take the most time."""
-    return [trouble for trouble in _looked_at(sketch)[0] if trouble.is_error]
+    """Return the errors of a sketch. This is faster than `troubles`, since hints are slow."""
+    return [trouble for trouble in _checked(sketch)[0] if trouble.is_error]
 
 
-def _looked_at(sketch: Sketch) -> tuple[list[Trouble], Facts | None]:
-    """Return all errors, and the hints that are seen beside them; and the facts of a sketch that is within bounds."""
+def _checked(sketch: Sketch) -> tuple[list[Trouble], Facts | None]:
+    """Return all errors and quick hints, and the facts about a sketch that is within bounds."""
     found = [*shape.of_bounds(sketch)]
     if found:
         return found, None

@@ -15,7 +15,7 @@ from typing import cast
 
 import msgspec
 
-from robochoc.app.sketch.building import applied, state, tell_where, term_of
+from robochoc.app.sketch.building import add_constraint, add_topic, applied, term_of
 from robochoc.app.sketch.palette import Applied, Links
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch, SketchRule, Value
@@ -151,7 +151,7 @@ class _Difference:
         self._say_values(model, event, was, now)
         for link in self._links:
             if not (self._by_values(link) and link in self._dropped):
-                state(model, link.rule, link.name, term_of(model, before, link.rule, link.robots), link.robots)
+                add_constraint(model, link.rule, link.name, term_of(model, before, link.rule, link.robots), link.robots)
         self._say(model, event)
         return model
 
@@ -167,7 +167,7 @@ class _Difference:
                     raise AnewError("whatif.anew-nothing", robot=name)
                 model.robots[name].variable(decision.name, domains[name, decision.name])
         for robot in model.robots.values():
-            tell_where(before, robot)
+            add_topic(before, robot)
         return model
 
     def _say_values(self, model: Model, event: ModelEvent, was: Domains, now: Domains) -> None:
@@ -194,7 +194,7 @@ class _Difference:
             robot = event.robot(drawn.name, weight=drawn.weight)
             for decision in _of(self._after, drawn.name):
                 robot.variable(decision.name, [*self._after.values(decision)])
-            tell_where(self._after, robot)
+            add_topic(self._after, robot)
         for link in self._added:
             if not self._by_values(link):
                 _add(event, model, link)

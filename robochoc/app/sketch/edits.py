@@ -1,6 +1,6 @@
-"""Edits of a sketch. Each returns another sketch, or says what is wrong with it, and with which element.
+"""Edits of a sketch. Each returns another sketch, or raises `EditError` with the invalid element.
 
-An edit never leaves behind what points to nothing: with a robot go its places in rules, with a decision its rules.
+An edit leaves no dangling references: a removed robot is removed from rules, a removed decision with its rules.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.system.errors import TransferableError
 
 
 class EditError(TransferableError, ValueError):
-    """An edit that cannot be: the `key` of its text in the catalogue, what the text names, and the element."""
+    """An invalid edit: the `key` of its text in the catalogue, the arguments of the text, and the element."""
 
     def __init__(self, key: str, element: str = "", **named: object) -> None:
         super().__init__(key)
@@ -25,7 +25,7 @@ class EditError(TransferableError, ValueError):
 
 
 def renamed(sketch: Sketch, name: str) -> Sketch:
-    """Give the team another name."""
+    """Rename the team."""
     return msgspec.structs.replace(sketch, name=_name(name, "team", ()))
 
 
@@ -33,7 +33,7 @@ def renamed(sketch: Sketch, name: str) -> Sketch:
 
 
 def with_robot(sketch: Sketch, at: Cell, name: str | None = None) -> Sketch:
-    """Add a robot at a cell. Without a name it gets a free one."""
+    """Add a robot in a cell; without a name, it gets an unused one."""
     if len(sketch.robots) >= limits.MAX_ROBOTS:
         raise EditError("edit.too-many-robots", most=limits.MAX_ROBOTS)
     check_cell(sketch, at)
@@ -43,7 +43,7 @@ def with_robot(sketch: Sketch, at: Cell, name: str | None = None) -> Sketch:
 
 
 def without_robot(sketch: Sketch, name: str) -> Sketch:
-    """Remove a robot, from decisions and rules, too. What was about it alone goes with it."""
+    """Remove a robot, also from decisions and rules. Decisions and rules of this robot only are removed."""
     robots = tuple(robot for robot in sketch.robots if robot.name != name)
     decisions = tuple(
         msgspec.structs.replace(one, robots=_without(one.robots, name))
@@ -59,28 +59,27 @@ def without_robot(sketch: Sketch, name: str) -> Sketch:
 
 
 def with_robot_moved(sketch: Sketch, name: str, to: Cell) -> Sketch:
-    """Let a robot stand at another cell."""
+    """Move a robot to another cell."""
     check_cell(sketch, to, name)
     return _with_robot(sketch, name, lambda robot: msgspec.structs.replace(robot, at=to))
 
 
 def with_robot_renamed(sketch: Sketch, name: str, new: str) -> Sketch:
-    """Give a robot another name, everywhere."""
+    """Rename a robot, also in decisions and rules."""
     chosen = _name(new, name, {robot.name for robot in sketch.robots} - {name})
-    swapped = {name: chosen}
 
-    def said(names: Sequence[str]) -> tuple[str, ...]:
-        return tuple(swapped.get(one, one) for one in names)
+    def updated(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(chosen if other == name else other for other in names)
 
     return msgspec.structs.replace(
         _with_robot(sketch, name, lambda robot: msgspec.structs.replace(robot, name=chosen)),
-        decisions=tuple(msgspec.structs.replace(one, robots=said(one.robots)) for one in sketch.decisions),
-        rules=tuple(msgspec.structs.replace(rule, robots=said(rule.robots)) for rule in sketch.rules),
+        decisions=tuple(msgspec.structs.replace(one, robots=updated(one.robots)) for one in sketch.decisions),
+        rules=tuple(msgspec.structs.replace(rule, robots=updated(rule.robots)) for rule in sketch.rules),
     )
 
 
 def with_importance(sketch: Sketch, name: str, *, weight: int | None = None, rank: int | None = None) -> Sketch:
-    """Say how much a robot counts when somebody has to step aside, and how high it ranks."""
+    """Set the weight of a robot's withdrawal, and its rank."""
     if weight is not None and not 1 <= weight <= MAX_WEIGHT:
         raise EditError("edit.weight", name, most=MAX_WEIGHT)
     if rank is not None and abs(rank) > MAX_WEIGHT:
@@ -93,7 +92,7 @@ def with_importance(sketch: Sketch, name: str, *, weight: int | None = None, ran
 
 
 def with_area(sketch: Sketch, columns: int, rows: int) -> Sketch:
-    """Make the map smaller or larger. Robots that would be outside move to its edge; cells stay where they are."""
+    """Resize the map. Robots outside the new map move to its edge; cells keep their positions."""
     most = limits.MAX_SIDE
     if not (1 <= columns <= most and 1 <= rows <= most):
         raise EditError("edit.map", "map", most=most)
@@ -101,7 +100,7 @@ def with_area(sketch: Sketch, columns: int, rows: int) -> Sketch:
 
 
 def with_cell_blocked(sketch: Sketch, cell: Cell, *, blocked: bool) -> Sketch:
-    """Block a cell of the map, or free it: nobody can decide to be there."""
+    """Block or free a cell of the map. Blocked cells are not values of decisions."""
     check_cell(sketch, cell)
     cells = sketch.area.blocked | {cell} if blocked else sketch.area.blocked - {cell}
     return msgspec.structs.replace(sketch, area=msgspec.structs.replace(sketch.area, blocked=cells))
@@ -111,7 +110,7 @@ def with_cell_blocked(sketch: Sketch, cell: Cell, *, blocked: bool) -> Sketch:
 
 
 def with_decision(sketch: Sketch, decision: Decision, *, instead_of: str | None = None) -> Sketch:
-    """Add a decision, or put it in the place of another one. Rules that no longer fit it are told by `checks`."""
+    """Add a decision, or replace another one. `checks` reports rules that do not fit the decision any more."""
     others = {one.name for one in sketch.decisions} - {instead_of}
     if instead_of is None and len(sketch.decisions) >= limits.MAX_DECISIONS:
         raise EditError("edit.too-many-decisions", most=limits.MAX_DECISIONS)
@@ -129,7 +128,7 @@ def with_decision(sketch: Sketch, decision: Decision, *, instead_of: str | None 
 
 
 def without_decision(sketch: Sketch, name: str) -> Sketch:
-    """Remove a decision, with the rules about it."""
+    """Remove a decision and its rules."""
     decisions = tuple(one for one in sketch.decisions if one.name != name)
     return _without_lost_rules(msgspec.structs.replace(sketch, decisions=decisions))
 
@@ -138,7 +137,7 @@ def without_decision(sketch: Sketch, name: str) -> Sketch:
 
 
 def with_rule(sketch: Sketch, rule: SketchRule) -> Sketch:
-    """Add a rule, or put it in the place of the one of the same name. Without a name it gets a free one."""
+    """Add a rule, or replace the rule with the same id; a new rule gets an unused id."""
     if rule.cost is not None and not 1 <= rule.cost <= limits.MAX_COST:
         raise EditError("edit.cost", rule.id, most=limits.MAX_COST)
     if sketch.rule(rule.id) is not None:
@@ -156,12 +155,12 @@ def without_rule(sketch: Sketch, name: str) -> Sketch:
 
 
 def with_rule_switched(sketch: Sketch, name: str, *, on: bool) -> Sketch:
-    """Let a rule count, or not."""
+    """Activate or deactivate a rule."""
     rules = tuple(msgspec.structs.replace(rule, on=on) if rule.id == name else rule for rule in sketch.rules)
     return msgspec.structs.replace(sketch, rules=rules)
 
 
-# What edits share
+# Common functions
 
 
 def _with_robot(sketch: Sketch, name: str, change: Callable[[SketchRobot], SketchRobot]) -> Sketch:
@@ -185,7 +184,7 @@ def check_cell(sketch: Sketch, cell: Cell, element: str = "map") -> None:
 
 
 def _name(name: str, element: str, taken: Sequence[str] | set[str]) -> str:
-    """Return a name that a user gave. Raises `EditError` if it cannot be one, or there is one already."""
+    """Return a valid name from the user's input. Raises `EditError` if it is invalid or in use."""
     chosen = name.strip()
     if not is_name(chosen) or chosen == RESERVED or len(chosen) > limits.MAX_LABEL:
         raise EditError("edit.name", element, name=chosen[: limits.MAX_LABEL])

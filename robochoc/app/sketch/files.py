@@ -1,7 +1,7 @@
-"""Teams of the application as files: a folder of XML that every command takes, and beside it how the team was drawn.
+"""Teams of the application as files: a folder of XML files, which all commands read, and the sketch.
 
-`sketch.json` holds the sketch, and a digest of it and of the XML files. Where any of these was changed by hand since,
-the sketch may no longer say what the team is, and the team is opened as any other one: as what its XML files say.
+`sketch.json` has the sketch, and a digest of it and of the XML files. If one of these was changed later, the sketch may
+differ from the team, and the team is opened as an imported one, from its XML files.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 
 VERSION = 1
-"""Of what is in `sketch.json`."""
+"""The version of the format of `sketch.json`."""
 MAX_SKETCH = 16 << 20
-"""Bytes of `sketch.json`. A larger one is none of ours."""
+"""The maximum number of bytes of `sketch.json`. Larger files are rejected."""
 
 
 class _Version(msgspec.Struct):
@@ -39,8 +39,8 @@ class _Version(msgspec.Struct):
     version: int
 
 
-class _Kept(msgspec.Struct, forbid_unknown_fields=True):
-    """What stands in `sketch.json`."""
+class _SketchFile(msgspec.Struct, forbid_unknown_fields=True):
+    """The content of `sketch.json`."""
 
     version: int
     digest: str
@@ -48,56 +48,56 @@ class _Kept(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def save(sketch: Sketch, folder: Path, *, replace: bool = False) -> None:
-    """Write the team of a sketch into `folder`, with the sketch: all of it, or nothing.
+    """Write the team of a sketch and the sketch into `folder`, atomically.
 
     Args:
         sketch: The sketch.
-        folder: The folder to be written.
-        replace: Whether a team that is there already is replaced.
+        folder: The folder to write.
+        replace: Whether to replace an existing team.
 
     Raises:
-        InvalidInputError: if the sketch has errors, or the folder is there and is not replaced.
-        OSError: if it cannot be written.
+        InvalidInputError: if the sketch has errors, or the folder exists and must not be replaced.
+        OSError: if a file cannot be written.
     """
     team = _checked_team(sketch)
     if not replace and folder.exists():
-        raise invalid_input(folder, "it exists already", "choose another folder, or replace this one")
-    write_team(team, folder, replace=replace, beside={SKETCH_FILE: kept(sketch, team_files(team))})
+        raise invalid_input(folder, "the folder exists already", "choose another folder, or replace this one")
+    write_team(team, folder, replace=replace, beside={SKETCH_FILE: sketch_file(sketch, team_files(team))})
 
 
 def zipped(sketch: Sketch) -> bytes:
-    """Return what `save` writes as one ZIP archive. Raises `InvalidInputError` if the sketch has errors."""
+    """Return the files of `save` as one ZIP archive. Raises `InvalidInputError` if the sketch has errors."""
     files = team_files(_checked_team(sketch))
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in {**files, SKETCH_FILE: kept(sketch, files)}.items():
+        for name, text in {**files, SKETCH_FILE: sketch_file(sketch, files)}.items():
             archive.writestr(zipfile.ZipInfo(f"{sketch.name}/{name}"), text, zipfile.ZIP_DEFLATED)
     return content.getvalue()
 
 
 def xml_sources(sketch: Sketch) -> dict[str, str]:
-    """Return the XML files of a sketch as `save` writes them, by name. Raises `InvalidInputError` if it has errors."""
+    """Return the XML files of a sketch, by name. Raises `InvalidInputError` if the sketch has errors."""
     return {name: content.decode() for name, content in team_files(_checked_team(sketch)).items()}
 
 
 def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...]:
-    """Return the sketch in a folder whose XML files are `xml`, if it is still true.
+    """Return the sketch in a folder with the XML files `xml`, if the files are unchanged.
 
-    If not, return which of the files do not say what the sketch says; none where there is no sketch at all.
+    Otherwise return the files that differ from the sketch; none if there is no sketch.
 
     Raises:
-        InvalidInputError: if there is a file of that name, and it is none of ours, or what it holds has errors.
+        InvalidInputError: if the sketch's file is damaged, or the sketch has errors.
     """
     path = folder / SKETCH_FILE
     if not path.exists():
         return ()
     if not path.is_file() or path.stat().st_size > MAX_SKETCH:
-        raise _damaged(path, "it is no file, or too large")
+        raise _damaged(path, "it is not a file, or too large")
     try:
         content = path.read_bytes()
         if msgspec.json.decode(content, type=_Version).version > VERSION:
             raise invalid_input(path, "a newer version of robochoc wrote it", "install that version")
-        found = msgspec.json.decode(content, type=_Kept)
+        found = msgspec.json.decode(content, type=_SketchFile)
         sketch = msgspec.json.decode(found.sketch, type=Sketch)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as damaged:
         raise _damaged(path, str(damaged)) from None
@@ -112,7 +112,7 @@ def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...
 
 
 def _differing(sketch: Sketch, xml: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return which files are others than those that would be written of a sketch; none if it is no sound one."""
+    """Return the files that differ from those of a sketch; none if the sketch is not sound."""
     if not is_sound(sketch):
         return ()
     try:
@@ -123,12 +123,12 @@ def _differing(sketch: Sketch, xml: Mapping[str, bytes]) -> tuple[str, ...]:
 
 
 def _digest(files: Mapping[str, bytes]) -> str:
-    """Return a digest of files: another one as soon as anything in them, or their names, differs."""
-    told = sha256()
+    """Return a digest of the names and contents of files."""
+    digest = sha256()
     for name in sorted(files):
         path = os.fsencode(name)
-        told.update(f"{len(path)} {len(files[name])} ".encode() + path + files[name])
-    return told.hexdigest()
+        digest.update(f"{len(path)} {len(files[name])} ".encode() + path + files[name])
+    return digest.hexdigest()
 
 
 def _checked_team(sketch: Sketch) -> Team:
@@ -139,16 +139,16 @@ def _checked_team(sketch: Sketch) -> Team:
         )
     try:
         return saved_team(sketch)
-    except ModelError as mistake:  # pragma: no cover - what checks should have seen
-        raise invalid_input(sketch.name, str(mistake), "change what it is about") from None
+    except ModelError as mistake:  # pragma: no cover - the checks should have found it
+        raise invalid_input(sketch.name, str(mistake), "change the named element") from None
 
 
-def kept(sketch: Sketch, xml: Mapping[str, bytes]) -> bytes:
-    """Return the content of `sketch.json`, beside XML files."""
+def sketch_file(sketch: Sketch, xml: Mapping[str, bytes]) -> bytes:
+    """Return the content of `sketch.json` for a sketch and its XML files."""
     drawn = msgspec.json.encode(sketch, order="deterministic")
-    told = _digest({**xml, SKETCH_FILE: drawn})
-    return msgspec.json.encode(_Kept(VERSION, told, msgspec.Raw(drawn))) + b"\n"
+    digest = _digest({**xml, SKETCH_FILE: drawn})
+    return msgspec.json.encode(_SketchFile(VERSION, digest, msgspec.Raw(drawn))) + b"\n"
 
 
 def _damaged(path: Path, why: str) -> InvalidInputError:
-    return invalid_input(path, f"it is damaged: {why}", "remove it: then the team opens as its XML files say")
+    return invalid_input(path, f"the sketch is damaged: {why}", "remove it to open the team from its XML files")

@@ -1,4 +1,4 @@
-"""Whether each rule of a sketch fits it: its decision, its robots, and what fills its openings."""
+"""Checks of the rules of a sketch: their decisions, robots and fields."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from robochoc.app.sketch.troubles import About, Trouble, shortened
 from robochoc.app.texts import say
 
 MAX_GROUP = 300
-"""Robots of one constraint: no file says it of many more."""
+"""The maximum number of robots of one constraint."""
 MAX_LINKS = 20_000
-"""Constraints that all rules become together."""
+"""The maximum number of constraints of all rules together."""
 _PAIR = 2
 
 Named = dict[str, str | int]
 
 
 class Facts:
-    """What checks of many rules ask of a sketch again and again."""
+    """Facts about a sketch that the checks of many rules use."""
 
     def __init__(self, sketch: Sketch) -> None:
         self.sketch = sketch
@@ -33,12 +33,12 @@ class Facts:
         self.sound = [rule for rule in sketch.rules if rule.on and rule.id not in self.unfit]
 
     def bound(self, rule: SketchRule) -> int:
-        """Return how many robots a rule binds, all of whom take its decision."""
+        """Return the number of robots of a rule, all of which have its decision."""
         return len(rule.robots or self.deciders[rule.decision])
 
 
 def _first(facts: Facts, rule: SketchRule) -> Trouble | None:
-    """Return what is wrong with a rule first."""
+    """Return the first error of a rule."""
     return next(_of_rule(facts, rule), None)
 
 
@@ -66,7 +66,7 @@ def _trouble(rule: SketchRule, key: str, **named: str | int) -> Trouble:
 
 
 def _of_robots(facts: Facts, rule: SketchRule, entry: PaletteRule) -> Iterator[Trouble]:
-    """Yield what is wrong with the robots that a rule binds."""
+    """Yield the errors of a rule's robots."""
     stranger, twice = strangers(rule.robots, facts.robots), repeated(rule.robots)
     idle = strangers(rule.robots, facts.deciders[rule.decision])
     count = facts.bound(rule)
@@ -88,7 +88,7 @@ def _of_robots(facts: Facts, rule: SketchRule, entry: PaletteRule) -> Iterator[T
 
 
 def _of_opening(given: Setting | None, opening: RuleField, values: set[int | str]) -> str | None:
-    """Return what is wrong with what fills an opening. None: nothing."""
+    """Return the key of the error in a field; None if its value is valid."""
     match opening.form:
         case Form.NUMBER:
             fits = isinstance(given, int) and opening.least <= given <= opening.most
@@ -117,9 +117,9 @@ def _is_value(given: object, values: set[int | str]) -> bool:
 
 
 def of_secrets(facts: Facts) -> Iterator[Trouble]:
-    """Yield private rules of two in a team that has costs: no protocol keeps secrets then.
+    """Yield private rules of two robots in a team with costs: no protocol for costs supports private rules.
 
-    What only one robot takes part in, nobody else learns anyway.
+    Rules of a single robot are never disclosed.
     """
     if any(rule.cost is not None or PALETTE[rule.kind].graded for rule in facts.sound):
         for rule in facts.sound:
@@ -128,7 +128,7 @@ def of_secrets(facts: Facts) -> Iterator[Trouble]:
 
 
 def why_not_private(sketch: Sketch, rule: SketchRule) -> Trouble | None:
-    """Return why a rule cannot be made private as the team stands. None: it can be."""
+    """Return the reason why a rule cannot be private in the present team; None if it can be."""
     entry = PALETTE.get(rule.kind)
     if entry is None or entry.links == Links.EACH:
         return None
@@ -140,7 +140,7 @@ def why_not_private(sketch: Sketch, rule: SketchRule) -> Trouble | None:
 
 
 def why_no_cost(sketch: Sketch, rule: SketchRule | None = None) -> Trouble | None:
-    """Return why a rule (None: a new one) cannot cost anything as the team stands. None: it can."""
+    """Return the reason why a rule (None: a new one) cannot have a cost in the present team; None if it can."""
     for other in sketch.rules:
         entry = PALETTE.get(other.kind)
         if other.on and other.private and entry is not None and entry.links != Links.EACH:
@@ -154,7 +154,7 @@ def _is_graded(rule: SketchRule) -> bool:
 
 
 def of_number(facts: Facts) -> Iterator[Trouble]:
-    """Yield the rule with which there are too many constraints."""
+    """Yield the first rule with which the number of constraints exceeds the limit."""
     total = 0
     for rule in facts.sound:
         total += _links(facts, rule)
@@ -164,7 +164,7 @@ def of_number(facts: Facts) -> Iterator[Trouble]:
 
 
 def _links(facts: Facts, rule: SketchRule) -> int:
-    """Return how many constraints a rule becomes. They are counted one by one only where that can be too many."""
+    """Return the number of constraints of a rule, or an upper bound that is far below the limit."""
     entry, count = PALETTE[rule.kind], facts.bound(rule)
     most = count * (count - 1) // 2
     match entry.links:

@@ -1,4 +1,4 @@
-"""Undo and redo: the sketches that there were."""
+"""Undo and redo of edits."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ import msgspec
 from robochoc.app.sketch.sketch import Sketch
 
 MAX_STEPS = 200
-"""So many steps can be undone."""
+"""The maximum number of undo steps."""
 
 
 class History(msgspec.Struct, frozen=True):
-    """A sketch, those before it, and those that were undone. `after` has the next one last."""
+    """A sketch, the earlier ones, and the undone ones; the next one for redo is the last of `after`."""
 
     now: Sketch
     before: tuple[Sketch, ...] = ()
     after: tuple[Sketch, ...] = ()
 
     def edited(self, sketch: Sketch) -> History:
-        """Return the history after an edit. What had been undone is gone."""
+        """Return the history after an edit, without redo steps."""
         if sketch == self.now:
             return self
         return History(sketch, (*self.before, self.now)[-MAX_STEPS:])
 
     def undone(self) -> History:
-        """Return the history one step back."""
+        """Return the history after an undo."""
         if not self.before:
             return self
         return History(self.before[-1], self.before[:-1], (*self.after, self.now))
 
     def redone(self) -> History:
-        """Return the history one step forth."""
+        """Return the history after a redo."""
         if not self.after:
             return self
         return History(self.after[-1], (*self.before, self.now), self.after[:-1])

@@ -1,4 +1,4 @@
-"""Opening what somebody has on disk: a folder of a team, an archive of one, or a file of another tool."""
+"""Open a team from disk: its folder, an archive of it, or a file of another tool."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from robochoc.model.problem import Team
 from robochoc.system.temporary_files import PrivateFolder
 
 MAX_FILES = 2_000
-"""Files of a team that are opened. What has more, commands decide without pictures."""
+"""The maximum number of files of a team. Larger teams can be solved by commands."""
 MAX_BYTES = 64 << 20
-"""Bytes of all files of a team, or of a file of another tool."""
+"""The maximum number of bytes of all files of a team, or of a file of another tool."""
 _PARTS = re.compile(r"(?:(?!late\d*/)[^/]+/)?((?:late\d*/)?[^/]+\.xml|sketch\.json)")
-"""What is taken of an archive: files of a team, which may all be in one folder."""
+"""The files that are unpacked from an archive: those of a team, which may be in a folder."""
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError)
-"""What reading a damaged archive raises."""
+"""The exceptions of reading a damaged archive."""
 
 
 @dataclass(frozen=True)
 class ForeignTeam:
-    """A team that was not drawn here, or not only: it can be solved, flown and compared, but not edited by hand.
+    """An imported team, which can be solved, flown and compared, but not edited.
 
     Attributes:
-        path: What was opened.
+        path: The opened file or folder.
         team: The team.
-        changed: Files that were changed by hand since it was drawn here; none: it never was.
-        notes: What has been changed when it was imported, in sentences.
+        changed: Of a team that was drawn here, the files that were changed later; else empty.
+        notes: Changes by the import, in sentences.
     """
 
     path: Path
@@ -59,12 +59,12 @@ class ForeignTeam:
 
     @property
     def variables(self) -> int:
-        """How many variables it has."""
+        """The number of variables."""
         return len(self.team.variables)
 
     @property
     def constraints(self) -> int:
-        """How many constraints it has."""
+        """The number of constraints."""
         return sum(1 for _ in self.team.constraints())
 
     def save(self, folder: Path, *, replace: bool = False) -> None:
@@ -73,28 +73,28 @@ class ForeignTeam:
 
 
 def opened(path: Path, *more: Path) -> Sketch | ForeignTeam:
-    """Return what is at `path`: the sketch if a team was drawn here and is as it was, or else a team that is as it is.
+    """Return the team at `path`: the sketch if it was drawn here and is unchanged, or else an imported team.
 
     Args:
         path: A team's folder, a ZIP archive of one, or a file that `robochoc import` reads.
         *more: Further files of the same problem, for formats with several.
 
     Raises:
-        InvalidInputError: if it is nothing of these, too large, or has mistakes.
-        OSError: if it cannot be read.
+        InvalidInputError: if the format is unknown, the files are too large, or they have errors.
+        OSError: if a file cannot be read.
     """
     if path.is_dir() and not more:
         return _folder(path)
     for file in (path, *more):
         if beginning_of(file) is None:
-            raise invalid_input(file, "it is no file that can be read", "choose a team's folder, or a file")
+            raise invalid_input(file, "this is not a readable file", "choose a team's folder, or a file")
         if file.stat().st_size > MAX_BYTES:
             raise _too_large(file)
     if not more and zipfile.is_zipfile(path):
         return _archive(path)
     if recognise(path) is None:
         if path.suffix.lower() == ".xml":
-            raise invalid_input(path, "it is of no format that is read here", "of a robot, open the team's folder")
+            raise invalid_input(path, "the XML format is unknown", "to open a robot's file, open the team's folder")
         raise unknown_format(path)
     imported = read_foreign([path, *more], ImportOptions())
     return ForeignTeam(path, imported.team, notes=tuple(note.text for note in imported.notes))
@@ -107,7 +107,7 @@ def _folder(folder: Path) -> Sketch | ForeignTeam:
 
 
 def _xml_in(folder: Path) -> dict[str, bytes]:
-    """Return the XML files of a team's folder, those of robots that join included, by their paths there."""
+    """Return the XML files of a team's folder, also those of robots that join later, by their relative paths."""
     found: dict[str, bytes] = {}
     total = 0
     for place in [folder, *folder.glob("late*")]:
@@ -116,7 +116,7 @@ def _xml_in(folder: Path) -> dict[str, bytes]:
             total += status.st_size
             if len(found) >= MAX_FILES or total > MAX_BYTES:
                 raise _too_large(folder)
-            if stat.S_ISREG(status.st_mode):  # of anything else, reading the team tells
+            if stat.S_ISREG(status.st_mode):  # reading the team reports other kinds of files
                 found[file.relative_to(folder).as_posix()] = file.read_bytes()
     return found
 
@@ -130,7 +130,7 @@ def _archive(path: Path) -> Sketch | ForeignTeam:
         except InvalidInputError:
             raise
         except DAMAGED as damaged:
-            raise invalid_input(path, f"it is damaged: {damaged}", "make the archive again") from None
+            raise invalid_input(path, f"the archive is damaged: {damaged}", "create the archive again") from None
         try:
             found = _folder(folder)
         except InvalidInputError as invalid:
@@ -139,7 +139,7 @@ def _archive(path: Path) -> Sketch | ForeignTeam:
 
 
 def _unpack(path: Path, folder: Path) -> None:
-    """Write the files of a team that are in an archive into a folder, within bounds. No path leads out of it."""
+    """Unpack the team's files of an archive into a folder, within bounds. No path leads out of the folder."""
     taken: set[str] = set()
     left = MAX_BYTES
     with bounded_archive(path) as archive:
@@ -160,20 +160,20 @@ def _unpack(path: Path, folder: Path) -> None:
             target.parent.mkdir(exist_ok=True)
             target.write_bytes(content)
     if not taken:
-        raise invalid_input(path, "there is no team in it: no XML file", "choose an archive of one team's folder")
+        raise invalid_input(path, "the archive has no team: no XML file", "choose an archive of one team's folder")
 
 
 def _too_large(path: Path) -> InvalidInputError:
-    hint = "'robochoc solve' decides it without pictures"
-    return invalid_input(path, f"it is too large: at most {MAX_FILES:,} files and {MAX_BYTES >> 20} MiB", hint)
+    hint = "use 'robochoc solve'"
+    return invalid_input(path, f"the team has more than {MAX_FILES:,} files or {MAX_BYTES >> 20} MiB", hint)
 
 
 def _two_teams(path: Path, name: str) -> InvalidInputError:
-    return invalid_input(path, f"{name} is in it twice", "choose an archive of one team's folder")
+    return invalid_input(path, f"the archive has {name} twice", "choose an archive of one team's folder")
 
 
 def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
-    """Return mistakes with paths in the archive, and not in the folder where it was looked at."""
+    """Return the errors with paths in the archive, instead of paths in the temporary folder."""
     inside = f"{place}{os.sep}"
     return [
         replace(one, file=one.file.removeprefix(inside), message=one.message.replace(inside, ""))

@@ -1,8 +1,8 @@
-"""The palette: every rule that a user can apply without writing a formula.
+"""The palette: all rules that a user can apply without writing a formula.
 
-A rule of the palette says which decisions it fits, what its words leave open, which robots it links in the picture, and
-what it is as a constraint, over terms of a `robochoc.Model`, or over written Python, which the user can copy
-(`written`). Over values it is true or false. Its words are in the catalogue of texts (`app/texts`), under `rule.KEY`.
+A rule of the palette defines the kinds of decisions that it fits, its fields, the robots that it links in the picture,
+and its condition. The condition can be applied to terms of a `robochoc.Model`, to Python text, which the user can copy
+(`written`), and to values, for which it is true or false. Its sentence is in the catalogue (`app/texts`): `rule.KEY`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NAMED = ALL_KINDS - NUMBERED
 
 
 class Form(StrEnum):
-    """What fills an opening in a rule's words."""
+    """The form of a rule's field."""
 
     NUMBER = "number"
     """An integer from `least` to `most`."""
@@ -33,29 +33,29 @@ class Form(StrEnum):
     VALUES = "values"
     """Some values of the decision."""
     TABLE = "table"
-    """Pairs of values, clicked together."""
+    """Pairs of values, chosen by clicks."""
 
 
 class Links(StrEnum):
-    """Whom a rule links, and so what is drawn, and what is a constraint of its own."""
+    """The robots of each link of a rule: each link is one constraint, and one line in the picture."""
 
     EACH = "each"
-    """It is about every robot by itself."""
+    """Each robot."""
     PAIRS = "pairs"
-    """About every two of them."""
+    """Each pair of robots."""
     NEIGHBOURS = "neighbours"
-    """About every two that stand near each other: within the setting `radius`."""
+    """Each pair of robots within the setting `radius`."""
     STAR = "star"
-    """About the first robot and every other one."""
+    """The first robot and each other one."""
     CHAIN = "chain"
-    """About every robot and the next one in the rule's order."""
+    """Each robot and the next one in the rule's order."""
     GROUP = "group"
-    """About all of them at once."""
+    """All robots together."""
 
 
 @dataclass(frozen=True)
 class RuleField:
-    """What a rule's words leave open: `name` is its name among the rule's settings."""
+    """A field of a rule, which the user fills; `name` is its key in the rule's settings."""
 
     name: str
     form: Form
@@ -66,7 +66,7 @@ class RuleField:
 
 @dataclass(frozen=True)
 class Applied:
-    """A rule as it stands in a sketch."""
+    """A rule in its sketch."""
 
     sketch: Sketch
     rule: SketchRule
@@ -75,35 +75,35 @@ class Applied:
         """Return a setting that is a number."""
         value = self.rule.settings[name]
         if not isinstance(value, int):
-            raise TypeError(f"{name} is {value!r}, no number")
+            raise TypeError(f"{name} is {value!r}, not a number")
         return value
 
     def value(self, name: str) -> int | str:
         """Return a setting that is a value."""
         value = self.rule.settings[name]
         if not isinstance(value, (int, str)):
-            raise TypeError(f"{name} is {value!r}, no value")
+            raise TypeError(f"{name} is {value!r}, not a value")
         return value
 
     def values(self, name: str) -> list[int | str]:
         """Return a setting that is a list of values."""
         values = self.rule.settings[name]
         if not isinstance(values, list):
-            raise TypeError(f"{name} is {values!r}, no list")
+            raise TypeError(f"{name} is {values!r}, not a list")
         return [value for value in values if isinstance(value, (int, str))]
 
     def rows(self, name: str) -> list[tuple[int | str, int | str]]:
         """Return a setting that is a table of pairs."""
         rows = self.rule.settings[name]
         if not isinstance(rows, list):
-            raise TypeError(f"{name} is {rows!r}, no table")
+            raise TypeError(f"{name} is {rows!r}, not a table")
         return [(row[0], row[1]) for row in rows if isinstance(row, list)]
 
     @property
     def kind(self) -> Kind:
-        """What the rule's decision is about."""
+        """The kind of the rule's decision."""
         decision = self.sketch.decision(self.rule.decision)
-        assert decision is not None, "a rule is applied to a decision that there is"  # noqa: S101
+        assert decision is not None, "the decision of an applied rule exists"  # noqa: S101
         return decision.kind
 
 
@@ -114,14 +114,13 @@ class PaletteRule:
     Attributes:
         key: Its name.
         kinds: The kinds of decisions that it fits.
-        links: Whom it links.
-        openings: What its words leave open.
-        condition: Makes the condition over the decisions of the robots of one link: of one, of two, or of all of them.
-            Of a rule that is graded, it makes the cost.
-        fewest: How many robots it binds at least.
-        most: How many at most. None: any number.
-        graded: It has costs by degrees, and can never be broken.
-        has_order: The order of its robots matters.
+        links: The robots of its links.
+        openings: Its fields.
+        condition: Returns the condition over the decisions of the robots of one link; for a graded rule, the cost.
+        fewest: The minimum number of robots.
+        most: The maximum number of robots. None: any number.
+        graded: Whether the rule has graded costs, and cannot be violated.
+        has_order: Whether the order of its robots matters.
     """
 
     key: str
@@ -135,11 +134,11 @@ class PaletteRule:
     has_order: bool = False
 
     def holds(self, given: Applied, values: Sequence[int | str]) -> bool:
-        """Return whether robots with these values, in the order of a link, keep the rule. A graded one holds always."""
+        """Return whether robots with these values, in the order of a link, satisfy the rule, as graded ones always do."""
         return self.graded or bool(self.condition(given, cast("Sequence[Operand]", values)))
 
     def groups(self, sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, ...]]:
-        """Yield the robots of each link: one constraint, and one line in the picture."""
+        """Yield the robots of each link."""
         bound = sketch.bound(rule)
         match self.links:
             case Links.EACH:
@@ -158,7 +157,7 @@ class PaletteRule:
 
 
 def allowed(pair: Sequence[Operand], rows: list[tuple[int | str, int | str]]) -> Operand:
-    """Return that a pair of decisions is one of `rows`."""
+    """Return the condition that a pair of decisions is one of `rows`."""
     if isinstance(pair[0], Written):
         return Written.call("robochoc.allowed", [*pair], rows)
     if isinstance(pair[0], Term):
@@ -167,12 +166,12 @@ def allowed(pair: Sequence[Operand], rows: list[tuple[int | str, int | str]]) ->
 
 
 def within(one: Operand, values: list[int | str]) -> Operand:
-    """Return that a decision is one of `values`."""
+    """Return the condition that a decision is one of `values`."""
     return one.is_in(values) if isinstance(one, (Written, Term)) else cast("Operand", cast("object", one) in values)
 
 
 def count(group: Sequence[Operand], value: int | str) -> Operand:
-    """Return how many of the decisions are `value`."""
+    """Return the number of decisions that are `value`."""
     if isinstance(group[0], Each):
         return Written(f"sum({equal(group[0], value)} for a in {group[0].over})")
     if isinstance(group[0], Written):
@@ -181,17 +180,17 @@ def count(group: Sequence[Operand], value: int | str) -> Operand:
 
 
 def equal(one: object, other: object) -> Operand:
-    """Return the condition that two are the same."""
+    """Return the condition that two decisions are equal."""
     return cast("Operand", one == other)
 
 
 def unequal(one: object, other: object) -> Operand:
-    """Return the condition that two differ."""
+    """Return the condition that two decisions differ."""
     return cast("Operand", one != other)
 
 
 def _neighbours(sketch: Sketch, bound: Sequence[str], radius: object) -> Iterator[tuple[str, str]]:
-    """Yield the pairs that stand near each other. The map is cut into squares: only those around one are looked at."""
+    """Yield the pairs of robots within the radius, found by a grid of squares: only adjacent squares are searched."""
     reach = radius if isinstance(radius, int) else 0
     side = max(1, reach)
     standing = {robot.name: robot.at for robot in sketch.robots}

@@ -1,4 +1,4 @@
-"""The rules of the palette, each said once. `PALETTE` has them all, in the order of the menu."""
+"""The rules of the palette, in `PALETTE`, in the order of the menu."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Group = Sequence[Operand]
 
 
 def _squared(given: Applied, pair: Group) -> Operand:
-    """Return the square of the distance of two cells of the map, or of a cell and a robot's own."""
+    """Return the squared distance of two cells of the map, or of a cell and a robot's cell."""
     one, other = pair
     columns = given.sketch.area.columns
     across, along = one % columns - other % columns, one // columns - other // columns
@@ -93,7 +93,7 @@ def _rather(given: Applied, alone: Group) -> Operand:
     wish, step = given.value("value"), given.number("step")
     if given.kind != Kind.PLACE or not isinstance(wish, int):
         return abs(alone[0] - wish) * step
-    columns = given.sketch.area.columns  # steps on the map go across, and along
+    columns = given.sketch.area.columns  # the number of horizontal and vertical steps on the map
     return (abs(alone[0] % columns - wish % columns) + abs(alone[0] // columns - wish // columns)) * step
 
 

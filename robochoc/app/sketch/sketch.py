@@ -1,8 +1,6 @@
-"""A sketch: a team as somebody has drawn it, before it is a problem.
+"""A sketch: a team as the user has drawn it, with the robots' decisions and rules.
 
-A sketch says in a few words of everyday language what robots decide, and which rules they follow. It is data, nothing
-is computed in it, and nothing in it is changed: an edit (`edits`) returns another sketch. `building` makes a
-`robochoc.Model` of it.
+A sketch is immutable data: an edit (`edits`) returns another sketch. `building` converts it to a `robochoc.Model`.
 """
 
 from __future__ import annotations
@@ -12,26 +10,26 @@ from enum import StrEnum
 import msgspec
 
 MAX_ROBOTS = 1_000
-"""What a picture can show, and a hand can model. Larger teams are made by `robochoc generate`, or in Python."""
+"""The limit for a picture and for modelling by hand. Make larger teams by `robochoc generate`, or in Python."""
 MAX_SIDE = 60
-"""Columns, or rows, of a map."""
+"""The maximum number of columns, and of rows, of a map."""
 MAX_VALUES = 4_000
-"""Values of one decision."""
+"""The maximum number of values of one decision."""
 MAX_RULES = 2_000
 MAX_DECISIONS = 12
 MAX_COST = 1_000_000
 MAX_LABEL = 60
-"""Characters of a name that a user gives."""
+"""The maximum number of characters of a name."""
 
 
 Value = int | str
 """A value of a decision."""
 Setting = Value | list[Value | list[Value]]
-"""What fills an opening of a rule's words: a number or a value, values, or rows of values."""
+"""The value of a rule's field: a number or a value, several values, or rows of values."""
 
 
 class Kind(StrEnum):
-    """What a decision is about. It tells how its values are written, and how they are shown."""
+    """The kind of a decision, which determines the form of its values and how they are shown."""
 
     LEVEL = "level"
     """A height: numbers."""
@@ -48,7 +46,7 @@ class Kind(StrEnum):
 
 
 NUMBERED = frozenset({Kind.LEVEL, Kind.PLACE, Kind.SLOT, Kind.CHANNEL})
-"""Kinds whose values are numbers: they can be compared, and be apart from each other."""
+"""Kinds whose values are numbers, which can be compared and subtracted."""
 
 
 class Cell(msgspec.Struct, forbid_unknown_fields=True, frozen=True, order=True):
@@ -59,7 +57,7 @@ class Cell(msgspec.Struct, forbid_unknown_fields=True, frozen=True, order=True):
 
 
 class Area(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """The map: how large it is, and which cells nobody can be at."""
+    """The map: its size, and its blocked cells."""
 
     columns: int = 8
     rows: int = 6
@@ -70,7 +68,7 @@ class Area(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return cell.y * self.columns + cell.x
 
     def cell(self, number: int) -> Cell:
-        """Return the cell of that number."""
+        """Return the cell with this number."""
         return Cell(number % self.columns, number // self.columns)
 
     def has(self, cell: Cell) -> bool:
@@ -89,9 +87,9 @@ class SketchRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     Attributes:
         name: Its name.
-        at: The cell in which it stands.
-        weight: How much its stepping aside counts.
-        rank: Robots with a higher rank are above others.
+        at: Its cell.
+        weight: The weight of its withdrawal.
+        rank: Its rank; robots with a higher rank have a higher priority.
     """
 
     name: str
@@ -101,13 +99,13 @@ class SketchRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Decision(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What robots decide.
+    """A decision of robots.
 
     Attributes:
-        name: Its name, such as `slot`: each robot gets a variable of that name.
-        kind: What it is about.
-        values: Its values: all numbers, or all names, as `kind` has it. Empty for a place: the map's free cells.
-        robots: Who decides it. Empty: everybody.
+        name: Its name, such as `slot`: each robot has a variable with this name.
+        kind: Its kind.
+        values: Its values: all numbers or all names, depending on `kind`. Empty for a place: the map's free cells.
+        robots: The robots with this decision. Empty: all robots.
     """
 
     name: str
@@ -117,18 +115,18 @@ class Decision(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A rule of the palette, applied.
+    """A rule of the palette in a sketch.
 
     Attributes:
         id: Its name in the team: `R1`, `R2`, ...
-        kind: Which rule of the palette (`palette.PALETTE`).
-        decision: The decision that it is about.
-        robots: Whom it binds. Empty: everybody who takes the decision. For rules with a leader, the first one leads.
-        settings: What the rule's words leave open, by name: a number, a value, or several values.
-        cost: What it costs to break it. None: it must hold.
-        private: Nobody but the robot whose rule it is may learn of it: of two robots, the first one. (What is about one
-            robot alone, nobody else learns in any case.)
-        on: Whether it counts at present.
+        kind: The key of the rule in the palette (`palette.PALETTE`).
+        decision: The decision that it restricts.
+        robots: The robots of the rule. Empty: all robots with the decision. In rules with a leader, the first one.
+        settings: The values of the rule's fields, by name: a number, a value, or several values.
+        cost: The cost of a violation. None: a hard rule.
+        private: Whether only the rule's owner knows it: of two robots, the first one. (Other robots never learn rules
+            of a single robot.)
+        on: Whether the rule is active.
     """
 
     id: str
@@ -142,15 +140,15 @@ class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A team as it was drawn.
+    """A team as drawn by the user.
 
     Attributes:
         name: Its name.
         area: The map.
-        robots: The robots, in the order in which they were added.
-        decisions: What they decide.
-        rules: What they follow.
-        story: A sentence about it, for the gallery.
+        robots: The robots, in the order of their creation.
+        decisions: Their decisions.
+        rules: Their rules.
+        story: A description for the gallery.
     """
 
     name: str = "team"
@@ -162,28 +160,28 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def is_ranked(self) -> bool:
-        """Whether somebody has said who is above whom."""
+        """Whether robots have ranks."""
         return any(robot.rank for robot in self.robots)
 
     @property
     def flies(self) -> bool:
-        """Whether somebody decides where to be: a level, or a place."""
+        """Whether some decisions are positions of robots: levels or places."""
         return any(decision.kind in {Kind.LEVEL, Kind.PLACE} for decision in self.decisions)
 
     def robot(self, name: str) -> SketchRobot | None:
-        """Return the robot of that name, if there is one."""
+        """Return the robot with this name, if there is one."""
         return next((robot for robot in self.robots if robot.name == name), None)
 
     def decision(self, name: str) -> Decision | None:
-        """Return the decision of that name, if there is one."""
+        """Return the decision with this name, if there is one."""
         return next((decision for decision in self.decisions if decision.name == name), None)
 
     def rule(self, name: str) -> SketchRule | None:
-        """Return the rule of that name, if there is one."""
+        """Return the rule with this name, if there is one."""
         return next((rule for rule in self.rules if rule.id == name), None)
 
     def deciders(self, decision: Decision) -> tuple[str, ...]:
-        """Return who takes a decision, in the order of the robots."""
+        """Return the robots with a decision, in the order of the robots."""
         chosen = set(decision.robots)
         return tuple(robot.name for robot in self.robots if not chosen or robot.name in chosen)
 
@@ -192,7 +190,7 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return self.area.free if decision.kind == Kind.PLACE and not decision.values else decision.values
 
     def bound(self, rule: SketchRule) -> tuple[str, ...]:
-        """Return whom a rule binds: those of its robots that take its decision, in the rule's order."""
+        """Return the robots of a rule that have its decision, in the rule's order."""
         decision = self.decision(rule.decision)
         if decision is None:
             return ()

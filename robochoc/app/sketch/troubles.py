@@ -1,4 +1,4 @@
-"""What is wrong with a sketch, each told at the element that it is about, with what to do."""
+"""Errors of a sketch and hints, each with its element and a remedy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robochoc.system.errors import TransferableError
 
 
 class About(StrEnum):
-    """What kind of element a trouble is told at."""
+    """The kind of element to which a trouble belongs."""
 
     TEAM = "team"
     MAP = "map"
@@ -21,23 +21,23 @@ class About(StrEnum):
 
 
 class Severity(StrEnum):
-    """How bad it is."""
+    """The severity of a trouble."""
 
     ERROR = "error"
-    """The sketch is no team before that is mended."""
+    """The sketch cannot be converted to a team."""
     HINT = "hint"
-    """It is a team, but it is probably not what was meant, or cannot be decided."""
+    """The sketch can be converted, but it is probably not as intended, or cannot be solved."""
 
 
 class Trouble(msgspec.Struct, frozen=True):
-    """One thing that is wrong.
+    """An error or a hint.
 
     Attributes:
-        about: What kind of element it is told at.
+        about: The kind of its element.
         element: The element: the name of a robot or a decision, the id of a rule, or `map`, or `team`.
         key: The key of its text in the catalogue.
-        named: What the text names.
-        severity: How bad it is.
+        named: The arguments of the text.
+        severity: The severity.
     """
 
     about: About
@@ -48,36 +48,36 @@ class Trouble(msgspec.Struct, frozen=True):
 
     @property
     def remedy_key(self) -> str:
-        """The key of the text that says what to do."""
+        """The key of the remedy's text."""
         return f"{self.key}-remedy"
 
     @property
     def text(self) -> str:
-        """What is wrong, in words."""
+        """The text of the error or hint."""
         return say(self.key, **self.named)
 
     @property
     def remedy(self) -> str:
-        """What to do, in words."""
+        """The text of the remedy."""
         return say(self.remedy_key, **self.named)
 
     @property
     def is_error(self) -> bool:
-        """Whether the sketch is no team with it."""
+        """Whether the sketch cannot be converted to a team."""
         return self.severity == Severity.ERROR
 
 
 class NotReadyError(TransferableError, ValueError):
-    """A sketch is no team yet: something has to be mended first. The message says what, and how."""
+    """A sketch cannot be converted to a team. The message has the error and its remedy."""
 
     def __init__(self, trouble: Trouble) -> None:
         super().__init__(f"{trouble.text} {trouble.remedy}")
 
 
 def shortened(name: object) -> str:
-    """Return something that a user, or a file, has named, as it may stand in a sentence."""
+    """Return a name from the user or a file, shortened for use in a sentence."""
     most = 60
     if isinstance(name, int) and abs(name) >= 10**most:
-        return f"{str(name >> name.bit_length() - 60)[:6]}..."  # Python writes no integer of thousands of digits
+        return f"{str(name >> name.bit_length() - 60)[:6]}..."  # Python converts no integers with thousands of digits
     text = str(name)
     return text if len(text) <= most else f"{text[: most - 3]}..."

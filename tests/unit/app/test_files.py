@@ -170,7 +170,7 @@ def test_nothing_of_an_archive_leaves_its_folder(tmp_path: Path) -> None:
     ann = xml_sources(TEAM)["Ann.xml"].encode()
     names = ("../Ann.xml", "/Ann.xml", "a/../../Ann.xml", "../../etc/Ann.xml")
     path = archive(tmp_path / "a.zip", *((name, ann) for name in names))
-    assert "no team in it" in refused(path)
+    assert "the archive has no team" in refused(path)
     assert [*tmp_path.rglob("*.xml")] == []
 
 
@@ -178,9 +178,9 @@ def test_an_archive_that_is_much_larger_than_it_looks_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(opening, "MAX_BYTES", 100_000)
-    assert "too large" in refused(archive(tmp_path / "a.zip", ("A.xml", b" " * 200_000)))
+    assert "has more than" in refused(archive(tmp_path / "a.zip", ("A.xml", b" " * 200_000)))
     monkeypatch.setattr(opening, "MAX_FILES", 3)
-    assert "too large" in refused(archive(tmp_path / "b.zip", *((f"A{number}.xml", b"") for number in range(5))))
+    assert "has more than" in refused(archive(tmp_path / "b.zip", *((f"A{number}.xml", b"") for number in range(5))))
 
 
 def test_mistakes_in_an_archive_are_told_by_the_names_in_it(tmp_path: Path) -> None:
@@ -239,14 +239,14 @@ def test_a_sketch_that_is_too_large_or_no_file_is_told(folder: Path) -> None:
     assert "too large" in refused(folder)
     (folder / "sketch.json").unlink()
     os.mkfifo(folder / "sketch.json")
-    assert "no file" in refused(folder)
+    assert "not a file" in refused(folder)
 
 
 def test_a_sketch_with_errors_is_told_though_nothing_was_changed(tmp_path: Path) -> None:
     robots = (SketchRobot("<script>", Cell(0, 0)),)
     hostile, ann = msgspec.structs.replace(TEAM, robots=robots), xml_sources(TEAM)["Ann.xml"].encode()
     (tmp_path / "Ann.xml").write_bytes(ann)
-    (tmp_path / "sketch.json").write_bytes(files.kept(hostile, {"Ann.xml": ann}))
+    (tmp_path / "sketch.json").write_bytes(files.sketch_file(hostile, {"Ann.xml": ann}))
     assert "cannot be the name of a robot" in refused(tmp_path)
 
 
