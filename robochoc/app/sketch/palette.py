@@ -134,7 +134,7 @@ class PaletteRule:
     has_order: bool = False
 
     def holds(self, given: Applied, values: Sequence[int | str]) -> bool:
-        """Return whether robots with these values, in the order of a link, satisfy the rule, as graded ones always do."""
+        """Return whether robots with these values, in the order of a link, satisfy the rule (always if graded)."""
         return self.graded or bool(self.condition(given, cast("Sequence[Operand]", values)))
 
     def groups(self, sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, ...]]:
