@@ -21,7 +21,7 @@ class _Kept(NamedTuple):
     weight: int
 
 
-class RosInbox:
+class MessageInbox:
     """Messages in the order in which they came. Any thread may put some in; one takes them.
 
     A topic with too many loses its own oldest messages, not those of others: batteries that report ten times a second

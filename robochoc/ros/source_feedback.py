@@ -11,7 +11,7 @@ from robochoc.flight.mission import Leg, MissionBuilder
 from robochoc.flight.reports import Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.closed_loop import TOGETHER_S, Feedback
-from robochoc.robots.inbox import RosInbox, weight_of
+from robochoc.robots.inbox import MessageInbox, weight_of
 from robochoc.robots.source import REPORTS, ReceivedMessage, Source, SourceError
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sim_clock import CLOCK, SimClock, with_clock
@@ -44,7 +44,7 @@ class SourceFeedback(Feedback):
         self._kept: Report | None = None
         self._now_ns: int | None = None
         self._sim = SimClock() if sim_time else None
-        self._early = RosInbox()
+        self._early = MessageInbox()
         self._last = math.inf
         self._idle_s = time.monotonic()
         source.assign(decoder.namespaces)

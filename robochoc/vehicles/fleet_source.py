@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.robots.inbox import RosInbox
+from robochoc.robots.inbox import MessageInbox
 from robochoc.robots.sink import Fields
 from robochoc.robots.source import REPORTS, ReceivedMessage, Source, SourceError
 from robochoc.vehicles.fleet import FleetError, read_fleet
@@ -43,7 +43,7 @@ class FleetSource(Source):
         self._is_closed = False
         self._charges: dict[str, float] = {}
         self._out: set[str] = set()
-        self._inbox = RosInbox()
+        self._inbox = MessageInbox()
 
     @property
     def is_busy(self) -> bool:

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.robots.inbox import RosInbox
+from robochoc.robots.inbox import MessageInbox
 from robochoc.robots.sink import SinkError
 from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.live import rosbridge_connection
@@ -339,7 +339,7 @@ def test_what_we_send_we_understand(stamp: int, fields: dict[str, object]) -> No
 
 
 def test_a_loud_topic_does_not_push_out_others() -> None:
-    inbox = RosInbox(per_topic=10, weight=1000)
+    inbox = MessageInbox(per_topic=10, weight=1000)
     inbox.put(ReceivedMessage("/blocked", "a", {}, 0))
     for number in range(100):
         inbox.put(ReceivedMessage("/battery", "b", {}, number))

@@ -9,21 +9,18 @@ import time
 from collections.abc import Collection, Mapping
 from typing import NoReturn
 
-from robochoc.robots.inbox import PER_TOPIC_MAX, RosInbox, weight_of
-from robochoc.robots.sink import Fields, Sink, SinkError
-from robochoc.robots.source import ReceivedMessage, Source, SourceError
+from robochoc.robots.inbox import PER_TOPIC_MAX
+from robochoc.robots.sink import Fields, SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.subscribers import await_subscribers
+from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource
 from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
 from robochoc.ros.names import is_for_waypoints
 
 WAIT_S = 2.0
 """The default wait for subscribers, in seconds."""
-STUCK_S = 10.0
-"""The longest time for which a subscriber may leave messages unacknowledged, in seconds."""
-LINGER_S = 0.3
-"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
 
 _PUBLISHED = Quality(reliable=True, latched=True, depth=1, wait_s=WAIT_S)
 _RECEIVED = Quality(reliable=False, latched=False, depth=PER_TOPIC_MAX)
@@ -32,7 +29,7 @@ _CDR = (b"\0\0", b"\0\1")
 """The first bytes of messages in CDR, big-endian and little-endian."""
 
 
-class DdsSink(Sink):
+class DdsSink(LiveSink):
     """Publishes in a domain of DDS. Topics are latched, unless the place says otherwise.
 
     Messages begin to leave when each waypoint's topic has a subscriber, or when the wait for that is over.
@@ -42,19 +39,15 @@ class DdsSink(Sink):
         self._place = DdsPlace.of(place, _PUBLISHED, (*_OPTIONS, "wait"), SinkError)
         super().__init__(f"domain {self._place.domain} of DDS")
         self._participant = Participant(self._place, SinkError)
-        self._topics: dict[str, str] = {}
 
-    def advertise(self, topics: Mapping[str, str]) -> None:
+    def _announce(self, topics: Mapping[str, str]) -> None:
         """Announce `topics`, and wait for the subscribers of waypoints."""
-        new = {topic: kind for topic, kind in topics.items() if topic not in self._topics}
-        for topic, kind in new.items():
+        for topic, kind in topics.items():
             self._participant.announce(topic, kind)
-            self._topics[topic] = kind
-        self._gather([topic for topic, kind in new.items() if is_for_waypoints(topic, kind)])
+        self._gather([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
 
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
-        """Send a message. Waits where a subscriber is far behind."""
-        self.advertise({topic: kind})
+    def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
+        """Send a message. Waits while a subscriber is far behind."""
         try:
             content = types_of(2).encode(kind, fields)
         except (UnknownTypeError, FieldsError) as error:
@@ -69,11 +62,11 @@ class DdsSink(Sink):
         """Wait until all subscribers have acknowledged everything."""
         try:
             until = time.monotonic() + STUCK_S
-            for topic in self._topics:
+            for topic in self._announced:
                 while not self._participant.is_acknowledged(topic):
                     if time.monotonic() > until:
                         self._stuck()
-            if any(self._participant.subscribers(self._topics)):
+            if any(self._participant.subscribers(self._announced)):
                 time.sleep(LINGER_S)
         finally:
             self.discard()
@@ -94,7 +87,7 @@ class DdsSink(Sink):
         )
 
 
-class DdsSource(Source):
+class DdsSource(LiveSource):
     """Receives in a domain of DDS. Messages that are none of their type are ignored.
 
     Its readers are as those of ROS 2 for sensors, if the place does not say otherwise: they take reliable messages and
@@ -103,7 +96,6 @@ class DdsSource(Source):
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._inbox = RosInbox()
         self._participant = Participant(DdsPlace.of(place, _RECEIVED, _OPTIONS, SourceError), SourceError)
         self._subscription = self._participant.subscribe({}, self._receive)
 
@@ -111,10 +103,6 @@ class DdsSource(Source):
         """Subscribe to `topics`."""
         self._subscription.close()
         self._subscription = self._participant.subscribe(topics, self._receive)
-
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest message that is here, or that comes within `wait_s`."""
-        return self._inbox.get(wait_s)
 
     def close(self) -> None:
         """Leave the domain."""
@@ -128,4 +116,4 @@ class DdsSource(Source):
             fields = types_of(2).decode(kind, content)
         except FieldsError:
             return
-        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
+        self._put(topic, kind, fields)

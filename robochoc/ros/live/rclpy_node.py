@@ -20,22 +20,19 @@ from pathlib import Path
 from typing import Any
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.robots.inbox import PER_TOPIC_MAX, RosInbox, weight_of
-from robochoc.robots.sink import Fields, Sink, SinkError
-from robochoc.robots.source import ReceivedMessage, Source, SourceError
+from robochoc.robots.inbox import PER_TOPIC_MAX
+from robochoc.robots.sink import Fields, SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.ros2_names import domain_id
 from robochoc.ros.live.ros_master import Failed
 from robochoc.ros.live.rospy_messages import message_class
 from robochoc.ros.live.subscribers import await_subscribers
+from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource
 from robochoc.ros.names import is_for_waypoints
 
 WAIT_S = 2.0
 """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
-STUCK_S = 10.0
-"""The longest time for which a subscriber may leave a message unacknowledged, in seconds."""
-LINGER_S = 0.3
-"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
 BLOCKED_S = 0.2
 """The time after which a call that waits for others comes back, so that a signal is heard."""
 END_S = 5.0
@@ -141,7 +138,7 @@ def _advice() -> str:
     return f"source {setup} first, or use dds, which needs no ROS here"
 
 
-class RclpySink(Sink):
+class RclpySink(LiveSink):
     """Publishes as a node of ROS 2. Topics are reliable and latched: later subscribers receive the last message.
 
     A topic keeps one message. The next is published when all subscribers have acknowledged the one before, so that they
@@ -155,21 +152,19 @@ class RclpySink(Sink):
         self._publishers: dict[str, Any] = {}
         self._kinds: dict[str, Any] = {}
 
-    def advertise(self, topics: Mapping[str, str]) -> None:
+    def _announce(self, topics: Mapping[str, str]) -> None:
         """Announce `topics`, and wait for the subscribers of waypoints."""
-        new = {topic: kind for topic, kind in topics.items() if topic not in self._kinds}
-        kinds = {topic: message_class(kind, SinkError, "rclpy") for topic, kind in new.items()}
+        kinds = {topic: message_class(kind, SinkError, "rclpy") for topic, kind in topics.items()}
         for topic, kind in kinds.items():
             try:
                 publisher = self._ros.node.create_publisher(kind, topic, self._ros.quality(waypoints=True))
             except Exception as error:
                 raise SinkError(on_one_line(f"{topic} cannot be announced in ROS 2: {_said(error)}")) from error
             self._publishers[topic], self._kinds[topic] = publisher, kind
-        self._gather([topic for topic, kind in new.items() if is_for_waypoints(topic, kind)])
+        self._gather([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
 
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
-        """Publish a message when the one before on its topic was acknowledged."""
-        self.advertise({topic: kind})
+    def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
+        """Send a message once the previous message on its topic was acknowledged."""
         try:
             message = filled(self._kinds[topic](), fields)
         except _WRONG_FIELDS as error:
@@ -221,7 +216,7 @@ class RclpySink(Sink):
             return True
 
 
-class RclpySource(Source):
+class RclpySource(LiveSource):
     """Receives as a node of ROS 2. A thread spins it until the source is closed.
 
     Its subscriptions are as ROS 2 has them for sensors: they take messages of reliable publishers and of others.
@@ -230,8 +225,7 @@ class RclpySource(Source):
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._ros = RclpyNode(place, SourceError)
-        self._inbox = RosInbox()
-        self._over = threading.Event()
+        self._over: threading.Event = threading.Event()
         self._problem = ""
         self._decode: Any = importlib.import_module("rclpy.serialization").deserialize_message
         executors = importlib.import_module("rclpy.executors")
@@ -251,12 +245,9 @@ class RclpySource(Source):
             except Exception as error:
                 raise SourceError(on_one_line(f"{topic} cannot be subscribed to in ROS 2: {_said(error)}")) from error
 
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest message that is here, or that comes within `wait_s`."""
-        received = self._inbox.get(wait_s, over=self._over)
-        if received is None and self._over.is_set():
+    def _check(self) -> None:
+        if self._over.is_set():
             raise SourceError(f"rclpy receives nothing any more ({self._problem or 'closed'}); start again")
-        return received
 
     def close(self) -> None:
         """End the thread, and leave ROS."""
@@ -284,7 +275,7 @@ class RclpySource(Source):
             fields = fields_of(self._decode(content, type_))
         except Exception:  # noqa: BLE001 - bytes that are no message are ignored
             return
-        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
+        self._put(topic, kind, fields)
 
 
 def _said(error: Exception) -> str:

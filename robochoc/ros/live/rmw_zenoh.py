@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from functools import partial
 
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.robots.inbox import RosInbox, weight_of
-from robochoc.robots.sink import Fields, Sink, SinkError
-from robochoc.robots.source import ReceivedMessage, Source, SourceError
+from robochoc.robots.sink import Fields, SinkError
+from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, Topic
 from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosSession
+from robochoc.ros.live.transport import LiveSink, LiveSource
 from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
 
 MESSAGE_BYTES_MAX = 256 * 1024
@@ -20,7 +20,7 @@ MESSAGE_BYTES_MAX = 256 * 1024
 _CHECK_S = 1.0
 
 
-class RmwZenohSink(Sink):
+class RmwZenohSink(LiveSink):
     """Publishes by a zenoh router. Topics are reliable and transient local: late subscribers receive the last message.
 
     With `ROS_DISTRO=humble` keys are those of ROS 2 Humble, which have no hash of the type.
@@ -32,10 +32,9 @@ class RmwZenohSink(Sink):
         self._publishers: dict[str, RosPublisher] = {}
         self._session = RosSession(place, SinkError)
 
-    def advertise(self, topics: Mapping[str, str]) -> None:
-        """Declare publishers, which others see from now on."""
-        new = {topic: kind for topic, kind in topics.items() if topic not in self._publishers}
-        for topic, kind in new.items():
+    def _announce(self, topics: Mapping[str, str]) -> None:
+        """Declare publishers, which are visible from now on."""
+        for topic, kind in topics.items():
             try:
                 type_hash = types_of(2).type_hash(kind)
             except UnknownTypeError as error:
@@ -43,9 +42,8 @@ class RmwZenohSink(Sink):
             named = Topic.of(topic, kind, NO_HASH if self._is_humble else type_hash)
             self._publishers[topic] = self._session.publisher(named)
 
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Publish a message. It leaves in the background."""
-        self.advertise({topic: kind})
+    def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        """Send a message in the background, with the given time."""
         try:
             content = types_of(2).encode(kind, fields)
         except FieldsError as error:
@@ -68,12 +66,11 @@ class RmwZenohSink(Sink):
         self._session.close()
 
 
-class RmwZenohSource(Source):
+class RmwZenohSource(LiveSource):
     """Receives by a zenoh router. Malformed messages, and those of another definition of their type, are ignored."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._inbox = RosInbox()
         self._session = RosSession(place, SourceError)
 
     def listen(self, topics: Mapping[str, str]) -> None:
@@ -86,7 +83,7 @@ class RmwZenohSource(Source):
             self._session.subscribe(topic, partial(self._receive, topic, kind))
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest message that is here, or that comes within `wait_s`."""
+        """Return the next message; the link is checked once a second."""
         until = time.monotonic() + wait_s
         while True:
             left = until - time.monotonic()
@@ -108,4 +105,4 @@ class RmwZenohSource(Source):
             fields = types_of(2).decode(kind, content)
         except FieldsError:
             return
-        self._inbox.put(ReceivedMessage(topic.name, kind, fields, time.time_ns()), weight_of(fields))
+        self._put(topic.name, kind, fields)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from robochoc.robots.inbox import RosInbox
-from robochoc.robots.sink import Fields, Sink, SinkError
-from robochoc.robots.source import ReceivedMessage, Source, SourceError
+from robochoc.robots.sink import Fields, SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live.rosbridge_connection import Connection
 from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
+from robochoc.ros.live.transport import LiveSink, LiveSource
 
 _LOOK_EVERY = 100
 """Messages published between two looks at how many bytes are on their way."""
 
 
-class RosbridgeSink(Sink):
+class RosbridgeSink(LiveSink):
     """Publishes through a rosbridge. Topics are latched: later subscribers receive the last message of each."""
 
     def __init__(self, place: str) -> None:
@@ -27,17 +26,18 @@ class RosbridgeSink(Sink):
         self._published = 0
 
     def advertise(self, topics: Mapping[str, str]) -> None:
-        """Announce `topics` to the server."""
+        """Announce new topics to the server, whose complaints are raised here."""
         self._check()
-        for name, kind in topics.items():
-            if name not in self._topics:
-                topic = self._connection.topic(name, kind)
-                topic.advertise()
-                self._topics[name] = topic
+        super().advertise(topics)
 
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
-        """Send a message. It leaves in the background."""
-        self.advertise({topic: kind})
+    def _announce(self, topics: Mapping[str, str]) -> None:
+        for name, kind in topics.items():
+            topic = self._connection.topic(name, kind)
+            topic.advertise()
+            self._topics[name] = topic
+
+    def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
+        """Send a message in the background."""
         self._topics[topic].publish(outgoing(fields))
         self._published += 1
         if self._published % _LOOK_EVERY == 0 and self._connection.is_ahead():
@@ -67,13 +67,13 @@ class RosbridgeSink(Sink):
             raise SinkError(f"{said}; see its log")
 
 
-class RosbridgeSource(Source):
+class RosbridgeSource(LiveSource):
     """Receives through a rosbridge. Malformed messages, and those of other topics, are ignored."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._inbox = RosInbox()
         self._connection = Connection(place, SourceError)
+        self._over = self._connection.over
         self._connection.on_over = self._inbox.wake
 
     def listen(self, topics: Mapping[str, str]) -> None:
@@ -83,12 +83,8 @@ class RosbridgeSource(Source):
             topic = self._connection.topic(name, kind)
             topic.subscribe(partial(self._receive, name, kind))
 
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest message that is here, or that comes within `wait_s`."""
-        received = self._inbox.get(wait_s, over=self._connection.over)
-        if received is None:
-            self._connection.check()
-        return received
+    def _check(self) -> None:
+        self._connection.check()
 
     def close(self) -> None:
         """End the connection."""
@@ -99,4 +95,4 @@ class RosbridgeSource(Source):
             fields, weight = incoming(message)
         except MalformedMessageError:
             return
-        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight)
+        self._put(topic, kind, fields, weight)

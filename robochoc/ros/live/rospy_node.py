@@ -18,21 +18,17 @@ from functools import partial
 from typing import Any
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.robots.inbox import RosInbox, weight_of
-from robochoc.robots.sink import Fields, Sink, SinkError
-from robochoc.robots.source import ReceivedMessage, Source, SourceError
+from robochoc.robots.sink import Fields, SinkError
+from robochoc.robots.source import SourceError
 from robochoc.ros.live.in_time import succeeds_in_time
 from robochoc.ros.live.ros_master import Failed, RosMaster
 from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
+from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource
 
 NODE_S = 15.0
 """The longest wait for the registration of our node or its topics, in seconds."""
 GATHER_S = 5.0
 """The longest wait for subscribers that the master lists, in seconds. It may list some that no longer exist."""
-STUCK_S = 10.0
-"""The longest time for which a subscriber may leave its pending messages unread, in seconds."""
-LINGER_S = 0.3
-"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
 _WAITING = 10_000
 """Messages that wait to be sent before `publish` waits, too."""
 
@@ -73,7 +69,7 @@ def _register(rospy: Any, failed: Failed) -> None:  # noqa: ANN401 - rospy is un
         raise failed(f"rospy could not make a node within {NODE_S:g} s; see ROS_MASTER_URI, ROS_IP and ROS_HOSTNAME")
 
 
-class RospySink(Sink):
+class RospySink(LiveSink):
     """Publishes as a node of ROS 1. Topics are latched: later subscribers receive the last message of each.
 
     Messages begin to leave when all subscribers are connected, so that they receive every one.
@@ -89,13 +85,11 @@ class RospySink(Sink):
         # rospy's own queues have threads that keep a program from ending while a subscriber reads nothing.
         self._waiting: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
         self._problem = ""
-        threading.Thread(target=self._send, daemon=True, name="rospy sender").start()
+        threading.Thread(target=self._send_queue, daemon=True, name="rospy sender").start()
 
-    def advertise(self, topics: Mapping[str, str]) -> None:
+    def _announce(self, topics: Mapping[str, str]) -> None:
         """Register the topics, and wait for their subscribers."""
-        new = {topic: message_class(kind, SinkError) for topic, kind in topics.items() if topic not in self._kinds}
-        if not new:
-            return
+        new = {topic: message_class(kind, SinkError) for topic, kind in topics.items()}
         self._master.check()
         if not succeeds_in_time(partial(self._register, new), NODE_S):
             raise SinkError(f"the ROS master at {self._master.uri} has not registered our topics; see its log")
@@ -108,9 +102,8 @@ class RospySink(Sink):
                 self._publishers[topic] = self._rospy.Publisher(topic, kind, latch=True, queue_size=None)
             self._kinds[topic] = kind
 
-    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
-        """Hand a message to the thread that sends."""
-        self.advertise({topic: kind})
+    def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
+        """Queue a message for the thread that sends."""
         try:
             message = filled(self._kinds[topic](), fields)
         except (ValueError, TypeError, AttributeError) as error:
@@ -137,7 +130,7 @@ class RospySink(Sink):
             self._waiting.put_nowait(None)
         self._end()
 
-    def _send(self) -> None:
+    def _send_queue(self) -> None:
         while (publish := self._waiting.get()) is not None and not self._problem:
             try:
                 publish()
@@ -193,7 +186,7 @@ class RospySink(Sink):
         succeeds_in_time(lambda: [publisher.unregister() for publisher in self._publishers.values()], NODE_S)
 
 
-class RospySource(Source):
+class RospySource(LiveSource):
     """Receives as a node of ROS 1."""
 
     def __init__(self, place: str) -> None:
@@ -201,7 +194,6 @@ class RospySource(Source):
         self._rospy = _node(place, SourceError)
         self._master = RosMaster(SourceError)
         self._asked = time.monotonic()
-        self._inbox = RosInbox()
         self._subscribers: list[Any] = []
 
     def listen(self, topics: Mapping[str, str]) -> None:
@@ -218,18 +210,15 @@ class RospySource(Source):
             received = partial(self._receive, topic, kind)
             self._subscribers.append(self._rospy.Subscriber(topic, type_, received, queue_size=100))
 
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest message that is here, or that comes within `wait_s`."""
-        received = self._inbox.get(wait_s)
-        if received is None and time.monotonic() - self._asked > 1:
+    def _check(self) -> None:
+        """Ask the master, once a second at most."""
+        if time.monotonic() - self._asked > 1:
             self._master.check()
             self._asked = time.monotonic()
-        return received
 
     def close(self) -> None:
         """Unsubscribe."""
         succeeds_in_time(lambda: [subscriber.unregister() for subscriber in self._subscribers], NODE_S)
 
     def _receive(self, topic: str, kind: str, message: Any) -> None:  # noqa: ANN401 - messages are untyped
-        fields = fields_of(message)
-        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
+        self._put(topic, kind, fields_of(message))
