@@ -131,17 +131,17 @@ def test_the_last_cell_and_the_last_robot_stay() -> None:
 def test_a_robot_that_was_just_added_is_named_but_rules_are_not_for_it() -> None:
     desk = Desk(cast("Project", Held(TEAM)))
     desk.select_added("South")
-    assert (desk.selected, desk.meant) == (["South"], [])
+    assert (desk.selected, desk.rule_robots) == (["South"], [])
     desk.select(["South"])
-    assert desk.meant == ["South"]
+    assert desk.rule_robots == ["South"]
 
 
 def test_a_place_whose_cells_are_clicked_is_let_go_when_it_is_gone() -> None:
     desk = Desk(cast("Project", Held(TEAM)), cells_of="place")
-    desk.forget_gone()
+    desk.drop_removed()
     assert desk.cells_of == "place"
     desk.project = cast("Project", Held(without_decision(TEAM, "place")))
-    desk.forget_gone()
+    desk.drop_removed()
     assert desk.cells_of is None
 
 
@@ -251,7 +251,7 @@ def test_what_is_drawn_is_whom_rules_link(seed: int) -> None:
 
 
 def test_rules_with_too_many_links_are_left_out_and_said() -> None:
-    many = tuple(SketchRobot(f"R{number}", Cell(0, 0)) for number in range(picture.MOST_LOOKED_AT))
+    many = tuple(SketchRobot(f"R{number}", Cell(0, 0)) for number in range(picture.MOST_NEIGHBOURS))
     near = SketchRule("R1", "neighbours-different", "level", (), {"radius": 1})
     rules = (near, SketchRule("R2", "at-most", "level"))
     found = picture.links_of(Sketch(robots=many, decisions=(LEVEL,), rules=rules))

@@ -1,4 +1,4 @@
-"""The board: the map of a team, its robots, and its rules as links. It is drawn in the browser (`board.js`)."""
+"""The board: the map of a team, its robots, and its rules as links, drawn in the browser (`board.js`)."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from robochoc.app.sketch.sketch import Area, Cell, Sketch
 from robochoc.app.texts import say
 
 SELECT = "select"
-"""The tool of a board that only looks, picks and drags. With others, the cell under the pointer is shown."""
+"""The tool for selecting and dragging. With other tools, the cell under the pointer is highlighted."""
 
 MOST_MOVES = 2**53
 
 
 class Clicked(msgspec.Struct):
-    """A robot that was clicked; `more`: together with those that are selected."""
+    """A clicked robot; `more`: whether the selection is extended."""
 
     name: str
     more: bool = False
 
 
 class Act(msgspec.Struct):
-    """Something that was chosen at a robot (`name`), or at a cell."""
+    """An action that was chosen at a robot (`name`), or at a cell."""
 
     act: str
     name: str = ""
@@ -37,7 +37,7 @@ class Act(msgspec.Struct):
 
 
 class Moved(msgspec.Struct):
-    """A robot that was dragged to a cell. `sent`: how many moves of this tab there were by then."""
+    """A robot that was dragged to a cell. `sent`: the number of moves sent by this tab."""
 
     name: str
     x: int
@@ -50,8 +50,8 @@ def _nothing(*_: object) -> None:
 
 
 @dataclass
-class Told:
-    """What a board tells: who was clicked, which cell, what was dragged where. The page decides what that means."""
+class BoardEvents:
+    """The handlers of a board's events, which the page defines."""
 
     robot: Callable[[Clicked], object] = _nothing
     cell: Callable[[Cell], object] = _nothing
@@ -76,24 +76,24 @@ class Board(Element, component="board.js"):
     """The map of a team.
 
     Args:
-        told: What is called when something is clicked, dragged, or typed.
+        events: The handlers of clicks, drags and keys.
         movable: Whether robots can be dragged, and moved by the arrow keys.
     """
 
-    def __init__(self, told: Told, *, movable: bool = True) -> None:
+    def __init__(self, events: BoardEvents, *, movable: bool = True) -> None:
         super().__init__()
-        self._told = told
+        self._events = events
         self._props |= {"columns": 1, "rows": 1, "blocked": [], "robots": [], "links": [], "selected": []}
         self._props |= {"lit": "", "tool": SELECT, "words": _words(), "movable": movable, "heard": 0}
-        for name in told.types:
-            self.on(name, lambda event, name=name: self._hear(name, event))
+        for name in events.types:
+            self.on(name, lambda event, name=name: self._handle(name, event))
         self._props["acts"] = {}
-        self.on("cleared", lambda _: told.cleared())
+        self.on("cleared", lambda _: events.cleared())
 
     def show(
         self, sketch: Sketch, *, robots: list[DrawnRobot] | None = None, links: list[DrawnLink] | None = None
     ) -> None:
-        """Draw a sketch. Links that are not given stay as they are."""
+        """Draw a sketch. Without `links`, they remain unchanged."""
         self._set_area(sketch.area)
         self._set("robots", robots_of(sketch) if robots is None else robots)
         if links is not None:
@@ -101,7 +101,7 @@ class Board(Element, component="board.js"):
         self.update()
 
     def offer(self, robot: dict[str, str], cell: dict[str, str]) -> None:
-        """Offer what can happen to a robot, or to a cell, that is clicked: names of acts, and their words."""
+        """Set the actions in the menus of robots and cells: names of actions, and their texts."""
         self._change("acts", {"robot": [*robot.items()], "cell": [*cell.items()]})
 
     def choose(self, names: list[str]) -> None:
@@ -109,11 +109,11 @@ class Board(Element, component="board.js"):
         self._change("selected", names)
 
     def light(self, rule: str | None) -> None:
-        """Show one rule with its words; others step back."""
+        """Highlight one rule with its text; others are dimmed."""
         self._change("lit", rule or "")
 
     def use(self, tool: str) -> None:
-        """Show which tool is used."""
+        """Show the current tool."""
         self._change("tool", tool)
 
     def _set_area(self, area: Area) -> None:
@@ -129,14 +129,14 @@ class Board(Element, component="board.js"):
     def _set(self, name: str, value: object) -> None:
         self._props[name] = value
 
-    def _hear(self, name: str, event: GenericEventArguments) -> None:
+    def _handle(self, name: str, event: GenericEventArguments) -> None:
         try:
-            given: object = msgspec.convert(event.args, self._told.types[name])
+            given: object = msgspec.convert(event.args, self._events.types[name])
         except msgspec.ValidationError:
             return  # not from our board
-        if isinstance(given, Moved):  # the board keeps moves that it has not been told of so
+        if isinstance(given, Moved):  # the board retains moves that are not confirmed by this
             self._change("heard", given.sent)
-        getattr(self._told, name)(given)
+        getattr(self._events, name)(given)
 
 
 def _words() -> dict[str, str]:

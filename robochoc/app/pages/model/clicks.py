@@ -1,4 +1,4 @@
-"""What a click on the board means while a rule, or a decision about places, is open."""
+"""Clicks on the board while a rule, or the cells of a decision, are edited."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from robochoc.app.sketch.sketch import Cell, Kind, Setting, Sketch, SketchRule
 
 
 def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
-    """Take a robot into a rule, or out of it. A rule about everybody is then about this robot, and who comes next.
+    """Add a robot to a rule, or remove it. A rule of all robots becomes a rule of this robot.
 
     Raises:
-        EditError: if it is the last one that the rule names: without a name, a rule is about everybody.
+        EditError: if it is the last robot of the rule: a rule without robots applies to all.
     """
     if sketch.robot(name) is None:
-        return sketch  # somebody has removed it meanwhile
+        return sketch  # the robot was removed meanwhile
     robots = rule.robots
     if robots == (name,):
         raise EditError("edit.last-of-rule", rule.id, robot=name)
@@ -27,10 +27,10 @@ def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
 
 
 def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: str | None) -> Sketch:
-    """Take a cell into the values of the decision `cells_of`, or into the rule that is open, or out of it.
+    """Add a cell to the values of the decision `cells_of` or to the open rule, or remove it.
 
     Raises:
-        EditError: if it is not on the map (any more), or the last cell that can be chosen.
+        EditError: if the cell is not on the map (any more), or is the last value.
     """
     check_cell(sketch, cell)
     decision = None if cells_of is None else sketch.decision(cells_of)

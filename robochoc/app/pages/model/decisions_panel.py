@@ -36,7 +36,7 @@ ICONS = {
 
 
 class DecisionsPanel:
-    """What robots decide."""
+    """The decisions of the robots."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
@@ -64,7 +64,7 @@ class DecisionsPanel:
 
 
 class _DecisionCard:
-    """A decision: its name, its values, and who takes it."""
+    """A decision: its name, values and robots."""
 
     def __init__(self, desk: Desk, key: tuple[int, Kind]) -> None:
         self._desk, (self._place, self._kind) = desk, key
@@ -95,7 +95,7 @@ class _DecisionCard:
         """Show the sketch as it stands."""
         decision = self._decision
         if decision is not None:
-            self._following = True  # what fields show now, nobody has chosen
+            self._following = True  # changes of fields are not the user's now
             self._show(self._desk.sketch, decision)
             self._following = False
 
@@ -170,7 +170,7 @@ class _DecisionCard:
             return None
         clicked = self._desk.cells_of
         if clicked == decision.name:
-            self._desk.cells_of = made.name  # its cells are clicked together on, under its new name
+            self._desk.cells_of = made.name  # continue with its cells under the new name
         wrong = self._desk.edit(lambda sketch: with_decision(sketch, made, instead_of=decision.name))
         if wrong is not None:
             self._desk.cells_of = clicked

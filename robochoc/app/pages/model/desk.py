@@ -1,4 +1,4 @@
-"""What the parts of the page "Model" share: the team, who is selected, which rule is open, and how edits are made."""
+"""The shared state of the panels of the page "Model": the team, the selection, the open rule, and edits."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def _still() -> None:
 
 @dataclass
 class Desk:
-    """One page that shows a team: tabs of the same team have a desk each.
+    """The state of one tab with the page.
 
     Attributes:
         project: The team.
-        selected: The robots that are selected, in the order in which they were.
-        just_added: The robot that is selected since it was added, so that it can be named. Rules are not meant for it.
-        opened: The rule whose parts are shown, to be changed. Robots that are clicked go into it, or out of it.
-        cells_of: The decision about places whose cells are clicked together on the map, by its name.
-        pointed: The rule that somebody points at in the list.
-        troubles: What is wrong, as far as it was looked at.
-        tell: Tells what could not be done, where no field is near it.
-        point: Is called when somebody points at another rule in the list.
+        selected: The selected robots, in the order of their selection.
+        just_added: The robot that is selected because it was just added, for naming. New rules do not apply to it.
+        opened: The rule that is edited. Clicked robots are added to it or removed from it.
+        cells_of: The name of the decision whose cells are chosen by clicks on the map.
+        pointed: The rule under the pointer in the list.
+        troubles: The known errors and hints.
+        tell: Shows an error that belongs to no field.
+        point: Called when another rule in the list is under the pointer.
     """
 
     project: Project
@@ -52,19 +52,19 @@ class Desk:
 
     @property
     def sketch(self) -> Sketch:
-        """The team as it stands."""
+        """The present state of the team."""
         return self.project.sketch
 
     def on_look(self, callback: Callable[[], None]) -> None:
-        """Call `callback` when something is selected or opened: what is shown changes, the team does not."""
+        """Call `callback` after a change of the selection or the open rule, without a change of the team."""
         self._listeners.add(callback)
 
     def looked(self) -> None:
-        """Let all parts show what is selected, opened, or pointed at."""
+        """Update all panels after a change of the selection, the open rule, or the pointer."""
         self._listeners()
 
     def edit(self, change: Edit) -> str | None:
-        """Change the team. Return what is wrong with that, in words, for the field where it was asked for."""
+        """Change the team. Return the text of an invalid edit, for the field of the edit; None if it is valid."""
         try:
             self.project.edit(change)
         except EditError as error:
@@ -72,13 +72,13 @@ class Desk:
         return None
 
     def do(self, change: Edit) -> bool:
-        """Change the team, and tell below the map if that cannot be. Return whether it could."""
+        """Change the team, and show an error below the map. Return whether the edit was valid."""
         wrong = self.edit(change)
         self.tell(wrong or "")
         return wrong is None
 
     def select(self, names: list[str]) -> None:
-        """Select these robots: those of them that are (still) there."""
+        """Select these robots, without those that do not exist (any more)."""
         known = {robot.name for robot in self.sketch.robots}
         self.selected = [name for name in dict.fromkeys(names) if name in known]
         self.just_added = None
@@ -90,17 +90,17 @@ class Desk:
         self.just_added = name
 
     @property
-    def meant(self) -> list[str]:
-        """The robots that a new rule is for. Empty: all of them."""
+    def rule_robots(self) -> list[str]:
+        """The robots of a new rule. Empty: all robots."""
         return [] if self.just_added else self.selected
 
     def open(self, rule: str | None) -> None:
-        """Show the parts of a rule, or of none."""
+        """Open a rule for editing; None to close it."""
         self.opened, self.cells_of = rule, None
         self.looked()
 
-    def forget_gone(self) -> None:
-        """Let go of what is no longer there."""
+    def drop_removed(self) -> None:
+        """Drop removed elements from the selection and the open rule."""
         known = {robot.name for robot in self.sketch.robots}
         self.selected = [name for name in self.selected if name in known]
         if self.opened is not None and self.sketch.rule(self.opened) is None:
@@ -112,5 +112,5 @@ class Desk:
             self.just_added = None
 
     def troubles_at(self, about: About, element: str) -> list[Trouble]:
-        """Return what is wrong with an element."""
+        """Return the errors and hints of an element."""
         return [trouble for trouble in self.troubles if trouble.about is about and trouble.element == element]

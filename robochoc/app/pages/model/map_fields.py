@@ -1,4 +1,4 @@
-"""How large the map is."""
+"""The fields for the size of the map."""
 
 from __future__ import annotations
 

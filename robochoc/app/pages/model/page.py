@@ -1,4 +1,4 @@
-"""The page "Model": the board on which a team is drawn, and beside it what robots decide, and by which rules."""
+"""The page "Model": the board on which a team is drawn, and the panels of robots, decisions and rules."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from importlib.resources import files
 
 from nicegui import run, ui
 
-from robochoc.app.pages.model.board import SELECT, Board, Clicked, Moved, Told
+from robochoc.app.pages.model.board import SELECT, Board, BoardEvents, Clicked, Moved
 from robochoc.app.pages.model.clicks import with_cell_clicked, with_robot_clicked
 from robochoc.app.pages.model.decisions_panel import DecisionsPanel
 from robochoc.app.pages.model.desk import Desk
@@ -28,7 +28,7 @@ from robochoc.app.texts import say
 TOOLS = {SELECT: "near_me", "add": "add_circle_outline", "block": "block"}
 """The tools, and their icons."""
 _QUIET_S = 0.15
-"""After so long without an edit, what is wrong is looked at."""
+"""The time after an edit until the sketch is checked."""
 
 
 def build_model(project: Project) -> None:
@@ -38,13 +38,13 @@ def build_model(project: Project) -> None:
 
 
 class ModelPage:
-    """The page, as one tab shows it."""
+    """The page in one browser tab."""
 
     def __init__(self, project: Project) -> None:
         self._desk = desk = Desk(project)
         self._tool = SELECT
-        self._looked_at: Sketch | None = None
-        self._looking = False
+        self._checked: Sketch | None = None
+        self._is_checking = False
         self._clicked: str | None = None
         with ui.element("div").classes("model"):
             with ui.element("section").classes("stage").props(f'aria-label="{say("board.map")}"'):
@@ -57,7 +57,7 @@ class ModelPage:
         desk.on_look(self._follow)
         desk.point = self._light
         on_leave(project.on_change(self._changed))
-        self._timer = ui.timer(_QUIET_S, self._look, active=False)
+        self._timer = ui.timer(_QUIET_S, self._check, active=False)
         self._changed()
 
     def _build_stage(self) -> None:
@@ -68,7 +68,7 @@ class ModelPage:
             MapFields(self._desk)
         self._hint = ui.label().classes("guide").props("role=status")
         with ui.element("div").classes("panel map-box"):
-            told = Told(
+            events = BoardEvents(
                 robot=self._robot,
                 cell=self._cell,
                 moved=self._moved,
@@ -76,13 +76,13 @@ class ModelPage:
                 rule=self._desk.open,
                 cleared=self._cleared,
             )
-            self._board = Board(told)
+            self._board = Board(events)
         self._wrong = ui.label().classes("error").props("role=alert")
         self._wrong.set_visibility(False)
-        self._desk.tell = self._tell
+        self._desk.tell = self._show_error
         self._lines = TroubleLines()
 
-    # What is clicked, dragged and typed on the board
+    # Events of the board
 
     def _use(self, tool: str) -> None:
         self._tool = tool
@@ -114,7 +114,7 @@ class ModelPage:
             desk.do(lambda sketch: with_cell_clicked(sketch, cell, desk.cells_of, desk.opened))
         elif desk.sketch.robots:
             desk.select([])
-        else:  # with an empty map, a click means the one thing that can be done first
+        else:  # on an empty map, a click adds a robot
             self._tools.set_value("add")
             self._cell(cell)
 
@@ -130,11 +130,11 @@ class ModelPage:
         self._desk.selected = []
         self._desk.open(None)
 
-    # What is shown
+    # Content
 
     def _changed(self) -> None:
-        """Show the team as it stands. What is wrong with it, and large pictures, come a little later."""
-        self._desk.forget_gone()
+        """Show the team. Errors and links are updated a little later."""
+        self._desk.drop_removed()
         self._follow()
         self._board.show(self._desk.sketch, robots=robots_of(self._desk.sketch, self._desk.troubles))
         self._timer.activate()
@@ -150,7 +150,7 @@ class ModelPage:
         self._guide()
 
     def _clicking_cells(self) -> None:
-        """Put the tool away once when cells, or what a rule binds, begin to be clicked together on the map."""
+        """Switch to the select tool when the editing of cells or of a rule starts."""
         clicked = self._desk.cells_of or self._desk.opened
         if clicked is not None and clicked != self._clicked:
             self._tools.set_value(SELECT)
@@ -164,7 +164,7 @@ class ModelPage:
         self._board.light(self._desk.pointed or self._desk.opened)
 
     def _guide(self) -> None:
-        """Say what to do next."""
+        """Show the next step."""
         desk = self._desk
         key = f"guide.{self._tool}"
         if not desk.sketch.robots:
@@ -179,29 +179,29 @@ class ModelPage:
             key = "guide.rules"
         self._hint.set_text(say(key))
 
-    def _tell(self, wrong: str) -> None:
+    def _show_error(self, wrong: str) -> None:
         self._wrong.set_text(wrong)
         self._wrong.set_visibility(bool(wrong))
-        if wrong:  # the board may show what could not be done
+        if wrong:  # the board may show the invalid edit
             self._board.show(self._desk.sketch, robots=robots_of(self._desk.sketch, self._desk.troubles))
 
-    async def _look(self) -> None:
-        """Look at what is wrong, and whom rules link, beside the event loop: of large teams it takes its time."""
+    async def _check(self) -> None:
+        """Compute errors and links in a thread, since this is slow for large teams."""
         self._timer.deactivate()
-        if self._looking:
+        if self._is_checking:
             return
-        self._looking = True
+        self._is_checking = True
         try:
-            while self._looked_at is not self._desk.sketch:
+            while self._checked is not self._desk.sketch:
                 sketch = self._desk.sketch
-                found = await run.io_bound(_looked_at, sketch)
-                if found is None:  # the application ends
+                found = await run.io_bound(_troubles_and_links, sketch)
+                if found is None:  # the application is shutting down
                     return
-                self._looked_at = sketch
+                self._checked = sketch
                 if sketch is self._desk.sketch:
                     self._show(*found)
         finally:
-            self._looking = False
+            self._is_checking = False
 
     def _show(self, wrong: list[Trouble], links: LinksDrawn) -> None:
         desk = self._desk
@@ -212,7 +212,7 @@ class ModelPage:
         self._follow()
 
 
-def _looked_at(sketch: Sketch) -> tuple[list[Trouble], LinksDrawn]:
+def _troubles_and_links(sketch: Sketch) -> tuple[list[Trouble], LinksDrawn]:
     return troubles(sketch), links_of(sketch)
 
 

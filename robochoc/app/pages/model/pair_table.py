@@ -1,4 +1,4 @@
-"""A table that is clicked together: which values of one robot go with which of another. Drawn in the browser."""
+"""A table of allowed pairs of values of two robots, chosen by clicks and drawn in the browser."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.app.sketch.sketch import Setting, Value
 from robochoc.app.texts import say
 
 MOST_PAIRS = 20_000
-"""Pairs of a table that is clicked together: more is a rule that another word says better."""
+"""The maximum number of pairs of a table."""
 _PAIR = 2
 _WORDS = ("caption", "many", "pair", "row", "column", "down", "across", "range", "back", "on")
 
@@ -21,7 +21,7 @@ class PairTable(Element, component="pair_table.js"):
     """Values by values, each a button.
 
     Args:
-        changed: Is called with the rows that fit then.
+        changed: Called with the new rows.
     """
 
     def __init__(self, changed: Callable[[list[list[Value]]], object]) -> None:
@@ -35,7 +35,7 @@ class PairTable(Element, component="pair_table.js"):
         self.on("filled", self._filled)
 
     def show(self, values: tuple[Value, ...], labels: list[str], rows: Setting | None, bound: tuple[str, ...]) -> None:
-        """Show the table as it stands."""
+        """Show the rows."""
         self._values = values
         self._rows = [[*row] for row in rows if isinstance(row, list)] if isinstance(rows, list) else []
         number = {value: index for index, value in enumerate(values)}
@@ -77,7 +77,7 @@ class PairTable(Element, component="pair_table.js"):
 def filled(
     rows: list[list[Value]], ones: tuple[Value, ...], others: tuple[Value, ...], *, on: bool
 ) -> list[list[Value]]:
-    """Return the rows of a table with every pair of one of `ones` and one of `others`, or without them."""
+    """Return the rows of a table after adding, or removing, all pairs of `ones` and `others`."""
     if not on:
         some, more = {*ones}, {*others}
         return [row for row in rows if not (len(row) == _PAIR and row[0] in some and row[1] in more)]

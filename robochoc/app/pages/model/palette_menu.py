@@ -1,4 +1,4 @@
-"""The palette: rules in plain words, of which one is picked. It begins with what fits best, and is changed then."""
+"""The palette: a menu of rules in plain words. A new rule has suitable initial settings, which the user can change."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class PaletteMenu:
             self._rules = ui.element("ul").classes("palette-rules")
 
     def open(self) -> None:
-        """Show it."""
+        """Show the menu."""
         names = [decision.name for decision in self._desk.sketch.decisions]
         if names:
             chosen = self._about.value if self._about.value in names else names[0]
@@ -56,7 +56,7 @@ class PaletteMenu:
         self._rules.clear()
         if decision is None:
             return
-        meant = self._desk.meant
+        meant = self._desk.rule_robots
         self._hint.set_text(say("model.palette-some", robots=listed(meant)) if meant else say("model.palette-all"))
         off = why_no_cost(self._desk.sketch)
         self._why.set_text("" if off is None else f"{off.text} {off.remedy}")
@@ -75,18 +75,18 @@ class PaletteMenu:
     def _pick(self, entry: PaletteRule, decision: Decision) -> None:
         self._dialog.close()
         before = {rule.id for rule in self._desk.sketch.rules}
-        rule = first_rule(self._desk.sketch, entry, decision, self._desk.meant)
+        rule = first_rule(self._desk.sketch, entry, decision, self._desk.rule_robots)
         if self._desk.do(lambda sketch: with_rule(sketch, rule)):
             self._desk.open(next(rule.id for rule in self._desk.sketch.rules if rule.id not in before))
 
 
 def costs_at_first(entry: PaletteRule) -> bool:
-    """Return whether a rule of the palette costs something as it begins."""
+    """Return whether a new rule of this kind has a cost."""
     return entry.graded or entry.key == _PREFERENCE
 
 
 def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected: list[str]) -> SketchRule:
-    """Return a rule as it begins: for the robots that are selected, and with settings that are possible."""
+    """Return a new rule for the selected robots, with valid settings."""
     deciders = sketch.deciders(decision)
     chosen = tuple(name for name in selected if name in deciders)
     if len(chosen) < entry.fewest:
@@ -97,12 +97,12 @@ def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected:
     settings = {opening.name: _first(opening, values) for opening in entry.openings}
     if entry.key == _NEAR and decision.kind == Kind.PLACE and len(chosen) == 1:
         settings["value"] = _nearest(sketch, chosen[0], values)
-    cost = FIRST_COST if entry.key == _PREFERENCE else None  # the graded ones have their own
+    cost = FIRST_COST if entry.key == _PREFERENCE else None  # graded rules have their own costs
     return SketchRule("", entry.key, decision.name, chosen, settings, cost)
 
 
 def _nearest(sketch: Sketch, robot: str, values: tuple[int | str, ...]) -> Setting:
-    """Return the place that is nearest to where a robot stands."""
+    """Return the place that is nearest to a robot's position."""
     drawn = sketch.robot(robot)
     cells = [value for value in values if isinstance(value, int)]
     if drawn is None or not cells:

@@ -1,4 +1,4 @@
-"""Small parts that the panels of the page "Model" are made of."""
+"""Small elements of the panels of the page "Model"."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robochoc.app.texts import say
 
 
 class Card(Protocol):
-    """An entry of a list that shows the sketch as it stands."""
+    """An entry of a list that shows a part of the sketch."""
 
     element: Element
 
@@ -24,14 +24,14 @@ class Card(Protocol):
 
 
 class Cards:
-    """A list of cards, one for each key. Cards stay what they are while the sketch changes: nobody's typing is lost."""
+    """A list of cards, one for each key. Cards are reused after changes of the sketch, so no typed text is lost."""
 
     def __init__(self, container: Element, make: Callable[..., Card]) -> None:
         self._container, self._make = container, make
         self._cards: dict[Hashable, Card] = {}
 
     def follow(self, keys: Sequence[Hashable]) -> None:
-        """Show a card for each key, in their order."""
+        """Show a card for each key, in order."""
         for key in [key for key in self._cards if key not in set(keys)]:
             self._cards.pop(key).element.delete()
         for place, key in enumerate(keys):
@@ -45,14 +45,14 @@ class Cards:
 
 
 class TroubleLines:
-    """Lines that tell what is wrong with the element above them, and what to do."""
+    """Lines with errors and hints of the element above them, and their remedies."""
 
     def __init__(self) -> None:
         self._box = ui.element("div").classes("troubles").props("role=status")
         self._shown: list[Trouble] = []
 
     def show(self, troubles: list[Trouble]) -> None:
-        """Show these, and no others."""
+        """Show only these errors and hints."""
         if troubles == self._shown:
             return
         self._shown = troubles
@@ -67,13 +67,13 @@ class TroubleLines:
 
 
 def line(text: str, classes: str = "") -> ui.label:
-    """Add a text to what is in a line."""
+    """Add a text to a line."""
     return ui.label(text).classes(f"run {classes}")
 
 
 @contextmanager
 def panel(key: str) -> Iterator[Element]:
-    """Add a part of the panel, under its heading."""
+    """Add a panel with a heading."""
     with ui.element("section").classes("panel part").props(f'aria-label="{say(key)}"') as section:
         with ui.element("h2"):
             ui.label(say(key))
@@ -81,14 +81,14 @@ def panel(key: str) -> Iterator[Element]:
 
 
 def icon_button(icon: str, says: str, does: Callable[[], object]) -> ui.button:
-    """Add a button that is only an icon. `says` is for who hears it, and for who waits on it."""
+    """Add a button with an icon only. `says` is its name for screen readers, and its tooltip."""
     button = ui.button(icon=icon, on_click=does).props("flat round dense size=sm").classes("quiet")
     name_it(button, says)
     return button
 
 
 def name_it(element: Element, says: str) -> None:
-    """Give an element a name for screen readers, whatever is in that name, and a tooltip."""
+    """Set an element's name for screen readers, which may contain any characters, and its tooltip."""
     if element.props.get("aria-label") != says:
         element.props["aria-label"] = says
         element.props["title"] = says
@@ -96,7 +96,7 @@ def name_it(element: Element, says: str) -> None:
 
 
 def number_field(key: str, least: int, most: int, changed: Callable[[int], str | None]) -> ui.number:
-    """Add a field for an integer. `changed` makes the edit, and returns what is wrong with it."""
+    """Add a field for an integer. `changed` makes the edit, and returns the text of an error."""
 
     def check(value: float | None) -> str | None:
         if value is None or not least <= value <= most or value != int(value):  # NaN is in no bounds
@@ -108,7 +108,7 @@ def number_field(key: str, least: int, most: int, changed: Callable[[int], str |
 
 
 def everybody_button(does: Callable[[], object]) -> ui.button:
-    """Add the button that lets something be about everybody again."""
+    """Add the button that applies an element to all robots again."""
     return (
         ui.button(say("model.everybody"), icon="groups", on_click=does)
         .props("flat dense no-caps align=left")
@@ -117,12 +117,12 @@ def everybody_button(does: Callable[[], object]) -> ui.button:
 
 
 def refuse_last(choice: ui.select, robots: Sequence[str], why: str) -> None:
-    """Say why the last robot of a choice stays: with nobody named, everybody would be meant."""
+    """Restore the last robot of a choice, with the reason: an empty choice would mean all robots."""
     choice.set_value([*robots])
     choice.error = why
 
 
 def put(field: ValidationElement[Any], value: object) -> None:
-    """Show a value in a field, unless it is there, or somebody types what is wrong so far."""
+    """Show a value in a field, unless the user is typing a text that is not valid yet."""
     if field.value != value and not field.error:
         field.set_value(value)

@@ -1,4 +1,4 @@
-"""What the board draws of a sketch: its robots with their marks, and its rules as links between them."""
+"""The content of the board for a sketch: robots with their marks, and rules as links."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from robochoc.app.sketch.words import sentence, short, weight_of
 from robochoc.app.texts import say
 
 COLOURS = 8
-"""Colours of rules, `--rule-0` and on in the style. They are used in turn."""
+"""The number of colours of rules (`--rule-0`, ... in the style), which are used in turn."""
 MOST_LINKS = 12_000
-"""Links that are drawn. Of more, nothing could be told apart; the list of rules says what is not drawn."""
-MOST_LOOKED_AT = 300
-"""Robots of a rule among neighbours: to find out who is near whom, every two of them are looked at."""
+"""The maximum number of drawn links, for readability; the list of rules marks those that are not drawn."""
+MOST_NEIGHBOURS = 300
+"""The maximum number of robots of a drawn rule on neighbours."""
 
 MOST_PAIRS = 300
-"""Lines between every two robots of a rule. If there are more, it is drawn as what is around all of them."""
+"""The maximum number of lines of a rule on pairs. With more, the rule is drawn as a hull around its robots."""
 
 _PAIR = 2
 _SHAPES = {Links.EACH: "dots", Links.GROUP: "hull"}
 
 
 class DrawnRobot(TypedDict):
-    """A robot as the board draws it."""
+    """A robot on the board."""
 
     name: str
     x: int
@@ -41,7 +41,7 @@ class DrawnRobot(TypedDict):
 
 
 class DrawnLink(TypedDict):
-    """A rule as the board draws it. `of` has the places of its robots among all robots, pair by pair for lines."""
+    """A rule on the board. `of` has the indices of its robots among all robots, pair by pair for lines."""
 
     rule: str
     color: int
@@ -53,20 +53,20 @@ class DrawnLink(TypedDict):
 
 
 class LinksDrawn(msgspec.Struct, frozen=True):
-    """The links of a sketch, and the rules that have too many to be drawn."""
+    """The links of a sketch, and the rules that are not drawn because they have too many."""
 
     drawn: list[DrawnLink]
     left_out: frozenset[str]
 
 
 def colour_of(rule: SketchRule) -> int:
-    """Return the number of a rule's colour. It stays the same while the rule does."""
+    """Return the number of a rule's colour, which never changes."""
     digits = "".join(letter for letter in rule.id[1:6] if letter.isascii() and letter.isdigit())
     return (int(digits or "1") - 1) % COLOURS
 
 
 def robots_of(sketch: Sketch, troubles: Iterable[Trouble] = ()) -> list[DrawnRobot]:
-    """Return the robots as they are drawn. Whoever has a trouble has a mark."""
+    """Return the drawn robots. Robots with errors or hints are marked."""
     bad: dict[str, list[str]] = {}
     for trouble in troubles:
         if trouble.about == About.ROBOT:
@@ -84,14 +84,14 @@ def _robot(robot: SketchRobot, bad: list[str]) -> DrawnRobot:
 
 
 def mark_of(robot: SketchRobot) -> str:
-    """Return what stands beside a robot: how much it counts, and how high it ranks, where that is special."""
+    """Return the mark of a robot: its weight and rank, if they differ from the defaults."""
     weight = f"\N{MULTIPLICATION SIGN}{robot.weight}" if robot.weight != 1 else ""
     rank = f"{'▲' if robot.rank > 0 else '▼'}{abs(robot.rank)}" if robot.rank else ""
     return " ".join(filter(None, (weight, rank)))
 
 
 def links_of(sketch: Sketch) -> LinksDrawn:
-    """Return the rules as links. Rules that are off, or make no sense yet, have none."""
+    """Return the rules as links. Inactive and incomplete rules have none."""
     place = {robot.name: index for index, robot in enumerate(sketch.robots)}
     drawn: list[DrawnLink] = []
     left_out: set[str] = set()
@@ -109,11 +109,11 @@ def links_of(sketch: Sketch) -> LinksDrawn:
 
 
 def _groups(sketch: Sketch, rule: SketchRule, room: int) -> list[tuple[str, ...]] | None:
-    """Return a rule's links, or nothing if they are too many."""
+    """Return a rule's links, or None if there are too many."""
     entry, bound = PALETTE[rule.kind], sketch.bound(rule)
     if entry.links == Links.PAIRS and len(bound) * (len(bound) - 1) // 2 > MOST_PAIRS:
         return [bound]
-    if entry.links == Links.NEIGHBOURS and len(bound) > MOST_LOOKED_AT:
+    if entry.links == Links.NEIGHBOURS and len(bound) > MOST_NEIGHBOURS:
         return None
     groups = [*islice(entry.groups(sketch, rule), room + 1)]
     return groups if len(groups) <= room else None

@@ -1,4 +1,4 @@
-"""The panel about robots: who is selected, what they are called, who matters most, and who is above whom."""
+"""The panel of robots: the selection, and the names, weights and ranks of selected robots."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.formats.names import MAX_WEIGHT
 
 
 class RobotsPanel:
-    """The list in which robots are selected, and what can be said of those that are."""
+    """The list in which robots are selected, and the fields of the selected robots."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
@@ -37,7 +37,7 @@ class RobotsPanel:
         self._choice.set_visibility(bool(names))
         self._hint.set_text(say("model.selected-hint" if names else "model.no-robots-hint"))
         self._hint.set_visibility(not selected)
-        # by their places: a robot that gets another name keeps its card, in which somebody types that name
+        # by index, so that a robot that is being renamed keeps its card
         self._cards.follow([tuple(map(names.index, selected))] if selected else [])
 
     def _selected(self, names: list[str]) -> None:
@@ -46,7 +46,7 @@ class RobotsPanel:
 
 
 class _SelectedCard:
-    """What can be said of the robots that are selected."""
+    """The fields of the selected robots."""
 
     def __init__(self, desk: Desk, places: tuple[int, ...]) -> None:
         self._desk = desk
@@ -89,7 +89,7 @@ class _SelectedCard:
         if new == old:
             return None
         added = self._desk.just_added
-        self._desk.selected = [new]  # before the edit: the robot stays selected, and its card stays
+        self._desk.selected = [new]  # before the edit, so that the robot remains selected and keeps its card
         self._desk.just_added = None if added is None else new
         wrong = self._desk.edit(lambda sketch: with_robot_renamed(sketch, old, new))
         if wrong is not None:
@@ -110,7 +110,7 @@ class _SelectedCard:
 
 
 def without_robots(sketch: Sketch, names: tuple[str, ...]) -> Sketch:
-    """Remove several robots at once: one step to be undone."""
+    """Remove several robots in one edit."""
     for name in names:
         sketch = without_robot(sketch, name)
     return sketch

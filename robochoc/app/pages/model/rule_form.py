@@ -1,4 +1,4 @@
-"""What can be changed of a rule that is open: whom it is about, what fills its openings, its cost, who knows of it."""
+"""The form of an open rule: its decision, robots, fields, cost and privacy."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from robochoc.app.sketch.words import value_words
 from robochoc.app.texts import say
 
 _SLIDER = 20
-"""A slider goes so far; a larger number is typed. It goes further where a number is further already."""
+"""The maximum of a slider, unless the value is larger; larger numbers are typed."""
 _FIRST_COST = 1
 
 
 class RuleForm:
-    """The fields of a rule. Each change is made at once."""
+    """The fields of a rule. Each change is an edit."""
 
     def __init__(self, desk: Desk, rule: str, entry: PaletteRule) -> None:
         self._desk, self._id, self._entry = desk, rule, entry
@@ -48,7 +48,7 @@ class RuleForm:
         rule = self._desk.sketch.rule(self._id)
         decision = None if rule is None else self._desk.sketch.decision(rule.decision)
         if rule is not None and decision is not None:
-            self._following = True  # what fields show now, nobody has chosen
+            self._following = True  # changes of fields are not the user's now
             for follow in self._follow:
                 follow(rule, decision)
             self._following = False
@@ -204,7 +204,7 @@ class RuleForm:
 
 
 def _show_why(label: ui.label, off: Trouble | None) -> None:
-    """Say why something is off, and what to do. None: it is not."""
+    """Show why an option is not available, and the remedy; None if it is available."""
     label.set_text("" if off is None else f"{off.text} {off.remedy}")
     label.set_visibility(off is not None)
 
@@ -212,15 +212,15 @@ def _show_why(label: ui.label, off: Trouble | None) -> None:
 def _slider_and_field(
     key: str, least: int, most: int, changed: Callable[[int], str | None]
 ) -> tuple[ui.slider, ui.number]:
-    """Add a slider, and a field beside it for what is further than it goes."""
+    """Add a slider, and a field for larger numbers."""
 
-    def _let_go(value: object) -> None:
+    def released(value: object) -> None:
         if isinstance(value, int) and least <= value <= most:
             changed(value)
 
     slider = ui.slider(min=least, max=min(most, _SLIDER), step=1).props("label").classes("slide")
     slider.props["aria-label"] = say(key)
-    slider.on("change", lambda event: _let_go(event.args))  # when it is let go: one step to be undone
+    slider.on("change", lambda event: released(event.args))  # when it is released: one edit
     field = number_field(key, least, most, changed)
     return slider, field
 

@@ -1,4 +1,4 @@
-"""The panel "Which rules?": each rule as its sentence, opened to be changed, and the palette that has more."""
+"""The panel "Which rules?": each rule as a sentence with its form, and the palette for new rules."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from robochoc.app.sketch.words import sentence, weight_of
 from robochoc.app.texts import say
 
 MOST_SHOWN = 40
-"""Rules that are listed before more are asked for."""
+"""The number of rules that are listed at first."""
 
 
 class RulesPanel:
-    """What robots follow."""
+    """The rules of the robots."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk, self._most = desk, MOST_SHOWN
@@ -55,7 +55,7 @@ class RulesPanel:
 
 
 class _RuleCard:
-    """A rule: its sentence, and its form while it is open."""
+    """A rule: its sentence, and its form when it is open."""
 
     def __init__(self, desk: Desk, rules: RulesPanel, key: tuple[str, str]) -> None:
         self._desk, self._rules, (self._id, self._kind) = desk, rules, key
@@ -84,12 +84,12 @@ class _RuleCard:
         sketch, rule = self._desk.sketch, self._desk.sketch.rule(self._id)
         if rule is None:
             return
-        said = sentence(sketch, rule)
-        self._sentence.set_text(f"{said} ")
+        text = sentence(sketch, rule)
+        self._sentence.set_text(f"{text} ")
         self._weight.set_text(weight_of(rule))
         self._switch.set_value(rule.on)
-        name_it(self._switch, say("model.rule-on", rule=said))
-        name_it(self._remove, say("model.remove", name=said))
+        name_it(self._switch, say("model.rule-on", rule=text))
+        name_it(self._remove, say("model.remove", name=text))
         self._note.set_visibility(rule.id in self._rules.left_out)
         self._lines.show(self._desk.troubles_at(About.RULE, rule.id))
         is_open = self._desk.opened == self._id
@@ -97,7 +97,7 @@ class _RuleCard:
             self._open.props["aria-expanded"] = str(is_open).lower()
             self._open.update()
             self.element.classes(toggle="opened")
-            if is_open:  # it may have been opened on the map
+            if is_open:  # the rule may have been opened on the map
                 ui.run_javascript(
                     f"document.getElementById('{self.element.html_id}')?.scrollIntoView({{block: 'nearest'}})"
                 )

@@ -1,4 +1,4 @@
-"""The team as XML, and as Python, beside the board and in step with it; and as files, to be kept elsewhere."""
+"""The team's XML and Python sources, which follow the board, and the download of its files."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 
 _QUIET_S = 0.5
-"""After so long without an edit, sources are written anew."""
+"""The time after an edit until the sources are written again."""
 MOST_AT_ONCE = 40
-"""Robots of a team whose sources are in step by themselves. Those of larger ones are written when asked for."""
+"""The maximum number of robots of a team whose sources are updated automatically; others are written on request."""
 _COPY = """(event) => {
   const text = document.getElementById(%s).textContent;
   navigator.clipboard?.writeText(text);
 }"""
 
 
-class Written(NamedTuple):
-    """The sources of a sketch, or why there are none."""
+class SourceTexts(NamedTuple):
+    """The sources of a sketch, or the reason why there are none."""
 
     xml: dict[str, str]
     python: str
@@ -64,7 +64,7 @@ class Sources:
         self._show_tab()
 
     def changed(self) -> None:
-        """Take note of that the team has changed."""
+        """Update the sources, or offer that, after a change of the team."""
         large = len(self._desk.sketch.robots) > MOST_AT_ONCE
         self._ask.set_visibility(large and self._written is not self._desk.sketch)
         if not large:
@@ -77,7 +77,7 @@ class Sources:
         await self._write()
 
     async def _write(self) -> None:
-        """Write the sources, beside the event loop, until they are those of the team as it stands."""
+        """Write the sources in a thread, until they are those of the present team."""
         self._timer.deactivate()
         if self._writing:
             return
@@ -85,15 +85,15 @@ class Sources:
         try:
             while self._written is not self._desk.sketch:
                 sketch = self._desk.sketch
-                written = await run.io_bound(written_of, sketch)
-                if written is None:  # the application ends
+                written = await run.io_bound(source_texts, sketch)
+                if written is None:  # the application is shutting down
                     return
                 self._written = sketch
                 self._show(written)
         finally:
             self._writing = False
 
-    def _show(self, written: Written) -> None:
+    def _show(self, written: SourceTexts) -> None:
         self._state.set_text(written.wrong)
         self._files, self._python = written.xml, written.python
         names = [*self._files]
@@ -122,11 +122,11 @@ class Sources:
             ui.download.content(content, f"{sketch.name}.zip", "application/zip")
 
 
-def written_of(sketch: Sketch) -> Written:
+def source_texts(sketch: Sketch) -> SourceTexts:
     """Return the sources of a sketch."""
     if errors_of(sketch):
-        return Written({}, "", say("model.source-wrong"))
+        return SourceTexts({}, "", say("model.source-wrong"))
     try:
-        return Written(xml_sources(sketch), python_source(sketch), "")
+        return SourceTexts(xml_sources(sketch), python_source(sketch), "")
     except InvalidInputError as error:
-        return Written({}, "", str(error))
+        return SourceTexts({}, "", str(error))

@@ -1,4 +1,4 @@
-"""Values of a decision as somebody types them: "1-5", "1, 2, 5", or names with commas between them."""
+"""Values of a decision as typed text: "1-5", "1, 2, 5", or names separated by commas."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from robochoc.app.sketch.sketch import NUMBERED, Decision, Kind, Sketch
 _RANGE = re.compile(r"(-?\d{1,9})\s*(?:-|\u2013|\.{2,3}|to)\s*(-?\d{1,9})", re.ASCII)
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _FEW = 3
-"""So many numbers in a row are written as a range."""
+"""The minimum number of consecutive numbers that are written as a range."""
 
 
 def typed_values(kind: Kind, text: str) -> tuple[int | str, ...]:
-    """Return the values that somebody typed, each once.
+    """Return the typed values without duplicates.
 
     Raises:
-        EditError: if they are none of that kind, or too many.
+        EditError: if they are not of this kind, or too many.
     """
     parts = [part.strip() for part in re.split(r"[,;\n]", text) if part.strip()]
     if len(parts) > limits.MAX_VALUES:
@@ -36,7 +36,7 @@ def typed_values(kind: Kind, text: str) -> tuple[int | str, ...]:
 
 
 def written_values(values: tuple[int | str, ...]) -> str:
-    """Return values as somebody would type them."""
+    """Return values as text in the form in which they are typed."""
     parts: list[str] = []
     run: list[int] = []
     for value in values:
@@ -50,24 +50,24 @@ def written_values(values: tuple[int | str, ...]) -> str:
 
 
 def first_values(sketch: Sketch, kind: Kind, names: str) -> tuple[int | str, ...]:
-    """Return the values with which a decision begins: a number for each robot, or some names to be changed."""
+    """Return the initial values of a decision: a number for each robot, or some names."""
     if kind == Kind.PLACE:
         return ()
     return tuple(range(1, max(len(sketch.robots), 3) + 1)) if kind in NUMBERED else typed_values(kind, names)
 
 
 def free_decision_name(sketch: Sketch, stem: str) -> str:
-    """Return a name for a decision that no other one has: `slot`, `slot2`, ..."""
+    """Return an unused name for a decision: `slot`, `slot2`, ..."""
     taken = {decision.name for decision in sketch.decisions}
     numbered = (f"{stem}{number}" for number in range(2, len(taken) + 3))
     return next(name for name in (stem, *numbered) if name not in taken)
 
 
 def with_cell(sketch: Sketch, decision: Decision, number: int) -> tuple[int | str, ...]:
-    """Return the cells of a place without this one, or with it. All free cells are none by name.
+    """Return the cells of a place after adding or removing a cell; empty for all free cells.
 
     Raises:
-        EditError: if it is the last one.
+        EditError: if it is the last cell.
     """
     cells = {*sketch.values(decision)} ^ {number}
     if not cells:

@@ -8,7 +8,7 @@ from importlib.resources import files
 
 from nicegui import run, ui
 
-from robochoc.app.pages.model.board import Act, Board, Clicked, Told
+from robochoc.app.pages.model.board import Act, Board, BoardEvents, Clicked
 from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
 from robochoc.app.pages.numbers import bounded_integer
 from robochoc.app.pages.shell import edit_error_text, on_leave
@@ -51,7 +51,7 @@ class WhatIfPage:
         with ui.element("div").classes("whatif"):
             with ui.element("section").classes("panel map-box").props(f'aria-label="{say("whatif.map")}"'):
                 self._board = Board(
-                    Told(robot=self._robot_clicked, cell=self._cell_clicked, act=self._act), movable=False
+                    BoardEvents(robot=self._robot_clicked, cell=self._cell_clicked, act=self._act), movable=False
                 )
             with ui.element("div").classes("whatif-side"):
                 self._build_happenings()
