@@ -68,5 +68,7 @@ def _mission(n: int) -> Mission:
     names = [variable.name for robot in team.robots if robot.name not in away for variable in robot.variables]
     cells = {name: [int(part) for part in name[1:].split(".")] for name in names}
     values = {name: (3 * row + 5 * column) % n + 1 for name, (row, column) in cells.items()}
-    outcome = Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, assignment=values, withdrawn=away)
+    outcome = Outcome(
+        Verdict.SOLUTION, team=team.name, protocol="abt", runtime="simulator", seed=0, assignment=values, withdrawn=away
+    )
     return mission_of(outcome, team)

@@ -191,7 +191,9 @@ def _still(place: Array) -> Setpoints:
 
 def _hangar() -> tuple[Array, Array]:
     team = read_team(HANGAR)
-    outcome = Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, assignment=_HANGAR_LEVELS)
+    outcome = Outcome(
+        Verdict.SOLUTION, team=team.name, protocol="abt", runtime="simulator", seed=0, assignment=_HANGAR_LEVELS
+    )
     mission = mission_of(outcome, team)
     up = np.array([0.0, 0.0, 1.0])
     homes = np.array([drone.home for drone in mission.drones])

@@ -259,7 +259,7 @@ def mission_of(
         ValueError: See `MissionBuilder`.
     """
     epochs = outcome.epochs or (
-        EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),
+        EpochOutcome(outcome.verdict, robots=team.order if team else (), assignment=outcome.assignment),
     )
     decided = [epoch.assignment for epoch in epochs if epoch.verdict != Verdict.NO_SOLUTION]
     first: dict[str, int] = {}

@@ -13,6 +13,7 @@ import msgspec
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import (
+    Answer,
     CheckCounts,
     EpochOutcome,
     Improvement,
@@ -91,6 +92,14 @@ class EpochForm(msgspec.Struct, omit_defaults=True, frozen=True):
     bound: int | Decimal | None = None
     tree: dict[str, PseudoTreeNode] = {}
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
+    withdrawn: tuple[str, ...] = ()
+    reason: str | None = None
+    count: Decimal | None = None
+    confirmed_by: tuple[str, ...] = ()
+    checked: CheckedForm | None = None
+    preprocessing: PreprocessingForm | None = None
+    optima: OptimaForm | None = None
+    deadline: float | None = None
 
 
 class CheckedForm(msgspec.Struct, frozen=True):
@@ -177,20 +186,12 @@ def result_json(
         places: Where on a map the values of variables are, in metres.
         values: The user's values of variables, where they differ from the integers in the assignment.
     """
-    told = outcome.optima
     form = ResultForm(
         **_fields(outcome, Outcome)
+        | _answer(outcome, outcome)
         | {
-            "assignment": outcome.labelled(outcome.assignment),
-            "cost": _number(outcome.cost),
-            "bound": _number(outcome.bound),
-            "count": None if outcome.count is None else Decimal(outcome.count),
             "epochs": tuple([_epoch(epoch, outcome) for epoch in outcome.epochs]),
             "metrics": MetricsForm(**_metrics(outcome.metrics)),
-            "checked": outcome.checked and CheckedForm(**outcome.checked._asdict()),
-            "preprocessing": _preprocessing(outcome.preprocessing),
-            "optima": told and OptimaForm(Decimal(told.number), tuple(map(outcome.labelled, told.assignments))),
-            "improvements": _improvements(outcome.improvements),
         },
         names=dict(names),
         places=dict(places),
@@ -206,6 +207,21 @@ def result_json(
 def _fields(source: object, kind: type) -> dict[str, Any]:
     """Return the values of the fields of the dataclass `kind` in `source`, by name."""
     return {one.name: getattr(source, one.name) for one in fields(kind)}
+
+
+def _answer(answer: Answer, outcome: Outcome) -> dict[str, Any]:
+    """Return the fields of an answer of `outcome` whose form in JSON differs."""
+    optima = answer.optima
+    return {
+        "assignment": outcome.labelled(answer.assignment),
+        "cost": _number(answer.cost),
+        "bound": _number(answer.bound),
+        "count": None if answer.count is None else Decimal(answer.count),
+        "checked": answer.checked and CheckedForm(**answer.checked._asdict()),
+        "preprocessing": _preprocessing(answer.preprocessing),
+        "optima": optima and OptimaForm(Decimal(optima.number), tuple(map(outcome.labelled, optima.assignments))),
+        "improvements": _improvements(answer.improvements),
+    }
 
 
 def _number(number: Cost | None) -> Cost | None:
@@ -237,13 +253,7 @@ def _epoch(epoch: EpochOutcome, outcome: Outcome) -> EpochForm:
     given = _fields(epoch, EpochOutcome)
     spent = _metrics(given.pop("metrics"))
     spent |= {name: spent[name] or _ZERO for name in ("compile_s", "simulated_s")}
-    different = {
-        "assignment": outcome.labelled(epoch.assignment),
-        "cost": _number(epoch.cost),
-        "bound": _number(epoch.bound),
-        "improvements": _improvements(epoch.improvements),
-    }
-    return EpochForm(**given | different, **spent)
+    return EpochForm(**given | _answer(epoch, outcome), **spent)
 
 
 class _Symbols:
@@ -278,19 +288,25 @@ def read_result(content: bytes) -> Outcome:
     except msgspec.MsgspecError as error:
         raise ResultError(describe_decode_error(error, ResultForm)) from error
     symbols = _Symbols(form.symbols, form.symbolic)
-    told = form.optima
-    different: dict[str, Any] = {
-        "assignment": symbols.values(form.assignment),
-        "count": None if form.count is None else _whole("count", form.count),
+    different = _answer_of(form, symbols) | {
         "epochs": tuple([_epoch_of(epoch, symbols) for epoch in form.epochs]),
         "metrics": _metrics_of(form.metrics),
-        "checked": form.checked and CheckCounts(**msgspec.structs.asdict(form.checked)),
-        "preprocessing": _preprocessing_of(form.preprocessing),
-        "optima": told and Optima(_whole("optima", told.number), tuple(map(symbols.values, told.assignments))),
-        "improvements": _improvements_of(form.improvements),
     }
     different |= {"symbols": tuple(symbols.codes), "symbolic": tuple(symbols.variables)}  # when all values were read
     return Outcome(**_fields(form, Outcome) | different)
+
+
+def _answer_of(form: ResultForm | EpochForm, symbols: _Symbols) -> dict[str, Any]:
+    """Return the fields of an `Answer` whose form in JSON differs."""
+    optima = form.optima
+    return {
+        "assignment": symbols.values(form.assignment),
+        "count": None if form.count is None else _whole("count", form.count),
+        "checked": form.checked and CheckCounts(**msgspec.structs.asdict(form.checked)),
+        "preprocessing": _preprocessing_of(form.preprocessing),
+        "optima": optima and Optima(_whole("optima", optima.number), tuple(map(symbols.values, optima.assignments))),
+        "improvements": _improvements_of(form.improvements),
+    }
 
 
 def _whole(key: str, number: Decimal) -> int:
@@ -304,13 +320,8 @@ def _improvements_of(forms: Sequence[ImprovementForm]) -> tuple[Improvement, ...
 
 
 def _epoch_of(form: EpochForm, symbols: _Symbols) -> EpochOutcome:
-    different: dict[str, Any] = {
-        "assignment": symbols.values(form.assignment),
-        "metrics": _metrics_of(form),
-        "improvements": _improvements_of(form.improvements),
-    }
-    same = {one.name: getattr(form, one.name) for one in fields(EpochOutcome) if one.name not in different}
-    return EpochOutcome(**same, **different)
+    same = {one.name: getattr(form, one.name) for one in fields(EpochOutcome) if one.name != "metrics"}
+    return EpochOutcome(**same | _answer_of(form, symbols), metrics=_metrics_of(form))
 
 
 def _preprocessing_of(form: PreprocessingForm | None) -> Preprocessing | None:

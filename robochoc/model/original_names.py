@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.change import team_after_events
-from robochoc.model.outcome import EpochOutcome, Improvement, Outcome, PseudoTreeNode
+from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Outcome, PseudoTreeNode
 from robochoc.model.problem import Team
 
 _NAME = re.compile(r"[A-Za-z0-9_.]+")
@@ -21,18 +22,11 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
         return outcome
     return replace(
         outcome,
-        assignment=_by(outcome.assignment, names),
-        withdrawn=_all(outcome.withdrawn, names),
+        **_answer(outcome, names),
         lost=_all(outcome.lost, names),
-        witness=_one(outcome.witness, names),
         claimed_by=_one(outcome.claimed_by, names),
-        tree=_tree(outcome.tree, names),
         epochs=tuple(_epoch(epoch, names) for epoch in outcome.epochs),
         symbolic=_all(outcome.symbolic, names),
-        optima=outcome.optima
-        and outcome.optima._replace(assignments=tuple(_by(one, names) for one in outcome.optima.assignments)),
-        improvements=_improvements(outcome.improvements, names),
-        dropped_constraints=_dropped(outcome.dropped_constraints, names),
     )
 
 
@@ -71,13 +65,23 @@ def _epoch(epoch: EpochOutcome, names: Mapping[str, str]) -> EpochOutcome:
         epoch,
         opened_by=_NAME.sub(lambda found: names.get(found[0], found[0]), epoch.opened_by),
         robots=_all(epoch.robots, names),
-        assignment=_by(epoch.assignment, names),
-        witness=_one(epoch.witness, names),
+        **_answer(epoch, names),
         lost=_all(epoch.lost, names),
-        tree=_tree(epoch.tree, names),
-        improvements=_improvements(epoch.improvements, names),
-        dropped_constraints=_dropped(epoch.dropped_constraints, names),
     )
+
+
+def _answer(answer: Answer, names: Mapping[str, str]) -> dict[str, Any]:
+    """Return the fields of an answer that contain names."""
+    optima = answer.optima
+    return {
+        "assignment": _by(answer.assignment, names),
+        "withdrawn": _all(answer.withdrawn, names),
+        "witness": _one(answer.witness, names),
+        "tree": _tree(answer.tree, names),
+        "optima": optima and optima._replace(assignments=tuple(_by(one, names) for one in optima.assignments)),
+        "improvements": _improvements(answer.improvements, names),
+        "dropped_constraints": _dropped(answer.dropped_constraints, names),
+    }
 
 
 def _dropped(found: Iterable[DroppedConstraint], names: Mapping[str, str]) -> tuple[DroppedConstraint, ...]:

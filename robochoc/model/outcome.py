@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, fields
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
@@ -101,43 +101,6 @@ class Improvement(NamedTuple):
     withdrawn: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class EpochOutcome:
-    """The outcome of one epoch of a problem that changes over time, or whose robots were lost.
-
-    Attributes:
-        verdict: The answer to the problem.
-        robots: The robots of the team in this epoch, in the files' order.
-        opened_by: What opened the epoch, in a few words.
-        assignment: The values of all variables of the robots that are not withdrawn.
-        cost: The cost of the assignment. None: there is no assignment.
-        metrics: What the epoch took.
-        verified: As in `Outcome`.
-        witness: As in `Outcome`.
-        lost: The robots whose loss ended the epoch.
-        bound: As in `Outcome`.
-        tree: As in `Outcome`.
-        confirmed: As in `Outcome`.
-        improvements: As in `Outcome`.
-        dropped_constraints: As in `Outcome`.
-    """
-
-    verdict: Verdict
-    robots: tuple[str, ...]
-    opened_by: str = "the start"
-    assignment: dict[str, int] = field(default_factory=dict)
-    cost: Cost | None = None
-    metrics: Metrics = field(default_factory=Metrics)
-    verified: bool = False
-    witness: str | None = None
-    lost: tuple[str, ...] = ()
-    bound: Cost | None = None
-    tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
-    confirmed: bool = False
-    improvements: tuple[Improvement, ...] = ()
-    dropped_constraints: tuple[DroppedConstraint, ...] = ()
-
-
 CENTRAL_SOLVER = "the central solver"
 """The name of ACE, and of what is done before it is asked, in `confirmed_by`."""
 ALL_ROBOTS = "all robots"
@@ -186,57 +149,39 @@ class Preprocessing:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The result of a run. With several epochs the verdict is that of the last one, and metrics are summed up.
+class Answer:
+    """The answer to a problem, of a search, an epoch or a whole run. Costs are in the user's numbers.
 
     Attributes:
-        team: The name of the team.
-        protocol: The protocol that was asked for, or chosen.
-        runtime: The runtime.
-        seed: The seed of the run.
-        verdict: The answer to the problem.
+        verdict: The verdict.
         assignment: The values of all variables of the robots that are not withdrawn, as the integers that robots
             compute with: those of `symbolic` variables are places in `symbols`. `Solution.values` has the values of
             the user.
-        cost: The cost of the assignment in the user's numbers, exactly; the utility where that is maximised. None:
-            there is no assignment.
-        withdrawn: The names of the withdrawn robots, the lost ones included.
-        metrics: What the run took.
+        cost: The cost of the assignment, exactly; the utility if that is maximised. None: there is no assignment.
+        withdrawn: The names of the withdrawn robots; in an `Outcome` including the lost ones.
+        metrics: The messages, checks and time spent.
         verified: Whether the checker has compared the assignment with every constraint of a team that was validated
             before; for `no-solution`, whether the central solver has found the same.
         witness: The robot that ended the search: for `no-solution`, the one that has `RULED_OUT`.
-        reason: Why, where it is not obvious: a robot without a local solution, or the limit that was reached.
-        count: The number of solutions, if it was asked for.
-        lost: The names of the withdrawn robots whose processes died, and that did not come back.
-        order: The name of the priority order that was asked for, or chosen; `listed` for a list of names.
-        bound: A lower bound on the cost of any assignment (an upper one on the utility, where that is maximised); with
+        reason: The reason for the verdict, if it is not obvious: a robot without a local solution, or a limit.
+        count: The number of solutions, if it was requested.
+        bound: A lower bound on the cost of any assignment (an upper one on the utility, if that is maximised); with
             withdrawal, on the weight of the withdrawn robots. None: not known.
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
         confirmed: Whether the central solver was asked, and has found the same `no-solution` or the same minimum cost.
         confirmed_by: The names of the solvers that have found the same, on the machine of the run.
-        epochs: The epochs, if there were several.
-        channel: The name of the channel model, if time was simulated by one.
-        placed_by: The protocol of the withdrawal, if it is not the one that was asked for.
-        claimed_by: Across machines: the robot whose claim the verdict rests on, as it cannot be checked; or
-            `ALL_ROBOTS`.
-        checked: Across machines: how many constraints were checked, and by whom.
-        symbols: The names of the team's symbols, if it has any: the value 2 stands for the one at place 2.
-        symbolic: The variables whose values stand for symbols.
-        chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
-        preprocessing: What the robots have done before, if that was asked for.
+        checked: Across machines: the numbers of checked constraints, by the robots that checked them.
+        preprocessing: The result of preprocessing, if that was requested.
         optima: The optima, or solutions, if the protocol lists them.
         deadline: The seconds after which an answer was due, if the search was ended by the time and the answer is the
-            best that was known by then.
-        improvements: The answers that were published while the search went on, the first of them at the deadline.
+            best one known at that moment.
+        improvements: The answers that were published during the search, the first of them at the deadline.
         dropped_constraints: The constraints between robots that were dropped because robots are absent, if there is an
             assignment (`model/absence.py`). Across machines no robot knows all of them, and none is listed.
     """
 
-    team: str
-    protocol: str
-    runtime: str
-    seed: int
     verdict: Verdict
+    _: KW_ONLY
     assignment: dict[str, int] = field(default_factory=dict)
     cost: Cost | None = None
     withdrawn: tuple[str, ...] = ()
@@ -245,25 +190,73 @@ class Outcome:
     witness: str | None = None
     reason: str | None = None
     count: int | None = None
-    lost: tuple[str, ...] = ()
-    order: str | None = None
     bound: Cost | None = None
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
     confirmed_by: tuple[str, ...] = ()
-    epochs: tuple[EpochOutcome, ...] = ()
-    channel: str | None = None
-    placed_by: str | None = None
-    claimed_by: str | None = None
     checked: CheckCounts | None = None
-    symbols: tuple[str, ...] = ()
-    symbolic: tuple[str, ...] = ()
-    chosen: dict[str, str] = field(default_factory=dict)
     preprocessing: Preprocessing | None = None
     optima: Optima | None = None
     deadline: float | None = None
     improvements: tuple[Improvement, ...] = ()
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
+
+    def parts(self) -> dict[str, Any]:
+        """Return the fields of an answer by name, without those of a subclass."""
+        return {one.name: getattr(self, one.name) for one in fields(Answer)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpochOutcome(Answer):
+    """The outcome of one epoch of a problem that changes over time, or whose robots were lost.
+
+    Attributes:
+        robots: The robots of the team in this epoch, in the files' order.
+        opened_by: The event that opened the epoch, in a few words.
+        lost: The robots whose loss ended the epoch.
+    """
+
+    robots: tuple[str, ...]
+    opened_by: str = "the start"
+    lost: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome(Answer):
+    """The result of a run: how it was run, and its answer. With several epochs the answer is that of the last one.
+
+    Metrics are summed up over the epochs.
+
+    Attributes:
+        team: The name of the team.
+        protocol: The protocol that was given or chosen.
+        runtime: The runtime.
+        seed: The seed of the run.
+        lost: The names of the withdrawn robots whose processes died, and that did not come back.
+        order: The name of the priority order that was given or chosen; `listed` for a list of names.
+        epochs: The epochs, if there were several.
+        channel: The name of the channel model, if time was simulated by one.
+        placed_by: The protocol of the withdrawal, if it differs from `protocol`.
+        claimed_by: Across machines: the robot on whose claim the verdict rests, as it cannot be checked; or
+            `ALL_ROBOTS`.
+        symbols: The names of the team's symbols, if it has any: the value 2 means the symbol at place 2.
+        symbolic: The variables whose values are symbols.
+        chosen: The reasons for the choice of `protocol` and `order`, where they were not given.
+    """
+
+    team: str
+    protocol: str
+    runtime: str
+    seed: int
+    lost: tuple[str, ...] = ()
+    order: str | None = None
+    epochs: tuple[EpochOutcome, ...] = ()
+    channel: str | None = None
+    placed_by: str | None = None
+    claimed_by: str | None = None
+    symbols: tuple[str, ...] = ()
+    symbolic: tuple[str, ...] = ()
+    chosen: dict[str, str] = field(default_factory=dict)
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""

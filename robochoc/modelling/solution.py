@@ -32,7 +32,7 @@ class NamedValues(dict[str, object]):
         return super().values()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SolutionEpoch(EpochOutcome):
     """The outcome of an epoch, with the user's values.
 
@@ -43,7 +43,7 @@ class SolutionEpoch(EpochOutcome):
     values: Mapping[str, object] = field(default_factory=dict, compare=False)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Solution(Outcome, Mapping[str, object]):
     """An outcome with the user's values.
 

@@ -8,7 +8,7 @@ while the search went on (`--improve`) may be older than these: it is checked wi
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 
@@ -212,11 +212,10 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochO
     try:
         answer = evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team), ANY_DEADLINE)
     except (RefutedError, TooManySolutionsError):
-        return EpochOutcome(Verdict.UNKNOWN, team.order)
+        return EpochOutcome(Verdict.UNKNOWN, robots=team.order)
     if not withdrawal:
         return answer.as_epoch(team.order)
-    bare = Outcome(outcome.team, outcome.protocol, outcome.runtime, outcome.seed, Verdict.UNKNOWN)
-    return answer.as_outcome(bare, ())
+    return answer.as_outcome(replace(outcome, verdict=Verdict.UNKNOWN), ())
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:

@@ -35,7 +35,7 @@ def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | 
     builder = MissionBuilder([robot], assignment, scale=scale)
     known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}
     if assignment:
-        goals = builder.leg(EpochOutcome(Verdict(verdict), (robot.name,), assignment=dict(assignment))).goals
+        goals = builder.leg(EpochOutcome(Verdict(verdict), robots=(robot.name,), assignment=dict(assignment))).goals
     else:
         goals = {number: Goal(drone.home, lands=True) for number, drone in enumerate(builder.drones)}
     return Leg(why, Verdict(verdict), {n: goal for n, goal in goals.items() if builder.drones[n].name in known})

@@ -13,7 +13,7 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.context import RunContext
-from robochoc.run.evaluation import Answer, check_assignment
+from robochoc.run.evaluation import PhaseAnswer, check_assignment
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, TeamSolver
 from robochoc.solver.errors import SolverLostError
@@ -26,7 +26,7 @@ from robochoc.verification.second_opinion import total_cost
 class _Decision(NamedTuple):
     """The decision of the central solver for one epoch, and the number of solutions if it was asked for."""
 
-    answer: Answer
+    answer: PhaseAnswer
     solutions: int | None = None
 
 
@@ -72,7 +72,7 @@ def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
     solutions = None
     if options.count:
         found = solver.solve(team, count=True)
-        answer, solutions = Answer(found.verdict), found.count
+        answer, solutions = PhaseAnswer(found.verdict), found.count
     else:
         answer = _answer(solver, team, options)
     if answer.verified:
@@ -80,7 +80,7 @@ def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
     return _Decision(replace(answer, metrics=Metrics(wall_s=time.monotonic() - began)), solutions)
 
 
-def _answer(solver: TeamSolver, team: Team, options: Options) -> Answer:
+def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
     """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
     price = None
     found = None
@@ -92,7 +92,7 @@ def _answer(solver: TeamSolver, team: Team, options: Options) -> Answer:
     return _answer_of(found, team, price, options)
 
 
-def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Options) -> Answer:
+def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Options) -> PhaseAnswer:
     """Return what the central solver has `found` as an answer.
 
     `price` is the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
@@ -111,7 +111,7 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
     withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
     is_impossible = verdict == Verdict.NO_SOLUTION
-    return Answer(
+    return PhaseAnswer(
         verdict,
         reason=absence_reason(team, withdrawal=price is not None) or None if is_impossible else None,
         assignment=assignment,

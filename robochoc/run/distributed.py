@@ -15,7 +15,7 @@ from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.evaluation import Answer, Search, evaluate_search, why_spoiled
+from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase, first_phase, second_phase
 from robochoc.system.stopping import stop_requested
@@ -73,7 +73,7 @@ class Deployment(ABC):
     def remove(self, lost: Mapping[str, str]) -> None:
         """Go on without robots that were lost; `lost` maps their names to the reasons."""
 
-    def confirm(self, phase: Phase, answer: Answer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
+    def confirm(self, phase: Phase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
         """Return the central solvers that agree. Raises `RefutedError` where one found something else."""
         return ()
 
@@ -82,7 +82,7 @@ class Deployment(ABC):
         """Return what kept the robots from finishing before a limit was reached, as far as it is known."""
         return ""
 
-    def solve(self, phase: Phase) -> Answer:
+    def solve(self, phase: Phase) -> PhaseAnswer:
         """Return the answer of `phase`: search until no robot gets lost, and check what was found.
 
         Raises:
@@ -93,7 +93,7 @@ class Deployment(ABC):
         answer = self.evaluated(phase, search)
         return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
 
-    def evaluated(self, phase: Phase, search: Search) -> Answer:
+    def evaluated(self, phase: Phase, search: Search) -> PhaseAnswer:
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
         deadline = self.options.deadline if self.left_s() == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.told, deadline))
@@ -101,11 +101,11 @@ class Deployment(ABC):
             return answer.confirmed_as(self.confirm(phase, answer))
         return answer
 
-    def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - as `confirm`
+    def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - as `confirm`
         """Return the answer of `search`, or a better one that was found while it went on."""
         return answer
 
-    def why_unknown(self, phase: Phase, answer: Answer) -> str | None:
+    def why_unknown(self, phase: Phase, answer: PhaseAnswer) -> str | None:
         """Return why `answer` has no verdict; None if it has one."""
         if answer.verdict != Verdict.UNKNOWN:
             return None
@@ -136,12 +136,12 @@ class Deployment(ABC):
             )
         return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
-    def outcome(self, header: Outcome, answer: Answer) -> Outcome:
+    def outcome(self, header: Outcome, answer: PhaseAnswer) -> Outcome:
         """Return `header`, which says what was run, with its `answer`."""
         metrics = replace(answer.metrics, compile_s=self.compile_s)
         return replace(answer, metrics=metrics, count=self._count(answer)).as_outcome(header, self.lost)
 
-    def _count(self, answer: Answer) -> int | None:
+    def _count(self, answer: PhaseAnswer) -> int | None:
         """Return how many solutions, or optima, there are, if that is asked for and known."""
         if not self.options.count:
             return None

@@ -7,24 +7,13 @@ files are at hand: `check_with_files`. Across machines the robots check (`run/ne
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
-from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
-from robochoc.model.outcome import (
-    CheckCounts,
-    EpochOutcome,
-    Improvement,
-    Metrics,
-    Optima,
-    Outcome,
-    Preprocessing,
-    PseudoTreeNode,
-    Verdict,
-)
+from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
@@ -40,27 +29,8 @@ from robochoc.verification.checker import (
     violations,
 )
 
-
-class CheckedAssignment(NamedTuple):
-    """An assignment that was checked.
-
-    `withdrawn` are the robots without values, `dropped` the constraints that are dropped. `verified`: no hard
-    constraint is broken. `check_counts` is set where robots have checked. `reason` says why there is no assignment, or
-    why it was not checked. `optima` are there if the protocol lists them.
-    """
-
-    assignment: dict[str, int]
-    cost: Cost | None = None
-    withdrawn: tuple[str, ...] = ()
-    verified: bool = True
-    check_counts: CheckCounts | None = None
-    reason: str | None = None
-    optima: Optima | None = None
-    dropped: tuple[DroppedConstraint, ...] = ()
-
-
-Check = Callable[[], CheckedAssignment | None]
-"""Returns the checked result of a search. None if the result breaks a hard constraint."""
+Check = Callable[[], Answer | None]
+"""Return the checked assignment of a search, with an undecided verdict. None if it violates a hard constraint."""
 
 
 class Search(NamedTuple):
@@ -70,44 +40,24 @@ class Search(NamedTuple):
     check: Check
 
 
-@dataclass(frozen=True)
-class Answer:
-    """The result of a phase of a run. Most fields are those of `model.outcome.Outcome`: costs are the user's numbers.
+@dataclass(frozen=True, kw_only=True)
+class PhaseAnswer(Answer):
+    """The answer of a phase of a run. `withdrawn` are the robots that withdrew; lost robots are not among them.
 
-    `withdrawn` are the robots that withdrew so that the others have a solution; those that were lost are not among
-    them. `ended`: the protocol has come to its end, no limit was reached. `count` is there if the protocol counts.
+    `ended`: the protocol has ended by itself, no limit was reached.
     """
 
-    verdict: Verdict
-    metrics: Metrics = field(default_factory=Metrics)
-    witness: str | None = None
-    assignment: dict[str, int] = field(default_factory=dict)
-    cost: Cost | None = None
-    withdrawn: tuple[str, ...] = ()
-    bound: Cost | None = None
-    tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
-    verified: bool = False
-    confirmed: bool = False
-    confirmed_by: tuple[str, ...] = ()
-    checked: CheckCounts | None = None
-    reason: str | None = None
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
-    preprocessing: Preprocessing | None = None
-    count: int | None = None
-    optima: Optima | None = None
-    deadline: float | None = None
-    improvements: tuple[Improvement, ...] = ()
-    dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
-    def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
-        """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
+    def confirmed_as(self, solvers: tuple[str, ...]) -> PhaseAnswer:
+        """Return this answer, confirmed by the central `solvers`; nothing else can verify `no-solution`."""
         sure = bool(solvers)
         verified = sure if self.verdict == Verdict.NO_SOLUTION else self.verified
         return replace(self, verified=verified, confirmed=sure, confirmed_by=solvers)
 
-    def then(self, second: Answer) -> Answer:
-        """Return the answer of two phases: that of the `second`, with what both have cost."""
+    def then(self, second: PhaseAnswer) -> PhaseAnswer:
+        """Return the answer of two phases: that of the `second`, with the costs of both."""
         return replace(
             second,
             metrics=self.metrics + second.metrics,
@@ -118,55 +68,19 @@ class Answer:
         )
 
     def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
-        """Return the epoch that ended with this answer."""
-        return EpochOutcome(
-            verdict=self.verdict,
-            robots=robots,
-            opened_by=opened_by,
-            assignment=self.assignment,
-            cost=self.cost,
-            metrics=self.metrics,
-            verified=self.verified,
-            witness=self.witness,
-            lost=tuple(lost),
-            bound=self.bound,
-            tree=self.tree,
-            confirmed=self.confirmed,
-            improvements=self.improvements,
-            dropped_constraints=self.dropped_constraints,
-        )
+        """Return the epoch that ended with this answer. Preprocessing is reported for the run as a whole."""
+        parts = self.parts() | {"preprocessing": None}
+        return EpochOutcome(**parts, robots=robots, opened_by=opened_by, lost=tuple(lost))
 
     def as_outcome(self, header: Outcome, lost: tuple[str, ...]) -> Outcome:
-        """Return `header`, which says what was run, with this answer; the robots `lost` are withdrawn as well."""
-        return replace(
-            header,
-            verdict=self.verdict,
-            assignment=self.assignment,
-            cost=self.cost,
-            withdrawn=(*lost, *self.withdrawn),
-            metrics=self.metrics,
-            verified=self.verified,
-            witness=self.witness,
-            reason=self.reason,
-            lost=lost,
-            bound=self.bound,
-            tree=self.tree,
-            confirmed=self.confirmed,
-            confirmed_by=self.confirmed_by,
-            epochs=self.epochs,
-            checked=self.checked,
-            preprocessing=self.preprocessing,
-            count=self.count,
-            optima=self.optima,
-            deadline=self.deadline,
-            improvements=self.improvements,
-            dropped_constraints=self.dropped_constraints,
-        )
+        """Return `header`, which describes the run, with this answer; the robots `lost` are withdrawn as well."""
+        parts = self.parts() | {"withdrawn": (*lost, *self.withdrawn)}
+        return replace(header, **parts, lost=lost, epochs=self.epochs)
 
 
 def evaluate_search(
     phase: Phase, search: Search, kind: ProblemKind, told: Callable[[float], Cost], deadline: float | None = None
-) -> Answer:
+) -> PhaseAnswer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`; `told` tells a cost to the user.
 
     A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
@@ -181,7 +95,8 @@ def evaluate_search(
     result = search.result
     ended = result.verdict == Verdict.SOLUTION
     cut = deadline is not None and result.verdict == Verdict.UNKNOWN and result.witness is None
-    answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
+    tree = pseudo_tree(result.findings)
+    answer = PhaseAnswer(result.verdict, metrics=result.metrics, witness=result.witness, tree=tree, ended=ended)
     if ended and not result.lost:
         answer = replace(answer, count=optima(result.findings))
     if result.lost or result.verdict == Verdict.NO_SOLUTION or not (ended or phase.traits.costs or cut):
@@ -204,10 +119,10 @@ def evaluate_search(
         withdrawn=found.withdrawn,
         bound=bound,
         verified=found.verified,
-        checked=found.check_counts,
+        checked=found.checked,
         reason=found.reason,
         optima=found.optima,
-        dropped_constraints=found.dropped,
+        dropped_constraints=found.dropped_constraints,
     )
 
 
@@ -222,13 +137,13 @@ def why_spoiled(phase: Phase, metrics: Metrics) -> str:
     return f"{many:,} message{'s were' if many != 1 else ' was'} lost, and {phase.name} needs every one"
 
 
-def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
+def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> PhaseAnswer:
     """Return the answer of a search that is spoiled: a solution that passes the check, or that nothing is known.
 
     Where there are costs, a reason goes with a solution: it is what the robots had when they could not go on, not what
     the protocol ends with. An auction may have sold nothing by then.
     """
-    answer = Answer(Verdict.UNKNOWN, search.result.metrics)
+    answer = PhaseAnswer(Verdict.UNKNOWN, metrics=search.result.metrics)
     found = search.check()
     if found is None:
         return answer
@@ -242,9 +157,9 @@ def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> Answer
         cost=found.cost,
         withdrawn=found.withdrawn,
         verified=found.verified,
-        checked=found.check_counts,
+        checked=found.checked,
         reason=unfinished if sure else found.reason,
-        dropped_constraints=found.dropped,
+        dropped_constraints=found.dropped_constraints,
     )
 
 
@@ -259,7 +174,7 @@ def is_proven(phase: Phase, result: RunResult) -> bool:
 
 
 @collection_paused()
-def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam) -> CheckedAssignment | None:
+def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam) -> Answer | None:
     """Return what a search has found, checked against every constraint of every file.
 
     Args:
@@ -288,7 +203,15 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn)
     listed = _checked_optima(phase, result, team, compiled, paid)
     dropped = dropped_constraints(team, withdrawn)
-    return CheckedAssignment(in_order, paid, withdrawn, optima=listed, dropped=dropped)
+    return Answer(
+        Verdict.UNKNOWN,
+        assignment=in_order,
+        cost=paid,
+        withdrawn=withdrawn,
+        verified=True,
+        optima=listed,
+        dropped_constraints=dropped,
+    )
 
 
 def _checked_optima(
@@ -334,7 +257,7 @@ def check_assignment(
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
-def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: CheckedAssignment) -> Verdict:
+def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Answer) -> Verdict:
     """Return the verdict on what was found."""
     if is_proven(phase, result):
         minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind == ProblemKind.DISWCSP)
@@ -346,7 +269,7 @@ def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Check
     return result.verdict
 
 
-def _meets_bound(result: RunResult, found: CheckedAssignment, told: Callable[[float], Cost]) -> bool:
+def _meets_bound(result: RunResult, found: Answer, told: Callable[[float], Cost]) -> bool:
     """Return whether what was found, with all robots, costs as little as their bound says that anything does."""
     least = lower_bound(result.findings)
     return least is not None and not found.withdrawn and found.verified and found.cost == told(least)

@@ -15,9 +15,9 @@ from typing import Protocol
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.model.cost_units import Cost
-from robochoc.model.outcome import EpochOutcome, Improvement, Verdict
+from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.evaluation import Answer, CheckedAssignment, Search, evaluate_search
+from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase
 from robochoc.verification.checker import RefutedError
@@ -53,7 +53,7 @@ class Rank:
         """Return the rank of an answer of this `cost` without the robots `withdrawn`: the lower, the better."""
         return sum(self._weights[name] for name in withdrawn), self._signed(cost)
 
-    def of_answer(self, answer: Answer) -> tuple[int, Cost]:
+    def of_answer(self, answer: PhaseAnswer) -> tuple[int, Cost]:
         """Return the rank of `answer`, which has an assignment."""
         return self.of(answer.cost or 0, answer.withdrawn)
 
@@ -61,7 +61,7 @@ class Rank:
         """Return the bound that says the most; None if there is none."""
         return max((bound for bound in bounds if bound is not None), key=self._signed, default=None)
 
-    def meets(self, answer: Answer, bound: Cost | None) -> bool:
+    def meets(self, answer: PhaseAnswer, bound: Cost | None) -> bool:
         """Return whether `answer`, by all robots, is as good as `bound` says that anything is."""
         return bound is not None and not answer.withdrawn and self._signed(answer.cost or 0) <= self._signed(bound)
 
@@ -90,14 +90,14 @@ class Improvements(SearchWatch):
         *,
         began: float,
         deadline: float,
-        evaluate: Callable[[RunResult], Answer],
+        evaluate: Callable[[RunResult], PhaseAnswer],
         rank: Rank,
         has_costs: bool,
         bounded: bool,
-        publish: Callable[[Answer, tuple[Improvement, ...]], None],
+        publish: Callable[[PhaseAnswer, tuple[Improvement, ...]], None],
         has_news: Callable[[], bool],
         earlier: Sequence[Improvement] = (),
-        keep: Callable[[Answer], None] | None = None,
+        keep: Callable[[PhaseAnswer], None] | None = None,
     ) -> None:
         self._began = began
         self._deadline = deadline
@@ -108,8 +108,8 @@ class Improvements(SearchWatch):
         self._publish = publish
         self._has_news = has_news
         self._keep = keep
-        self._published: Answer | None = None
-        self._best: Answer | None = None
+        self._published: PhaseAnswer | None = None
+        self._best: PhaseAnswer | None = None
         self._bound: Cost | None = None
         self._asked = self._polled = began
         self._due = min(began + PERIOD_S, deadline)
@@ -150,7 +150,7 @@ class Improvements(SearchWatch):
         if now < self._deadline - PERIOD_S:
             self._due = min(self._due, self._deadline - PERIOD_S)  # so that the answer is there at the deadline
 
-    def _note(self, answer: Answer) -> None:
+    def _note(self, answer: PhaseAnswer) -> None:
         """Keep `answer` if it is the best so far, and what is proven of the costs of all."""
         if self._bounded:
             self._bound = self._rank.tightest([self._bound, answer.bound])
@@ -164,7 +164,7 @@ class Improvements(SearchWatch):
         if best is not None and (self._has_costs or best.withdrawn) and self._is_proven(best, answer):
             self._best = replace(best, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
 
-    def _is_proven(self, best: Answer, answer: Answer) -> bool:
+    def _is_proven(self, best: PhaseAnswer, answer: PhaseAnswer) -> bool:
         """Return whether nothing is better than the `best`, as `answer` says, or the bound."""
         optimal = answer.verdict == Verdict.OPTIMAL and self._rank.of_answer(answer) == self._rank.of_answer(best)
         return optimal or self._rank.meets(best, self._bound)
@@ -175,7 +175,7 @@ class Improvements(SearchWatch):
             final = self._best.verdict == Verdict.OPTIMAL or not (self._has_costs or self._best.withdrawn)
             self._over = self._over or final
 
-    def _tell(self, best: Answer, now: float) -> None:
+    def _tell(self, best: PhaseAnswer, now: float) -> None:
         """Publish the `best`, if that is a gain: robots under way are not sent elsewhere for nothing."""
         before = self._published
         if self._outdated or (before is not None and not self._rank.of_answer(best) < self._rank.of_answer(before)):
@@ -185,7 +185,7 @@ class Improvements(SearchWatch):
             self.improvements.append(Improvement(now - self._began, best.verdict, best.cost, best.withdrawn))
         self._publish(best, tuple(self.improvements))
 
-    def concluded(self, final: Answer, *, lost: bool) -> Answer:
+    def concluded(self, final: PhaseAnswer, *, lost: bool) -> PhaseAnswer:
         """Return the answer of the search, which has ended with `final`: that, or what is better of those before.
 
         It is published if nothing as good is, and the problem has not changed. If robots were `lost`, what was
@@ -219,7 +219,7 @@ class Improvements(SearchWatch):
             improvements=tuple(self.improvements),
         )
 
-    def _refuse_false_claims(self, final: Answer) -> None:
+    def _refuse_false_claims(self, final: PhaseAnswer) -> None:
         best = self._best
         if best is None:
             return
@@ -236,11 +236,11 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
     *,
     began: float,
     told: Callable[[float], Cost],
-    check: Callable[[RunResult], CheckedAssignment | None],
-    publish: Callable[[Answer, tuple[Improvement, ...]], None],
+    check: Callable[[RunResult], Answer | None],
+    publish: Callable[[PhaseAnswer, tuple[Improvement, ...]], None],
     audience: Audience | None,
     before: Improvements | None,
-    keep: Callable[[Answer], None] | None = None,
+    keep: Callable[[PhaseAnswer], None] | None = None,
 ) -> Improvements:
     """Return the best answers of the search of `phase`, of a run with a deadline.
 
@@ -257,7 +257,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
         keep: Gets each best answer when it is found.
     """
 
-    def evaluate(snapshot: RunResult) -> Answer:
+    def evaluate(snapshot: RunResult) -> PhaseAnswer:
         snapshot = _as_told_one_after_the_other(snapshot, phase, options)
         return evaluate_search(phase, Search(snapshot, partial(check, snapshot)), team.kind, told, options.deadline)
 
@@ -286,7 +286,7 @@ def _as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Opt
     return replace(snapshot, metrics=replace(snapshot.metrics, lost_messages=lost))
 
 
-def _is_found(answer: Answer) -> bool:
+def _is_found(answer: PhaseAnswer) -> bool:
     """Return whether `answer` is one that was checked. That nobody flies is none, unless nothing else is possible."""
     flown = bool(answer.assignment) or not answer.withdrawn or answer.verdict == Verdict.OPTIMAL
     return flown and answer.verdict in _FOUND and answer.verified and answer.cost is not None

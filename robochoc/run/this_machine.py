@@ -15,7 +15,7 @@ from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preproces
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import Answer, Search, check_with_files
+from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.options import Runtime
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
@@ -104,7 +104,7 @@ class ThisMachine(Deployment):
         """See `Deployment.remove`."""
         self._scenario.remove(lost.keys())
 
-    def solve(self, phase: Phase) -> Answer:
+    def solve(self, phase: Phase) -> PhaseAnswer:
         """See `Deployment.solve`. The problem may change, but not while it is decided which robots withdraw."""
         if not phase.withdrawal:
             return self._solve_epochs(phase)
@@ -124,7 +124,7 @@ class ThisMachine(Deployment):
             result = session.search(self.left_s(), self.options.messages)
         return Search(result, partial(check_with_files, phase, result, self._scenario.team, epoch.compiled))
 
-    def confirm(self, phase: Phase, answer: Answer) -> tuple[str, ...]:
+    def confirm(self, phase: Phase, answer: PhaseAnswer) -> tuple[str, ...]:
         """See `Deployment.confirm`."""
         if not self.options.verify:
             return ()
@@ -136,22 +136,22 @@ class ThisMachine(Deployment):
         total = total_cost(self._scenario.team, answer.assignment, cost)
         return self._confirmed(total=total, withdrawal_cost=cost)
 
-    def limit_reached(self, why: str) -> Answer:
+    def limit_reached(self, why: str) -> PhaseAnswer:
         """Return the answer of a run that a limit has ended before the robots could search."""
         reason = "; ".join([why, *self._scenario.failed_returns])
         before = total_preprocessing(self._done)
-        return self._with_epochs(Answer(Verdict.UNKNOWN, reason=reason, preprocessing=before))
+        return self._with_epochs(PhaseAnswer(Verdict.UNKNOWN, reason=reason, preprocessing=before))
 
     # Epochs
 
-    def _solve_epochs(self, phase: Phase) -> Answer:
+    def _solve_epochs(self, phase: Phase) -> PhaseAnswer:
         """Return the answer of the last epoch, with what all of them have cost."""
         scenario = self._scenario
-        answer, lost = Answer(Verdict.UNKNOWN), dict[str, str]()
+        answer, lost = PhaseAnswer(Verdict.UNKNOWN), dict[str, str]()
         try:
             compiled = scenario.compiled()
         except NoLocalSolutionError as alone:
-            answer = Answer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
+            answer = PhaseAnswer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
             return answer.confirmed_as(self._confirmed(alone.robot))
         if self.options.preprocess is not None:
             compiled = scenario.prepared()
@@ -176,7 +176,7 @@ class ThisMachine(Deployment):
         reasons = filter(None, [why, *scenario.failed_returns])
         return replace(answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._done))
 
-    def _absence_reason(self, answer: Answer, *, withdrawal: bool) -> str | None:
+    def _absence_reason(self, answer: PhaseAnswer, *, withdrawal: bool) -> str | None:
         """Return the reason for a missing solution: constraints that the remaining robots cannot satisfy."""
         if answer.verdict != Verdict.NO_SOLUTION:
             return None
@@ -184,7 +184,7 @@ class ThisMachine(Deployment):
 
         return absence_reason(self._scenario.team, withdrawal=withdrawal) or None
 
-    def _events_missed(self, answer: Answer) -> str:
+    def _events_missed(self, answer: PhaseAnswer) -> str:
         """Return in words that a limit came before all events, with an answer; empty: it did not."""
         left = self._scenario.events_left
         if not left or answer.verdict == Verdict.UNKNOWN:
@@ -211,7 +211,7 @@ class ThisMachine(Deployment):
             return
         team, compiled = self._scenario.team, start.epoch.compiled
 
-        def publish(answer: Answer, improvements: tuple[Improvement, ...]) -> None:
+        def publish(answer: PhaseAnswer, improvements: tuple[Improvement, ...]) -> None:
             if audience is not None:
                 now = replace(answer, improvements=improvements)
                 audience.improve(team, now.as_epoch(team.order, start.opened_by or "the start"), answer.withdrawn)
@@ -228,7 +228,7 @@ class ThisMachine(Deployment):
             before=before,
         )
 
-    def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - see `Deployment`
+    def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
         """See `Deployment.concluded`. What was published for robots that are now lost is no answer."""
         improvements = self._improvements
         return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
@@ -249,16 +249,16 @@ class ThisMachine(Deployment):
         if result.verdict == Verdict.SOLUTION:
             return self._compile(restricted(whole, result.findings)), None
         if result.verdict == Verdict.UNKNOWN:
-            self._cut_short = self.why_unknown(phase, Answer(result.verdict, result.metrics)) or ""
+            self._cut_short = self.why_unknown(phase, PhaseAnswer(result.verdict, metrics=result.metrics)) or ""
         return whole, RunResult.of(result.verdict, result.witness, {}, (), 0)
 
-    def _settled(self, phase: Phase, found: RunResult) -> Answer:
+    def _settled(self, phase: Phase, found: RunResult) -> PhaseAnswer:
         """Return the answer of a run that has ended before the protocol began."""
         before = total_preprocessing(self._done)
-        answer = Answer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
+        answer = PhaseAnswer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
         return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict == Verdict.NO_SOLUTION else answer
 
-    def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> Answer:
+    def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> PhaseAnswer:
         """Return the answer of an epoch, checked with the files."""
         check = partial(check_with_files, phase, epoch.result, epoch.team, epoch.epoch.compiled)
         answer = self.evaluated(phase, Search(epoch.result, check))
@@ -274,7 +274,7 @@ class ThisMachine(Deployment):
         if event:
             self._scenario.add_event(normalized_event(self._scenario.team, event))
 
-    def _with_epochs(self, answer: Answer) -> Answer:
+    def _with_epochs(self, answer: PhaseAnswer) -> PhaseAnswer:
         """Return the last epoch's `answer`, with what all epochs have cost."""
         spent = sum((epoch.metrics for epoch in self.epochs), Metrics())
         several = len(self.epochs) > 1 or self._dynamic

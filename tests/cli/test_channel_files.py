@@ -156,7 +156,7 @@ def test_a_bad_file_is_told_in_one_line(tmp_path: Path) -> None:
 
 def test_what_is_no_file_or_no_text(tmp_path: Path) -> None:
     (tmp_path / "raw.toml").write_bytes(b"\xff\xfe")
-    for name, message in (("", "is not a file"), ("none.toml", "is no file"), ("raw.toml", "is not UTF-8")):
+    for name, message in (("", "is not a file"), ("none.toml", "is not a file"), ("raw.toml", "is not UTF-8")):
         with pytest.raises(InvalidInputError, match=message):
             read_channel(tmp_path / name)
 

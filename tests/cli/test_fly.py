@@ -31,7 +31,7 @@ def flown(*words: object) -> dict[str, Any]:
 
 def saved(folder: Path, values: dict[str, int], *, epochs: tuple[EpochOutcome, ...] = (), name: str = "two") -> Path:
     verdict = Verdict.SOLUTION if values else Verdict.NO_SOLUTION
-    outcome = Outcome(name, "abt", "simulator", 0, verdict, values, epochs=epochs)
+    outcome = Outcome(verdict, team=name, protocol="abt", runtime="simulator", seed=0, assignment=values, epochs=epochs)
     path = folder / "result.json"
     path.write_bytes(result_json(outcome))
     return path
@@ -144,7 +144,9 @@ def test_places_far_from_the_origin_are_flown_there(tmp_path: Path) -> None:
 
 
 def test_drones_of_one_name_are_all_told(tmp_path: Path) -> None:
-    outcome = Outcome("t", "abt", "simulator", 0, Verdict.SOLUTION, {"A": 1}, withdrawn=("A",))
+    outcome = Outcome(
+        Verdict.SOLUTION, team="t", protocol="abt", runtime="simulator", seed=0, assignment={"A": 1}, withdrawn=("A",)
+    )
     (tmp_path / "result.json").write_bytes(result_json(outcome))
     assert [drone["name"] for drone in flown(tmp_path / "result.json")["drones"]] == ["A", "A"]
 
@@ -177,8 +179,8 @@ def test_epochs_that_the_situation_opened_and_a_recording_that_takes_the_same_dr
 
 def test_a_team_without_a_solution_stays_on_the_ground(tmp_path: Path) -> None:
     nowhere = (
-        EpochOutcome(Verdict.SOLUTION, ("A",), assignment={"V1.1": 1}),
-        EpochOutcome(Verdict.NO_SOLUTION, ("A",)),
+        EpochOutcome(Verdict.SOLUTION, robots=("A",), assignment={"V1.1": 1}),
+        EpochOutcome(Verdict.NO_SOLUTION, robots=("A",)),
     )
     told = flown(saved(tmp_path, {}, epochs=nowhere))
     assert [leg["verdict"] for leg in told["legs"]] == ["solution", "no-solution"]

@@ -164,9 +164,16 @@ def spoilt_scenario(chance: Random, content: bytes) -> bytes:
 def results() -> Sequence[bytes]:
     """Results with and without all that can be in one."""
     counts = Metrics({"Ok": 3, "Nogood": 1}, 90, 7, 20, 0.5, 0.25, 4096, 1.5)
-    epoch = EpochOutcome(Verdict.SOLUTION, ("A", "B"), assignment={"V": 1}, cost=2, metrics=counts, lost=("B",))
+    epoch = EpochOutcome(Verdict.SOLUTION, robots=("A", "B"), assignment={"V": 1}, cost=2, metrics=counts, lost=("B",))
     whole = Outcome(
-        *("four", "abt", "simulator", 7, Verdict.OPTIMAL, {"V1.1": 1, "V1.2": -3}, 12, ("Robot3",)),
+        Verdict.OPTIMAL,
+        team="four",
+        protocol="abt",
+        runtime="simulator",
+        seed=7,
+        assignment={"V1.1": 1, "V1.2": -3},
+        cost=12,
+        withdrawn=("Robot3",),
         metrics=counts,
         reason="why",
         count=3,
@@ -178,7 +185,10 @@ def results() -> Sequence[bytes]:
         channel="radio",
         placed_by="sfb",
     )
-    return [result_json(whole), result_json(Outcome("t", "abt", "processes", 0, Verdict.NO_SOLUTION))]
+    return [
+        result_json(whole),
+        result_json(Outcome(Verdict.NO_SOLUTION, team="t", protocol="abt", runtime="processes", seed=0)),
+    ]
 
 
 def check_result(content: bytes) -> bool:
@@ -218,7 +228,9 @@ def _journal(team: Team, protocol: type[ABT | DPOP]) -> bytes:
     )
     result = Simulation(team, protocol, Concurrent(seed=0), observer=recorder).run()
     recorder.flush()
-    recorder.outcome = Outcome(team.name, name, "simulator", 0, result.verdict or Verdict.SOLUTION)
+    recorder.outcome = Outcome(
+        result.verdict or Verdict.SOLUTION, team=team.name, protocol=name, runtime="simulator", seed=0
+    )
     recorder.close()
     return b"".join(blocks)
 

@@ -178,7 +178,7 @@ def test_who_contradicts_another_while_they_search_ends_the_run(liar: dict[str, 
 
 CHECKED = "checked against every constraint"
 WHOLE = "no solution for the whole team (RB claims it; nobody could check)"
-SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
+SAID = Outcome(Verdict.NO_SOLUTION, team="t", protocol="abt", runtime="network", seed=0, witness="RB")
 
 
 @looped(

@@ -152,7 +152,9 @@ def test_unconnected_parts_are_multiplied_and_the_number_is_written_whatever_its
     assert outcome.count == 3**50
     assert f'"count":{3**50}'.encode() in result_json(outcome)
     assert f"{3**50:,} solutions" in outcome_report(free_team(50), outcome)
-    outcome = Outcome("t", "count-dpop", "simulator", 0, Verdict.OPTIMAL, count=10**5000, cost=7)
+    outcome = Outcome(
+        Verdict.OPTIMAL, team="t", protocol="count-dpop", runtime="simulator", seed=0, count=10**5000, cost=7
+    )
     assert b"1" + b"0" * 5000 in result_json(outcome)
     assert "0,000 optima of cost 7" in outcome_report(free_team(1), outcome)
 

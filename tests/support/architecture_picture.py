@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import tomllib
 
 from tests.support.program import ROOT
@@ -60,4 +61,5 @@ def _box(x: float, y: float, width: float, fill: str, text: str) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     PICTURE.write_text(picture(), encoding="utf-8")

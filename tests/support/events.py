@@ -83,5 +83,5 @@ outcomes = st.builds(
     cost=st.none() | told_costs,
     metrics=st.builds(Metrics, messages=assignments, bytes=counts, wall_s=st.floats(0, 1e9)),
     tree=st.dictionaries(names, st.builds(PseudoTreeNode, st.none() | names), max_size=2),
-    epochs=st.lists(st.builds(EpochOutcome, st.sampled_from(Verdict), st.just(("R",))), max_size=2).map(tuple),
+    epochs=st.lists(st.builds(EpochOutcome, st.sampled_from(Verdict), robots=st.just(("R",))), max_size=2).map(tuple),
 )

@@ -100,11 +100,13 @@ def epochs_of_three(team: str = "watch") -> Outcome:
     places = {f"V{place}.1": place for place in range(2, 6)}
     last = {"V1.1": 1, "V2.1": 4, "V3.1": 3, "V4.1": 4}
     epochs = (
-        EpochOutcome(Verdict.SOLUTION, everybody, assignment=places),
-        EpochOutcome(Verdict.NO_SOLUTION, everybody[:4], "-R5.1"),
-        EpochOutcome(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
+        EpochOutcome(Verdict.SOLUTION, robots=everybody, assignment=places),
+        EpochOutcome(Verdict.NO_SOLUTION, robots=everybody[:4], opened_by="-R5.1"),
+        EpochOutcome(Verdict.SOLUTION, robots=everybody[:4], opened_by="V2.1 without <2>", assignment=last),
     )
-    return Outcome(team, "dynabt", "simulator", 0, Verdict.SOLUTION, last, epochs=epochs)
+    return Outcome(
+        Verdict.SOLUTION, team=team, protocol="dynabt", runtime="simulator", seed=0, assignment=last, epochs=epochs
+    )
 
 
 def planar(n: int, *away: str) -> Mission:
@@ -119,7 +121,18 @@ def planar(n: int, *away: str) -> Mission:
         for variable in robot.variables
     }
     values = {name: height % n + 1 for name, height in heights.items()}
-    return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=away), team)
+    return mission_of(
+        Outcome(
+            Verdict.SOLUTION,
+            team=team.name,
+            protocol="abt",
+            runtime="simulator",
+            seed=0,
+            assignment=values,
+            withdrawn=away,
+        ),
+        team,
+    )
 
 
 def commands_of(html: bytes) -> list[dict[str, Any]]:

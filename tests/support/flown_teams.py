@@ -94,7 +94,11 @@ def flown_on(
             return "no team: more robots than cells"
         values[variable.name] = chance.choice(free)
     ground = read_ground_map(ground_map_json(ground))
-    mission = mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values), team, ground=ground)
+    mission = mission_of(
+        Outcome(Verdict.SOLUTION, team=team.name, protocol="abt", runtime="simulator", seed=0, assignment=values),
+        team,
+        ground=ground,
+    )
     conditions = FlightConditions(distance=chance.choice((None, None, 0.3)), downwash=chance.choice((1, 1, 1, 2)))
     try:
         flown = fly(mission, conditions)

@@ -78,7 +78,11 @@ def _sent(chance: Random, team: Team, ground: GroundMap) -> Mission:
         if not left:
             raise ValueError("there are more robots than cells")
         values[robot.variables[0].name] = chance.choice(left)
-    return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values), team, ground=ground)
+    return mission_of(
+        Outcome(Verdict.SOLUTION, team=team.name, protocol="abt", runtime="simulator", seed=0, assignment=values),
+        team,
+        ground=ground,
+    )
 
 
 def _goals(mission: Mission) -> npt.NDArray[np.float64]:

@@ -19,10 +19,10 @@ from robochoc.communication.network.plausibility import doubts_about_checks, dou
 from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.cost_units import Cost, common_units
-from robochoc.model.outcome import ALL_ROBOTS, Improvement, Outcome, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, Answer, Improvement, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import Answer, CheckedAssignment, Search, is_proven
+from robochoc.run.evaluation import PhaseAnswer, Search, is_proven
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
@@ -137,13 +137,13 @@ class Machines(Deployment):
         options, audience = self.options, self._audience
         self._snapshot = self._kept = NO_SNAPSHOT
 
-        def publish(answer: Answer, improvements: tuple[Improvement, ...]) -> None:
+        def publish(answer: PhaseAnswer, improvements: tuple[Improvement, ...]) -> None:
             self._adopt(answer)
             if audience is not None and options.improve is not None:
                 now = replace(answer, improvements=improvements)
                 audience.improve(team, now.as_epoch(team.order), answer.withdrawn)
 
-        def keep(answer: Answer) -> None:
+        def keep(answer: PhaseAnswer) -> None:
             if answer.assignment is self._snapshot.values:
                 self._kept = self._snapshot
                 self._master.adopt(self._kept.number)
@@ -161,7 +161,7 @@ class Machines(Deployment):
             keep=keep,
         )
 
-    def _check_snapshot(self, phase: Phase, snapshot: RunResult) -> CheckedAssignment | None:
+    def _check_snapshot(self, phase: Phase, snapshot: RunResult) -> Answer | None:
         """Return what the robots had at a snapshot, which all of them have checked; None if something is against it.
 
         Raises:
@@ -178,15 +178,22 @@ class Machines(Deployment):
         values = merged_values(snapshot.assignments)
         self._snapshot = Snapshot(found.number, values, snapshot.assignments)
         cost = sum(check.cost for check in found.checks.values())
-        return CheckedAssignment(values, self.told(cost), without, check_counts=thoroughness(found.checks))
+        return Answer(
+            Verdict.UNKNOWN,
+            assignment=values,
+            cost=self.told(cost),
+            withdrawn=without,
+            verified=True,
+            checked=thoroughness(found.checks),
+        )
 
-    def _adopt(self, answer: Answer) -> None:
+    def _adopt(self, answer: PhaseAnswer) -> None:
         """Tell the robots that `answer` is their decision until they hear otherwise."""
         withdrawn = f", {len(answer.withdrawn)} withdraw" if answer.withdrawn else ""
         number = self._kept.number if answer.assignment is self._kept.values else 0
         self._master.adopt(number, f"{answer.verdict}{withdrawn}")
 
-    def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - see `Deployment`
+    def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
         """See `Deployment.concluded`. The best that robots have checked may be what they had at a snapshot."""
         improvements = self._improvements
         if improvements is None:
@@ -208,7 +215,7 @@ class Machines(Deployment):
             robots.append(replace(robot, variables=(*robot.variables, *shown)))
         return Team(self._name, (*robots, *self._gone))
 
-    def _check(self, phase: Phase, result: RunResult) -> CheckedAssignment | None:
+    def _check(self, phase: Phase, result: RunResult) -> Answer | None:
         """Return the values that robots have reported, once every robot has checked its own constraints.
 
         Raises:
@@ -222,13 +229,20 @@ class Machines(Deployment):
         if self._master.is_private:
             withdrawn = without if phase.withdrawal and result.verdict == Verdict.SOLUTION else ()
             why = "every robot knows its own values, and nobody else's (--private)"
-            return CheckedAssignment({}, None, withdrawn, verified=False, reason=why)
+            return Answer(Verdict.UNKNOWN, withdrawn=withdrawn, reason=why)
         self._values = self._reported(result.assignments)
         held, cost = self._master.checked(self._values)
         self._refuse_contradictions()
         if held and (phase.withdrawal or not without):
             values = merged_values(self._values)
-            return CheckedAssignment(values, self.told(cost), without, check_counts=state.thoroughness)
+            return Answer(
+                Verdict.UNKNOWN,
+                assignment=values,
+                cost=self.told(cost),
+                withdrawn=without,
+                verified=True,
+                checked=state.thoroughness,
+            )
         if is_proven(phase, result):
             against = "; ".join(state.objections) or f"{first_names(without)} has no value"
             source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"

@@ -217,11 +217,11 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
     refuse_unfit(team, options, protocol.traits)
     machines = Machines(master, options, plan.name, observer, audience)
     header = Outcome(
-        plan.name,
-        name,
-        Runtime.NETWORK,
-        plan.seed,
         Verdict.UNKNOWN,
+        team=plan.name,
+        protocol=name,
+        runtime=Runtime.NETWORK,
+        seed=plan.seed,
         symbols=symbol_table(team.robots),
         symbolic=symbolic_variables(team),
         chosen=dict(options.chosen),

@@ -57,8 +57,17 @@ def sent(
         x, y, z = (round(part / (ground.scale or 1)) - first for part, first in zip(place, firsts, strict=True))
         values[f"V{number}"] = (z * ground.rows + y) * ground.columns + x
     names = tuple(robot.name for robot in team.robots)
-    epochs = (EpochOutcome(Verdict.SOLUTION, names, assignment=values),) if withdrawn else ()
-    outcome = Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=withdrawn, epochs=epochs)
+    epochs = (EpochOutcome(Verdict.SOLUTION, robots=names, assignment=values),) if withdrawn else ()
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team=team.name,
+        protocol="abt",
+        runtime="simulator",
+        seed=0,
+        assignment=values,
+        withdrawn=withdrawn,
+        epochs=epochs,
+    )
     return mission_of(outcome, team, ground=ground)
 
 
@@ -136,7 +145,12 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"Robot2 is to be at \(1.50, 0.50, 1.00\), in a wall"):
         fly(sent(team, ground, (3.5, 0.5, 0.5), (1.5, 0.5, 1)))
     with pytest.raises(ValueError, match=r"0.5 m on it, not 2 m"):
-        mission_of(Outcome("x", "abt", "simulator", 0, Verdict.SOLUTION, {"V1": 40}), team, 2.0, ground)
+        mission_of(
+            Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
+            team,
+            2.0,
+            ground,
+        )
     pipe = {(x, 0, 0): FREE for x in range(8)}
     team, ground = floors(tmp_path, pipe, "2,0.25,0.25", at="0.25,0.25,0.25 3.75,0.25,0.25", cell=0.25)
     with pytest.raises(ValueError, match="Robot1, Robot2 get past each other between the walls: ask for a smaller"):

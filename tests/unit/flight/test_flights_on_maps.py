@@ -46,8 +46,17 @@ def sent(team: Team, ground: GroundMap, *places: tuple[int, int], withdrawn: tup
     cells = [(y - ground.first[1]) * ground.columns + x - ground.first[0] for x, y in places]
     values = {f"V{number}": cell for number, cell in enumerate(cells, 1)}
     names = tuple(robot.name for robot in team.robots)
-    epochs = (EpochOutcome(Verdict.SOLUTION, names, assignment=values),) if withdrawn else ()
-    outcome = Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=withdrawn, epochs=epochs)
+    epochs = (EpochOutcome(Verdict.SOLUTION, robots=names, assignment=values),) if withdrawn else ()
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team=team.name,
+        protocol="abt",
+        runtime="simulator",
+        seed=0,
+        assignment=values,
+        withdrawn=withdrawn,
+        epochs=epochs,
+    )
     return mission_of(outcome, team, ground=ground)
 
 
@@ -149,7 +158,12 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"Robot2 is to be at \(2.00, 0.50\), in a wall"):
         fly(sent(team, ground, (7, 2), (4, 1)))
     with pytest.raises(ValueError, match=r"0.5 m on it, not 2 m"):
-        mission_of(Outcome("x", "abt", "simulator", 0, Verdict.SOLUTION, {"V1": 40}), team, 2.0, ground)
+        mission_of(
+            Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
+            team,
+            2.0,
+            ground,
+        )
     with pytest.raises(ValueError, match=r"goals of Robot1 and Robot2 are 0\.50 m apart"):
         fly(sent(team, ground, (7, 2), (7, 3)), FlightConditions(distance=0.6))
 
@@ -160,7 +174,13 @@ def test_a_map_with_tiny_cells_is_flown_in_a_picture_with_its_walls(tmp_path: Pa
     team, ground = formation(choice, anchor="100.35,200.2", spacing=0.1)
     values = {name: own.variables[0].domain.ranges[0][0] for name, own in zip(("V1", "V2"), team.robots, strict=True)}
     values["V2"] = next(value for value in team.robots[1].variables[0].domain if value != values["V1"])
-    preview = preview_of(mission_of(Outcome("x", "abt", "simulator", 0, Verdict.SOLUTION, values), team, ground=ground))
+    preview = preview_of(
+        mission_of(
+            Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment=values),
+            team,
+            ground=ground,
+        )
+    )
     assert preview.flown, preview.why_not
     assert preview.mission.scale == 1
     walls = preview.mission.walls

@@ -36,8 +36,16 @@ def outcome(*places: tuple[int, int]) -> Outcome:
     """A result with an epoch for each of the two robots' columns."""
     values = [{"A.x": a, "B.x": b, "Idle.slot": 2} for a, b in places]
     names = ("A", "B", "Idle")
-    epochs = tuple(EpochOutcome(Verdict.SOLUTION, names, assignment=one) for one in values)
-    return Outcome("walled", "abt", "simulator", 0, Verdict.SOLUTION, values[-1], epochs=epochs)
+    epochs = tuple(EpochOutcome(Verdict.SOLUTION, robots=names, assignment=one) for one in values)
+    return Outcome(
+        Verdict.SOLUTION,
+        team="walled",
+        protocol="abt",
+        runtime="simulator",
+        seed=0,
+        assignment=values[-1],
+        epochs=epochs,
+    )
 
 
 def test_robots_begin_where_they_stand_and_who_has_no_waypoint_stays_there() -> None:

@@ -27,7 +27,9 @@ TEAM = Team("duo", (robot("A", "a", 1, 1), robot("B", "b", 1, 2)))
 
 
 def result(values: dict[str, int], *withdrawn: str, verdict: Verdict = Verdict.SOLUTION) -> Outcome:
-    return Outcome("duo", "abt", "simulator", 0, verdict, values, withdrawn=withdrawn)
+    return Outcome(
+        verdict, team="duo", protocol="abt", runtime="simulator", seed=0, assignment=values, withdrawn=withdrawn
+    )
 
 
 def goals(mission: Mission, leg: int = -1) -> dict[str, tuple[tuple[float, float, float], bool]]:
@@ -65,12 +67,20 @@ def test_each_epoch_is_a_leg() -> None:
     late = robot("C", "c", 2, 2)
     team = Team("trio", TEAM.robots, (ScenarioEvent((AddAgent(late),)),))
     epochs = (
-        EpochOutcome(Verdict.SOLUTION, ("A", "B"), assignment={"a": 1, "b": 2}),
-        EpochOutcome(Verdict.SOLUTION, ("A", "B", "C"), "+C", {"a": 1, "b": 3, "c": 2}),
-        EpochOutcome(Verdict.NO_SOLUTION, ("A", "B", "C"), "fog"),
-        EpochOutcome(Verdict.SOLUTION, ("B", "C"), "-A", {"b": 4, "c": 1}),
+        EpochOutcome(Verdict.SOLUTION, robots=("A", "B"), assignment={"a": 1, "b": 2}),
+        EpochOutcome(Verdict.SOLUTION, robots=("A", "B", "C"), opened_by="+C", assignment={"a": 1, "b": 3, "c": 2}),
+        EpochOutcome(Verdict.NO_SOLUTION, robots=("A", "B", "C"), opened_by="fog"),
+        EpochOutcome(Verdict.SOLUTION, robots=("B", "C"), opened_by="-A", assignment={"b": 4, "c": 1}),
     )
-    outcome = Outcome("trio", "dynabt", "simulator", 0, Verdict.SOLUTION, {"b": 4, "c": 1}, epochs=epochs)
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team="trio",
+        protocol="dynabt",
+        runtime="simulator",
+        seed=0,
+        assignment={"b": 4, "c": 1},
+        epochs=epochs,
+    )
     mission = mission_of(outcome, team)
     assert [leg.opened_by for leg in mission.legs] == ["the start", "+C", "fog", "-A"]
     assert [sorted(goals(mission, leg)) for leg in range(4)] == [["A", "B"], ["A", "B", "C"], [], ["A", "B", "C"]]

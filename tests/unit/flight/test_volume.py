@@ -37,7 +37,9 @@ GROUND = GroundMap(6, 4, {"A": (1, 1), "B": (5, 4)}, scale=0.5, volume=VOLUME)
 
 
 def outcome(a: int, b: int) -> Outcome:
-    return Outcome("flying", "abt", "simulator", 0, Verdict.SOLUTION, {"A.z": a, "B.z": b})
+    return Outcome(
+        Verdict.SOLUTION, team="flying", protocol="abt", runtime="simulator", seed=0, assignment={"A.z": a, "B.z": b}
+    )
 
 
 def test_drones_are_in_the_air_in_the_beginning_where_the_map_says() -> None:

@@ -13,7 +13,7 @@ from robochoc.formats.result import ResultError, read_result, result_json
 from robochoc.model.outcome import EpochOutcome, Metrics, Optima, Outcome, Verdict
 from tests.support.random_outcomes import random_outcome
 
-PLAIN = Outcome("team", "abt", "simulator", 1, Verdict.SOLUTION)
+PLAIN = Outcome(Verdict.SOLUTION, team="team", protocol="abt", runtime="simulator", seed=1)
 
 
 def test_every_field_survives_a_round_trip() -> None:
@@ -29,7 +29,7 @@ def test_every_field_survives_a_round_trip() -> None:
 
 def test_plain_results_stay_short() -> None:
     assert read_result(result_json(PLAIN)) == PLAIN
-    told = msgspec.json.decode(result_json(replace(PLAIN, epochs=(EpochOutcome(Verdict.SOLUTION, ("a",)),))))
+    told = msgspec.json.decode(result_json(replace(PLAIN, epochs=(EpochOutcome(Verdict.SOLUTION, robots=("a",)),))))
     assert list(told) == [
         *("team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics"),
         "verified",
@@ -42,7 +42,7 @@ def test_plain_results_stay_short() -> None:
 
 @pytest.mark.parametrize("number", [2**63 - 1, 2**63, -(2**63) - 1, 10**40])
 def test_numbers_of_any_length(number: int) -> None:
-    epoch = EpochOutcome(Verdict.OPTIMAL, ("a",), cost=number, bound=number)
+    epoch = EpochOutcome(Verdict.OPTIMAL, robots=("a",), cost=number, bound=number)
     outcome = replace(PLAIN, cost=number, bound=number, count=number, optima=Optima(number, ()), epochs=(epoch,))
     read = read_result(result_json(outcome))
     assert read == outcome

@@ -42,7 +42,7 @@ from tests.support.examples import examples
 from tests.support.problems import team_of
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
-OUTCOME = Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION)
+OUTCOME = Outcome(Verdict.SOLUTION, team="four", protocol="abt", runtime="simulator", seed=0)
 
 
 def told(events: list[AnyEvent], every: int = 3, header: Header = HEADER) -> bytes:

@@ -63,7 +63,7 @@ def blocks_of(seed: int, number: int = 10, every: int = 5) -> list[bytes]:
         recorder(event)
         if place % every == 0:
             recorder.flush()
-    recorder.outcome = Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION)
+    recorder.outcome = Outcome(Verdict.SOLUTION, team="four", protocol="abt", runtime="simulator", seed=0)
     recorder.close()
     return blocks
 
@@ -254,7 +254,7 @@ def test_other_versions_are_refused_with_both_numbers() -> None:
 
 def test_entries_in_a_wrong_place_are_damage() -> None:
     lost = Lost(t=0, robot="R", why="")
-    ended = Ended(outcome=Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION))
+    ended = Ended(outcome=Outcome(Verdict.SOLUTION, team="four", protocol="abt", runtime="simulator", seed=0))
     with pytest.raises(JournalError, match="expected the header"):
         read_journal(made(columns(lost)))
     assert "a second header" in str(read_journal(made(columns(HEADER), columns(HEADER))).damage)

@@ -10,9 +10,12 @@ from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from tests.support.cases import looped
 
-SOLVED = Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION, {"V1": 1})
+SOLVED = Outcome(Verdict.SOLUTION, team="team", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 1})
 SIX = tuple(f"Robot{number}" for number in range(6))
-EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcome(Verdict.SOLUTION, SIX[:3]))
+EPOCHS = (
+    EpochOutcome(Verdict.SOLUTION, robots=SIX, assignment={"V1": 1}),
+    EpochOutcome(Verdict.SOLUTION, robots=SIX[:3]),
+)
 
 
 @looped(

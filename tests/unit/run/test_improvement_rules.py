@@ -8,14 +8,14 @@ from types import SimpleNamespace
 import pytest
 
 from robochoc.model.outcome import Improvement, Verdict
-from robochoc.run.evaluation import Answer
+from robochoc.run.evaluation import PhaseAnswer
 from robochoc.run.improvement import Improvements, Rank
 from robochoc.verification.checker import RefutedError
 from tests.support.improvements import costly
 
 
-def answer(cost: int, verdict: Verdict = Verdict.SOLUTION, **more: object) -> Answer:
-    known = Answer(verdict, assignment={"X": cost}, cost=cost, verified=True)
+def answer(cost: int, verdict: Verdict = Verdict.SOLUTION, **more: object) -> PhaseAnswer:
+    known = PhaseAnswer(verdict, assignment={"X": cost}, cost=cost, verified=True)
     return replace(known, **more)  # type: ignore[arg-type]
 
 
@@ -27,7 +27,7 @@ class Bench:
         self.published: list[tuple[float, int]] = []
         self.news = False
         monkeypatch.setattr("robochoc.run.improvement.time", SimpleNamespace(monotonic=lambda: self.now))
-        self._given = Answer(Verdict.UNKNOWN)
+        self._given = PhaseAnswer(Verdict.UNKNOWN)
         self.made = Improvements(
             began=0,
             deadline=1,
@@ -39,7 +39,7 @@ class Bench:
             has_news=lambda: self.news,
         )
 
-    def tick(self, at_s: float, given: Answer | None = None) -> None:
+    def tick(self, at_s: float, given: PhaseAnswer | None = None) -> None:
         self.now = at_s
         if self.made.wants_snapshot(at_s) and given is not None:
             self._given = given
@@ -82,13 +82,13 @@ def test_a_bound_proves_what_was_found_before(bench: Bench) -> None:
     bench.tick(1.0, answer(5, bound=3, deadline=1.0))
     bench.tick(1.2, answer(7, bound=5))
     assert bench.made.satisfied
-    final = bench.made.concluded(Answer(Verdict.UNKNOWN, bound=4), lost=False)
+    final = bench.made.concluded(PhaseAnswer(Verdict.UNKNOWN, bound=4), lost=False)
     assert (final.verdict, final.cost, final.bound, final.deadline) == (Verdict.OPTIMAL, 5, None, None)
 
 
 def test_a_limit_leaves_the_best_of_those_that_were_published(bench: Bench) -> None:
     bench.tick(1.0, answer(5, deadline=1.0))
-    final = bench.made.concluded(Answer(Verdict.UNKNOWN, bound=4, reason="the time was over"), lost=False)
+    final = bench.made.concluded(PhaseAnswer(Verdict.UNKNOWN, bound=4, reason="the time was over"), lost=False)
     assert (final.verdict, final.cost, final.bound, final.deadline) == (Verdict.SOLUTION, 5, 4, 1.0)
     assert final.reason is None
 
@@ -111,19 +111,19 @@ def test_who_ends_before_the_deadline_has_published_once_and_improved_nothing(be
 
 def test_a_limit_before_the_deadline_decides_nothing(bench: Bench) -> None:
     bench.tick(0.5, answer(5))
-    unknown = Answer(Verdict.UNKNOWN, reason="so many messages have been sent (--messages 3)")
+    unknown = PhaseAnswer(Verdict.UNKNOWN, reason="so many messages have been sent (--messages 3)")
     assert bench.made.concluded(unknown, lost=False) == unknown
     assert bench.published == []
 
 
 def test_after_a_loss_what_was_published_is_no_answer(bench: Bench) -> None:
     bench.tick(1.0, answer(5))
-    final = bench.made.concluded(Answer(Verdict.UNKNOWN), lost=True)
+    final = bench.made.concluded(PhaseAnswer(Verdict.UNKNOWN), lost=True)
     assert (final.verdict, final.cost, len(final.improvements)) == (Verdict.UNKNOWN, None, 1)
 
 
 def test_a_protocol_that_an_answer_refutes_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for claim in (Answer(Verdict.NO_SOLUTION), answer(6, Verdict.OPTIMAL)):
+    for claim in (PhaseAnswer(Verdict.NO_SOLUTION), answer(6, Verdict.OPTIMAL)):
         bench = Bench(monkeypatch)
         bench.tick(1.0, answer(5))
         with pytest.raises(RefutedError, match=r"5\)? was found"):

@@ -180,7 +180,18 @@ def aside(verdict: Verdict, *weights: int, **known: Any) -> str:  # noqa: ANN401
     """What is told when RB of a hard team has stepped aside."""
     hard = team_of({"A": (1,), "B": (1,)}, [])
     robots = tuple(replace(robot, weight=weight) for robot, weight in zip(hard.robots, weights, strict=True))
-    outcome = Outcome("t", "sfb", "simulator", 0, verdict, {"A": 1}, 0, ("RB",), verified=True, **known)
+    outcome = Outcome(
+        verdict,
+        team="t",
+        protocol="sfb",
+        runtime="simulator",
+        seed=0,
+        assignment={"A": 1},
+        cost=0,
+        withdrawn=("RB",),
+        verified=True,
+        **known,
+    )
     return outcome_report(replace(hard, robots=robots), outcome)
 
 
@@ -195,7 +206,17 @@ def test_weights_are_told_where_they_are_not_all_one() -> None:
 def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
     told = aside(Verdict.UNKNOWN, 1, 3, reason="the time was over", bound=2)
     assert "unknown: the time was over; in the best answer so far 1 withdraws (weight 3) (lower bound 2)" in told
-    outcome = Outcome("t", "afb", "simulator", 0, Verdict.UNKNOWN, {"A": 1, "B": 2}, 2**60 + 1, reason="so", bound=3)
+    outcome = Outcome(
+        Verdict.UNKNOWN,
+        team="t",
+        protocol="afb",
+        runtime="simulator",
+        seed=0,
+        assignment={"A": 1, "B": 2},
+        cost=2**60 + 1,
+        reason="so",
+        bound=3,
+    )
     assert f"so; the best so far costs {2**60 + 1:,}, and lower bound 3" in outcome_report(PAIR, outcome)
 
 
@@ -205,14 +226,33 @@ def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
 
 
 def test_what_is_not_proven_says_so() -> None:
-    outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team="t",
+        protocol="dsa",
+        runtime="simulator",
+        seed=0,
+        assignment={"A": 1, "B": 2},
+        cost=3,
+        verified=True,
+    )
     assert "solution for all 2 robots, cost 3 (not proven to be the minimum), checked" in outcome_report(PAIR, outcome)
 
 
 def test_where_the_sum_is_maximised_the_best_is_a_maximum_and_bounds_are_upper_ones() -> None:
     robots = tuple(replace(robot, costs=CostUnits(maximize=True)) for robot in PAIR.robots)
     team = replace(PAIR, robots=robots)
-    found = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True, bound=9)
+    found = Outcome(
+        Verdict.SOLUTION,
+        team="t",
+        protocol="dsa",
+        runtime="simulator",
+        seed=0,
+        assignment={"A": 1, "B": 2},
+        cost=3,
+        verified=True,
+        bound=9,
+    )
     assert "cost 3 (not proven to be the maximum), checked" in outcome_report(team, found)
     timely = replace(found, deadline=2)
     assert "by the deadline of 2 s (not proven to be the maximum; upper bound 9), checked" in outcome_report(
@@ -234,7 +274,7 @@ def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
         "S": PseudoTreeNode(None),
     }
     assert pseudo_tree({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
-    outcome = Outcome("team", "dpop", "simulator", 0, Verdict.OPTIMAL, tree=places)
+    outcome = Outcome(Verdict.OPTIMAL, team="team", protocol="dpop", runtime="simulator", seed=0, tree=places)
     assert tree_text(outcome).splitlines() == [
         "  pseudo-tree, built by the robots: depth 2, induced width 2, 2 roots ([neighbours further up])",
         "    R1",
@@ -247,10 +287,13 @@ def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
 
 @pytest.mark.parametrize("places", [{}, {"R2": PseudoTreeNode("R1"), "R3": PseudoTreeNode("R2")}])
 def test_a_tree_that_is_not_finished_is_not_drawn(places: dict[str, PseudoTreeNode]) -> None:
-    outcome = Outcome("team", "dpop", "simulator", 0, Verdict.UNKNOWN, tree=places)
+    outcome = Outcome(Verdict.UNKNOWN, team="team", protocol="dpop", runtime="simulator", seed=0, tree=places)
     assert tree_text(outcome) == "  the run ended before the robots had built a pseudo-tree"
 
 
 def test_who_builds_no_tree_says_so() -> None:
     for name, verdict in (("abt", Verdict.SOLUTION), ("abt", Verdict.UNKNOWN), ("central", Verdict.UNKNOWN)):
-        assert tree_text(Outcome("team", name, "simulator", 0, verdict)) == f"  {name} builds no pseudo-tree"
+        assert (
+            tree_text(Outcome(verdict, team="team", protocol=name, runtime="simulator", seed=0))
+            == f"  {name} builds no pseudo-tree"
+        )

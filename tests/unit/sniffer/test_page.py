@@ -139,4 +139,11 @@ def test_meshcats_commands_hold_every_drone_and_no_animation() -> None:
 
 
 def test_nobody_to_be_seen_is_no_scene() -> None:
-    assert whole_scene(Trace.of(Journal(header(), (), Outcome("t", "abt", "simulator", 0, Verdict.UNKNOWN)))) == b"null"
+    assert (
+        whole_scene(
+            Trace.of(
+                Journal(header(), (), Outcome(Verdict.UNKNOWN, team="t", protocol="abt", runtime="simulator", seed=0))
+            )
+        )
+        == b"null"
+    )

@@ -179,7 +179,7 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     given = Given(t=0, order=("R1", "R2", "R3"), robots={})
 
     def ended(**ending: Any) -> str:  # noqa: ANN401 - fields of an outcome
-        outcome = replace(Outcome("T", "abt", "simulator", 0, Verdict.SOLUTION), **ending)
+        outcome = replace(Outcome(Verdict.SOLUTION, team="T", protocol="abt", runtime="simulator", seed=0), **ending)
         return verdict_of(Trace.of(Journal(header, (Began(t=0, protocol="ABT"), given), outcome, None)))
 
     assert ended(cost=0) == "A solution."
@@ -193,8 +193,8 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     assert gave_up == "No verdict: R1 gave up, as its protocol has it."
     best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
     assert best == "1 of 3 fly (proven best; 1 lost): no solution for all; withdrawn: R2; lost: R1."
-    epochs = [EpochOutcome(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
-    epochs += [EpochOutcome(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
+    epochs = [EpochOutcome(verdict, robots=("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
+    epochs += [EpochOutcome(Verdict.UNKNOWN, robots=("R1",), lost=("R2",))]
     assert ended(epochs=(epochs[0],)) == "A solution."
     assert ended(epochs=tuple(epochs)) == "3 epochs: a solution, no solution, R2 lost. The last: A solution."
     many = ended(epochs=(epochs[0],) * 1000)

@@ -26,7 +26,8 @@ LIVE = """
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.view.live import serve_scene
 from tests.support.flights import scene_of
-outcome = Outcome("live team", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})
+run = {"team": "live team", "protocol": "abt", "runtime": "processes", "seed": 0}
+outcome = Outcome(Verdict.SOLUTION, assignment={"V1.1": 1}, **run)
 serve_scene(scene_of(outcome), ready=lambda url: print(url, flush=True))
 print("left")
 """
@@ -69,7 +70,9 @@ def first_message(port: int, path: str, host: str, origin: str) -> tuple[int, by
 @pytest.fixture(scope="module")
 def live() -> Iterator[tuple[int, str]]:
     """The port of a live viewer, and the path that nobody guesses."""
-    one = Outcome("live team", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})
+    one = Outcome(
+        Verdict.SOLUTION, team="live team", protocol="abt", runtime="processes", seed=0, assignment={"V1.1": 1}
+    )
     with served_scene(scene_of(one)) as url:
         yield port_and_path(url)
 
@@ -142,4 +145,16 @@ def test_a_port_in_use_is_an_error_that_says_so() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"Address already in use .*'127.0.0.1', {port}"):
-            serve_scene(scene_of(Outcome("taken", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})), port=port)
+            serve_scene(
+                scene_of(
+                    Outcome(
+                        Verdict.SOLUTION,
+                        team="taken",
+                        protocol="abt",
+                        runtime="processes",
+                        seed=0,
+                        assignment={"V1.1": 1},
+                    )
+                ),
+                port=port,
+            )

@@ -126,7 +126,14 @@ def test_the_page_plays_what_was_flown() -> None:
 
 
 def test_metres_are_shown_in_cells() -> None:
-    outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, {"V1.1": 1, "V1.2": 10**9, "V2.1": 5 * 10**8})
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team="vast",
+        protocol="abt",
+        runtime="simulator",
+        seed=0,
+        assignment={"V1.1": 1, "V1.2": 10**9, "V2.1": 5 * 10**8},
+    )
     mission = mission_of(outcome)
     scene = scene_of(outcome, mission, straight(mission))
     assert scene.playback
@@ -138,7 +145,14 @@ def test_metres_are_shown_in_cells() -> None:
 
 
 def test_vast_numbers_are_flown_as_they_are_drawn() -> None:
-    outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, {"V1.1": -1000, "V1.2": 10**12})
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team="vast",
+        protocol="abt",
+        runtime="simulator",
+        seed=0,
+        assignment={"V1.1": -1000, "V1.2": 10**12},
+    )
     scene = flown_scene_of(outcome)
     assert scene.playback
     for drone, end in zip(scene.drones, scene.playback.positions[-1], strict=True):
@@ -160,7 +174,7 @@ def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
 
 
 def test_nobody_flies_where_there_never_was_a_solution() -> None:
-    outcome = Outcome("t", "abt", "simulator", 0, Verdict.NO_SOLUTION, {})
+    outcome = Outcome(Verdict.NO_SOLUTION, team="t", protocol="abt", runtime="simulator", seed=0, assignment={})
     assert playback_in(scene_page(shown(outcome)))["chapters"] == [
         {"at": 0, "opened": "the start", "says": "no solution, no drone flies"}
     ]
@@ -324,7 +338,14 @@ def test_a_flight_whose_legs_are_others_still_plays() -> None:
 
 
 def test_hostile_names_and_words_stay_text() -> None:
-    outcome = Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "__proto__": 2, "\ud800": 3})
+    outcome = Outcome(
+        Verdict.SOLUTION,
+        team=HOSTILE,
+        protocol=HOSTILE,
+        runtime="processes",
+        seed=0,
+        assignment={HOSTILE: 1, "__proto__": 2, "\ud800": 3},
+    )
     mission = mission_of(outcome)
     seen = (FlightEvent(1.0, 0, HOSTILE),)
     html = scene_page(scene_of(outcome, mission, replace(straight(mission), events=seen)))
@@ -342,7 +363,9 @@ def test_equal_flights_make_equal_pages() -> None:
 @pytest.mark.parametrize(("n", "most"), [(4, 1_200_000), (9, 2_000_000)])
 def test_pages_of_large_teams_are_small(n: int, most: int) -> None:
     places = {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
-    scene = flown_scene_of(Outcome("t", "abt", "simulator", 0, Verdict.SOLUTION, places))
+    scene = flown_scene_of(
+        Outcome(Verdict.SOLUTION, team="t", protocol="abt", runtime="simulator", seed=0, assignment=places)
+    )
     html = scene_page(scene)
     assert len(html) < most
     assert len(tracks_of(html)) >= n * n
@@ -372,7 +395,7 @@ def test_animate_refuses_a_team_whose_robots_are_others(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_bytes(result_json(replace(outcome, epochs=(strangers, *outcome.epochs[1:]))))
     told = robochoc_within("animate", "result.json", "--team", "watch", "-o", "page.html")
     assert told.returncode == 1
-    assert "not the team" in told.stderr
+    assert "is not watch, the team of result.json" in told.stderr
     assert not (tmp_path / "page.html").exists()
 
 
@@ -384,7 +407,7 @@ def test_animate_refuses_a_team_whose_robots_are_others(tmp_path: Path) -> None:
     [({"V1.1": 1, "V1.2": 10**12}, None), ({"V1.1": 1, "V1.2": 2}, 1e9), ({"V1.1": 10**7, "V1.2": 10**7 + 1}, None)],
 )
 def test_what_is_flown_in_cells_is_said_not_to_be_to_scale(values: dict[str, int], scale: float | None) -> None:
-    outcome = Outcome("vast", "abt", "simulator", 0, Verdict.SOLUTION, values)
+    outcome = Outcome(Verdict.SOLUTION, team="vast", protocol="abt", runtime="simulator", seed=0, assignment=values)
     scene = flown_scene_of(outcome, mission=mission_of(outcome, None, scale))
     facts = dict(scene.facts)
     assert scene.playback
@@ -394,7 +417,19 @@ def test_what_is_flown_in_cells_is_said_not_to_be_to_scale(values: dict[str, int
 
 
 def test_more_epochs_than_are_flown_for_a_picture() -> None:
-    many = tuple(EpochOutcome(Verdict.SOLUTION, (), assignment={"V1.1": number % 3 + 1}) for number in range(100))
-    scene = flown_scene_of(Outcome("many", "dynabt", "simulator", 0, Verdict.SOLUTION, {"V1.1": 1}, epochs=many))
+    many = tuple(
+        EpochOutcome(Verdict.SOLUTION, robots=(), assignment={"V1.1": number % 3 + 1}) for number in range(100)
+    )
+    scene = flown_scene_of(
+        Outcome(
+            Verdict.SOLUTION,
+            team="many",
+            protocol="dynabt",
+            runtime="simulator",
+            seed=0,
+            assignment={"V1.1": 1},
+            epochs=many,
+        )
+    )
     assert scene.playback is None
     assert dict(scene.facts)["flight"].startswith("none: 1 drone in 100 epochs")

@@ -34,7 +34,16 @@ def flown_straight(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def outcome(assignment: Mapping[str, int], verdict: Verdict = Verdict.SOLUTION, *withdrawn: str) -> Outcome:
     metrics = Metrics(messages={"Ok": 1200, "Nogood": 34})
-    return Outcome("a team", "abt", "simulator", 0, verdict, dict(assignment), withdrawn=withdrawn, metrics=metrics)
+    return Outcome(
+        verdict,
+        team="a team",
+        protocol="abt",
+        runtime="simulator",
+        seed=0,
+        assignment=dict(assignment),
+        withdrawn=withdrawn,
+        metrics=metrics,
+    )
 
 
 def robot(name: str, *variables: str, topics: tuple[Topic, ...] = ()) -> Robot:
@@ -265,7 +274,16 @@ def test_the_page_loads_nothing() -> None:
 
 
 def test_hostile_names_stay_text() -> None:
-    scene = scene_of(Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "constructor": 2}))
+    scene = scene_of(
+        Outcome(
+            Verdict.SOLUTION,
+            team=HOSTILE,
+            protocol=HOSTILE,
+            runtime="processes",
+            seed=0,
+            assignment={HOSTILE: 1, "constructor": 2},
+        )
+    )
     html = scene_page(scene)
     assert b"<img" not in html
     assert html.count(b"</script>") == 4
@@ -275,7 +293,9 @@ def test_hostile_names_stay_text() -> None:
 
 @looped("name", ["\x00\x1b[31m", "\ud800", "$title ${x} {y} %s", "x" * 500, "机器人1.1", ""])
 def test_no_name_breaks_the_page(name: str) -> None:
-    html = scene_page(scene_of(Outcome(name, name, "processes", 0, Verdict.SOLUTION, {name: 1})))
+    html = scene_page(
+        scene_of(Outcome(Verdict.SOLUTION, team=name, protocol=name, runtime="processes", seed=0, assignment={name: 1}))
+    )
     assert b"\x00" not in html
     assert commands_of(html)
 
