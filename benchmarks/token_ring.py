@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import ClassVar, cast
 
-from robochoc.model.message import Message
 from robochoc.model.problem import Child, Domain, Parent, Robot, Team, Variable
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem

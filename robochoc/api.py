@@ -21,10 +21,10 @@ from robochoc.journal.events import Observer
 from robochoc.model.original_names import renamed_outcome, renamed_team, robots_called
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.model.wording import counted
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
+from robochoc.system.plain_text import counted
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending

@@ -17,11 +17,11 @@ import msgspec
 
 from robochoc.communication.message_dropper import MessageDropper
 from robochoc.journal.events import Bounded, Concluded, Decided, Heard, Observer, Received, Sent, Settled
-from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
 from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.key_stream import KeyStream
+from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import equip

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 
-from robochoc.model.message import Envelope
+from robochoc.protocols.message import Envelope
 
 
 class MessageDropper:

@@ -14,8 +14,8 @@ from robochoc.communication.control import Conclusion, Counters, Events, Ready, 
 from robochoc.communication.host import Host
 from robochoc.communication.message_dropper import MessageDropper
 from robochoc.journal.events import AnyEvent, Sent
-from robochoc.model.message import Envelope
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Envelope
 
 IDLE_S = 0.002
 """Seconds without a message after which a robot reports its counters.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from robochoc.model.wording import listed
+from robochoc.system.plain_text import listed
 
 SEEDS = ("seed", "problem_seed", "scenario_seed")
 """Parameters that are drawn at random: they do not belong to a setting."""

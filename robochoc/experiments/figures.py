@@ -22,7 +22,7 @@ from robochoc.experiments.study import WIDTH
 from robochoc.experiments.summary import METRICS, Rows
 from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import listed
+from robochoc.system.plain_text import listed
 
 _SETTINGS = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,

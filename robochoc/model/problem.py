@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from importlib import import_module
 
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.constraint import (
@@ -35,7 +36,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits, common_units
 from robochoc.model.expression import Expression
-from robochoc.model.wording import counted
+from robochoc.system.plain_text import counted
 
 __all__ = [
     "INFINITE",
@@ -65,9 +66,17 @@ __all__ = [
     "Team",
     "Term",
     "Topic",
+    "Value",
     "Variable",
     "WhenAbsent",
 ]
+
+Value = tuple[int | None, ...]
+"""A robot's value as others see it: the values of its interface variables, in the order of its file.
+
+In the left side of a nogood, and in the value that it rules out, None stands for a variable that does not matter:
+the nogood holds whatever that variable's value is, and so for every value of the robot that looks alike.
+"""
 
 
 class ProblemKind(StrEnum):
@@ -267,9 +276,8 @@ class Team:
         return f"<team {self.name}: {counted(len(self.robots), 'robot')}>"
 
     def _repr_html_(self) -> str:
-        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
-
-        return team_html(self)
+        html: str = import_module("robochoc.modelling.team_html").team_html(self)  # by name: the model needs no HTML
+        return html
 
     @cached_property
     def _by_name(self) -> dict[str, Robot]:

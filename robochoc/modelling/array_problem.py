@@ -20,10 +20,9 @@ from robochoc.communication.arrays.array_types import Floats, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, cycles_of, exact_sum
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import Layout
-from robochoc.model.message import encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import counted
+from robochoc.protocols.message import encode
 from robochoc.protocols.settings import settings_of
 from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
 from robochoc.run.option_values import texts_by_name
@@ -31,6 +30,7 @@ from robochoc.run.options import Options
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError
 
 _TABLE = _PAIR = 2

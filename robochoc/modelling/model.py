@@ -28,7 +28,6 @@ from robochoc.model.constraint import WhenAbsent
 from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.model.wording import counted
 from robochoc.modelling.codes import Symbols
 from robochoc.modelling.constraints import ModelConstraint, absence_or_none, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.drafts import ObjectiveTerm, split
@@ -41,6 +40,7 @@ from robochoc.modelling.solving import Solvable
 from robochoc.modelling.team_builder import build_team, saved_order
 from robochoc.modelling.team_contents import TeamContents, contents_of, model_variable
 from robochoc.modelling.terms import ModelVariable, all_of, number
+from robochoc.system.plain_text import counted
 from robochoc.system.suggestions import did_you_mean
 
 
@@ -325,8 +325,8 @@ class Model(Solvable):
         write_team(team, Path(folder), replace=replace)
 
     def _repr_html_(self) -> str:
-        from robochoc.model.notebook.tables import heading  # noqa: PLC0415 - notebooks only
-        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
+        from robochoc.modelling.html_tables import heading  # noqa: PLC0415 - notebooks only
+        from robochoc.modelling.team_html import team_html  # noqa: PLC0415 - notebooks only
 
         try:
             team = self.team

@@ -11,8 +11,8 @@ from functools import cached_property
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
+from robochoc.formats.headline import describe_outcome
 from robochoc.formats.result import result_json
-from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelTypeError, UnknownNameError

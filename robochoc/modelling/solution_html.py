@@ -5,11 +5,11 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from robochoc.formats.headline import describe_outcome
 from robochoc.model.cost_units import Cost, cost_shown
-from robochoc.model.headline import describe_outcome
-from robochoc.model.notebook.tables import heading, table
-from robochoc.model.notebook.team import shown_values
 from robochoc.model.problem import AddAgent, ProblemKind, Team
+from robochoc.modelling.html_tables import heading, table
+from robochoc.modelling.team_html import shown_values
 
 if TYPE_CHECKING:
     from robochoc.modelling.solution import Solution

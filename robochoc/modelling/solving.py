@@ -132,7 +132,7 @@ class Solvable(ABC):
         return self._solution(outcome, team)
 
     def _repr_html_(self) -> str:
-        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
+        from robochoc.modelling.team_html import team_html  # noqa: PLC0415 - notebooks only
 
         return team_html(self._team_to_solve())
 

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 from robochoc.journal.events import Decided, Received, Sent
 from robochoc.journal.given import run_parameters_of
 from robochoc.journal.journal import Journal
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel
 from robochoc.privacy.losses import Kind, Loss, PrivacyReport, loss_between
 from robochoc.privacy.observer import Observer, Scene
 from robochoc.privacy.possible import Secret
 from robochoc.privacy.secrets import TeamSecrets, TooManySecretsError
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PseudoTree
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RebuiltRobots, ReplayOptions
 from robochoc.replay.steps import RecordedRun, runs_of

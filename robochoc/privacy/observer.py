@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, assert_never
 
-from robochoc.model.communicative_acts import Performative
-from robochoc.model.disclosure import (
+from robochoc.model.problem import INFINITE
+from robochoc.privacy.possible import AtLeast, AtMost, Case, Knowledge, OneAtMost, OneCase, Terms
+from robochoc.privacy.secrets import TeamSecrets
+from robochoc.protocols.acts import Performative
+from robochoc.protocols.disclosure import (
     AT_THE_END,
     FINITE,
     Clash,
@@ -23,13 +26,10 @@ from robochoc.model.disclosure import (
     Total,
     View,
 )
-from robochoc.model.message import Message, Value
-from robochoc.model.problem import INFINITE
-from robochoc.model.wording import is_withdrawn
-from robochoc.privacy.possible import AtLeast, AtMost, Case, Knowledge, OneAtMost, OneCase, Terms
-from robochoc.privacy.secrets import TeamSecrets
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import is_withdrawn
 
-Channel = tuple[type[Message], str, str]
+Channel = tuple[type, str, str]
 _DECIDING = (Performative.CANCEL, Performative.REQUEST)
 """By these acts a robot may decide on others' values: for good, or (to a receiver) for now."""
 
@@ -44,7 +44,7 @@ class Scene(NamedTuple):
         fixed_holders: As in `Hearing`.
         minimises: As in `Hearing`.
         one_sided: Costs in messages may be those of one robot's part of a partially known constraint. Then only what is
-            proved of single robots counts: own costs and totals are those of both sides (`model/disclosure.py`).
+            proved of single robots counts: own costs and totals are those of both sides (`protocols/disclosure.py`).
     """
 
     secrets: TeamSecrets

@@ -5,8 +5,8 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator, Mapping, Sequence
 
-from robochoc.model.wording import counted, listed
 from robochoc.privacy.losses import Kind, Measure, PrivacyReport
+from robochoc.system.plain_text import counted, listed
 
 _CELL, _SMALL_CELL = 34, 16
 MOST_NUMBERED = 40

@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from robochoc.model.absence import may_count_when_absent, restated
-from robochoc.model.disclosure import View
-from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
-from robochoc.model.wording import is_withdrawn
 from robochoc.privacy.possible import Possible, Secret, Terms
+from robochoc.protocols.disclosure import View
+from robochoc.protocols.message import Value
+from robochoc.protocols.wording import is_withdrawn
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import constraints_above, parts_below
@@ -100,7 +100,7 @@ class TeamSecrets:
         return [one for one, knowing in self.entries[subject].items() if subject in knowing and observer not in knowing]
 
     def own_cost(self, robot: str, value: Value, view: View) -> Terms:
-        """Return the secrets whose sum is the own cost of `value` of `robot` in `view` (`model/disclosure.py`)."""
+        """Return the secrets whose sum is the own cost of `value` of `robot` in `view` (`protocols/disclosure.py`)."""
         charge = self.charges[robot].get(value)
         terms = [] if charge is None else [charge]
         return tuple(terms + self._between({**view, robot: value}, self._shared[robot]))

@@ -1,8 +1,47 @@
-"""FIPA acts shared by messages of several protocols; other messages declare their own."""
+"""The communicative acts of FIPA00037, and the acts of messages of several protocols."""
 
 from __future__ import annotations
 
-from robochoc.model.communicative_acts import Act, Performative
+from enum import StrEnum
+from typing import NamedTuple
+
+
+class Performative(StrEnum):
+    """The name of a communicative act. It is written in capitals, and read in any case."""
+
+    ACCEPT_PROPOSAL = "accept-proposal"
+    AGREE = "agree"
+    CANCEL = "cancel"
+    CFP = "cfp"
+    CONFIRM = "confirm"
+    DISCONFIRM = "disconfirm"
+    FAILURE = "failure"
+    INFORM = "inform"
+    INFORM_IF = "inform-if"
+    INFORM_REF = "inform-ref"
+    NOT_UNDERSTOOD = "not-understood"
+    PROPAGATE = "propagate"
+    PROPOSE = "propose"
+    PROXY = "proxy"
+    QUERY_IF = "query-if"
+    QUERY_REF = "query-ref"
+    REFUSE = "refuse"
+    REJECT_PROPOSAL = "reject-proposal"
+    REQUEST = "request"
+    REQUEST_WHEN = "request-when"
+    REQUEST_WHENEVER = "request-whenever"
+    SUBSCRIBE = "subscribe"
+
+
+class Act(NamedTuple):
+    """The act of a type of message: its performative, and the reason for it."""
+
+    performative: Performative
+    why: str
+
+
+INFORM = Act(Performative.INFORM, "every message tells the receiver something")
+"""The act of a message whose class declares no other."""
 
 TELL_VALUE = Act(Performative.INFORM, "the receiver learns the sender's value")
 TELL_DOMAIN = Act(Performative.INFORM, "the receiver learns the sender's values")

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.model.message import Value
 from robochoc.model.outcome import PseudoTreeNode
+from robochoc.model.problem import Value
 
 
 class Incumbent(msgspec.Struct, frozen=True):

@@ -18,7 +18,7 @@ from typing import Any, get_args
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Received, Sent
-from robochoc.model.message import Envelope, Message
+from robochoc.protocols.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 
 Edge = tuple[str, str]

@@ -12,9 +12,9 @@ from collections.abc import Set as AbstractSet
 from itertools import islice
 from typing import Any
 
-from robochoc.model.message import Message, Value
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.nogood import NogoodStore

@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from robochoc.journal.events import Concluded, Sent
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.nogood import NogoodStore
 from robochoc.replay.inspection import ALWAYS, MOST_VALUES, Inspector, safely

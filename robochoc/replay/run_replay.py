@@ -10,7 +10,7 @@ import msgspec
 from robochoc.communication.host import Host
 from robochoc.journal.events import AnyEvent, Received, Sent
 from robochoc.journal.journal import Header
-from robochoc.model.message import Envelope, Message
+from robochoc.protocols.message import Envelope, Message
 from robochoc.replay.channels import MessageDecoder, RecordedChannels
 from robochoc.replay.comparison import Difference, StepComparison
 from robochoc.replay.rebuild import RebuiltRobots

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.solver.agent_problem import Interfaces
 
 LONGEST = 200

@@ -14,7 +14,6 @@ from types import MappingProxyType
 from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.orders import Order
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.model.wording import counted
 from robochoc.run.alternatives import refuse_team
 from robochoc.run.choice_rules import FEW_LOSSES, LOSSY, RULES
 from robochoc.run.context import RunContext
@@ -27,6 +26,7 @@ from robochoc.solver.compile import CompileError, CompileTimeoutError, TeamCompi
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.errors import SolverLostError, SolverMissingError
+from robochoc.system.plain_text import counted
 
 SOMEBODY = "it accepts the team with these options, and what suits the team better does not"
 NOBODY = "no protocol accepts the team with these options"

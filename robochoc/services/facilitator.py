@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.communicative_acts import Performative
+from robochoc.protocols.acts import Performative
 from robochoc.services.descriptions import FAILURES, AgentDescription, Reason, RequestRefusedError
 from robochoc.services.directory import Directory, Notice
 from robochoc.services.identifier import AgentIdentifier, expression_of

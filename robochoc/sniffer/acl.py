@@ -1,6 +1,6 @@
 r"""FIPA ACL messages (FIPA00061), and their form as text (FIPA00070).
 
->>> from robochoc.model.communicative_acts import Performative
+>>> from robochoc.protocols.acts import Performative
 >>> from robochoc.services.identifier import AgentIdentifier
 >>> print(text(ACLMessage(Performative.INFORM, AgentIdentifier("a@p"), (AgentIdentifier("b@p"),), content='say "hi"')))
 (INFORM :sender (agent-identifier :name a@p) :receiver (set (agent-identifier :name b@p)) :content "say \"hi\"")
@@ -12,7 +12,7 @@ import re
 
 import msgspec
 
-from robochoc.model.communicative_acts import Performative
+from robochoc.protocols.acts import Performative
 from robochoc.services.identifier import AgentIdentifier, expression_of, identifier_of
 from robochoc.services.symbolic import (
     Caps,

@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from robochoc.model.message import Envelope, Message, encode
+from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.sniffer.acl import ACLMessage
 from robochoc.sniffer.conversation import CLOCK, JSON, ONTOLOGY, Conversation

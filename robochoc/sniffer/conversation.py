@@ -16,7 +16,7 @@ from typing import Any, get_args
 
 import msgspec
 
-from robochoc.model.message import Envelope, Message
+from robochoc.protocols.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.services.identifier import AgentIdentifier, identifier_on
 from robochoc.sniffer.acl import ACLError, ACLMessage

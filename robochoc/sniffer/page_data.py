@@ -16,9 +16,9 @@ from typing import Any, assert_never
 
 import msgspec
 
+from robochoc.formats.headline import describe_outcome
 from robochoc.formats.result import result_json
 from robochoc.model.cost_units import cost_shown
-from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.sniffer.acl import text

@@ -22,8 +22,8 @@ from msgspec.inspect import (
     type_info,
 )
 
-from robochoc.model.communicative_acts import INFORM, Act
-from robochoc.model.message import Message
+from robochoc.protocols.acts import INFORM, Act
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_stage
 from robochoc.sniffer.trace import Trace

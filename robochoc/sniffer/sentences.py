@@ -11,11 +11,11 @@ from typing import Any
 
 import msgspec
 
-from robochoc.model.communicative_acts import INFORM
-from robochoc.model.message import Message
-from robochoc.model.wording import MOST_LISTED, Wording, listed
+from robochoc.protocols.acts import INFORM
+from robochoc.protocols.message import Message
+from robochoc.protocols.wording import Wording
 from robochoc.sniffer.recorded_messages import message_of
-from robochoc.system.plain_text import printable
+from robochoc.system.plain_text import MOST_LISTED, listed, printable
 
 _MAX_CHARACTERS = 1000
 _MAX_VALUE_CHARACTERS = 60

@@ -9,7 +9,7 @@ from robochoc.formats import InvalidInputError
 from robochoc.journal.entries import Header, JournalEntry
 from robochoc.journal.events import Began, Given, Sent
 from robochoc.journal.given import GivenProblemError, TeamReader
-from robochoc.model.message import Message
+from robochoc.protocols.message import Message
 from robochoc.sniffer.recorded_messages import installed_protocol, types_by_name
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.team_names import RunNames, run_names

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from robochoc.formats import InvalidInputError
 from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.model.problem import Team
-from robochoc.model.wording import Wording
 from robochoc.protocols.order import PseudoTree
+from robochoc.protocols.wording import Wording
 from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.trace import Trace
 

@@ -17,8 +17,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, WhenAbsent
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Value, WhenAbsent
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint, constraints_above, parts_below

@@ -12,8 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from robochoc.model.message import Value
-from robochoc.model.problem import Constraint, Robot
+from robochoc.model.problem import Constraint, Robot, Value
 from robochoc.solver.encoding import (
     Codes,
     Component,

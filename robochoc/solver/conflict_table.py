@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.message import Value
+from robochoc.model.problem import Value
 from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 
 MAX_CACHED = 512

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from robochoc.model.message import Value
+from robochoc.model.problem import Value
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.shared_constraint import SharedConstraint

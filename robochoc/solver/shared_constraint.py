@@ -8,8 +8,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Se
 from typing import NamedTuple
 
 from robochoc.model.absence import may_count_when_absent, restated
-from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Constraint, Domain
+from robochoc.model.problem import INFINITE, Constraint, Domain, Value
 from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import (
     MAX_TUPLES,

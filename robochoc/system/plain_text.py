@@ -6,10 +6,14 @@ the terminal (escape sequences), turn what is read around (bidirectional overrid
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 LONGEST = 10_000
 """Characters. Our own lines are shorter."""
 LONGEST_REASON = 500
 """The maximum number of characters of the reason why a participant ends, or is refused."""
+MOST_LISTED = 8
+"""The maximum number of items in a list; a longer list is cut."""
 
 
 def on_one_line(text: str, longest: int = LONGEST) -> str:
@@ -25,3 +29,17 @@ def on_one_line(text: str, longest: int = LONGEST) -> str:
 def printable(text: str) -> str:
     """Return `text` with a mark in place of what is not printable: control characters, half a surrogate pair."""
     return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)
+
+
+def listed(things: Iterable[str], conjunction: str = "and") -> str:
+    """Return `a`, `a and b`, `a, b and c`; of many `a, b, ... and 12 more`."""
+    items = list(things)
+    if len(items) > MOST_LISTED + 1:
+        items = [*items[:MOST_LISTED], f"{len(items) - MOST_LISTED:,} more"]
+        conjunction = "and"
+    return f"{', '.join(items[:-1])} {conjunction} {items[-1]}" if len(items) > 1 else "".join(items)
+
+
+def counted(number: int, thing: str) -> str:
+    """Return `1 value`, `3 values`."""
+    return f"{number:,} {thing if number == 1 else thing + 's'}"

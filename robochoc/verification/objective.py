@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
-from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Constraint, Team
+from robochoc.model.problem import INFINITE, Constraint, Team, Value
 from robochoc.solver.encoding import cost_function, max_cost
 
 Price = Callable[[Sequence[int]], float]

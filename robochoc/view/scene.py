@@ -15,8 +15,8 @@ from robochoc.flight.layout import Axis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission
 from robochoc.formats.ground_map import ALL_SIDES
+from robochoc.formats.headline import describe_outcome
 from robochoc.model.cost_units import cost_shown
-from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
 from robochoc.view.footprints import DrawnWalls, walls_drawn
 from robochoc.view.playback import Playback, fell, playback_of

@@ -193,7 +193,7 @@ def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(here: Path, tmp_p
 # What may go wrong
 
 SILENT = """
-from robochoc.model.message import Message
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 

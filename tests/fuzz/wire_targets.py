@@ -51,9 +51,9 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.formats import on_one_line
 from robochoc.journal.events import AnyEvent, Decided, Sent
-from robochoc.model.communicative_acts import Performative
 from robochoc.model.outcome import Metrics, PseudoTreeNode, Verdict
 from robochoc.model.problem import Robot, Team
+from robochoc.protocols.acts import Performative
 from robochoc.protocols.findings import Findings
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory

@@ -25,8 +25,8 @@ from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import NetworkRobot
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.transport import CannotConnectError, Transport
-from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import encode
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.solver.compiled_team import CompiledRobot

@@ -23,9 +23,9 @@ from robochoc.communication.network.profile import Profile, profile_of
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RobotsLostError
-from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
+from robochoc.protocols.message import encode
 from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.awc import AWC
 from tests.support.cases import looped

@@ -28,10 +28,10 @@ from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.robot_loop import EVENTS_AT_ONCE
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Received
-from robochoc.model.message import Envelope, encode
 from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.findings import NOTHING, Trail
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.message import Envelope, encode
 from robochoc.protocols.optimization.syncbb import BestPath, Path, SyncBB
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT

@@ -9,9 +9,9 @@ from random import Random
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Event, Sent
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.abt_do import ABTDORetro, CurrentOrder
 from robochoc.protocols.satisfaction.abt_do_messages import AddLink, Counters, Nogood, Ok, Order
 from tests.support.agents import replies, robot_of, started, started_robot, value

@@ -7,8 +7,8 @@ from functools import partial
 from random import Random
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.abt_hyb import ABTHyb
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.nogood_messages import Nogood

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from functools import partial
 
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.optimization.afb_bounds import Cost
 from robochoc.solver.agent_problem import RunParameters

@@ -11,8 +11,8 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE, Team
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.afb import AFB, CPA, FBEstimate
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import cost_of, random_cost_team

@@ -9,9 +9,9 @@ from typing import ClassVar
 from robochoc.communication.host import message_decoder
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message, Value, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
+from robochoc.protocols.message import Message, Value, encode
 from robochoc.protocols.satisfaction.afc_ng import AFCng, first_difference
 from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved
 from robochoc.protocols.satisfaction.nogood_messages import Nogood

@@ -9,9 +9,9 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.afc_ng import AFCng
 from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.agile_abt import AgileABT
 from robochoc.protocols.satisfaction.agile_abt_messages import AddLink, Ok, Order
@@ -26,6 +25,7 @@ from robochoc.protocols.satisfaction.agile_order import (
     updated,
 )
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
+from robochoc.protocols.wording import Wording
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.examples import count, examples
 from tests.support.problems import random_team

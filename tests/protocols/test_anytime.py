@@ -13,10 +13,10 @@ import pytest
 from robochoc.communication.arrays.session import ArraysRun
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.anytime import Anytime, Best, BreadthFirstTree, Paid, Place, Step

@@ -10,11 +10,11 @@ import pytest
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.message import Message
 from robochoc.protocols.asymmetric.acls import ACLS, ACLSSettings, Proposal, Sides
 from robochoc.protocols.asymmetric.gca_mgm import GCAMGM
 from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM, Transfer
 from robochoc.protocols.local_search.mgm import Gain
+from robochoc.protocols.message import Message
 from robochoc.protocols.shared.cycles import NO_GAIN, Value
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled import LexicographicCost

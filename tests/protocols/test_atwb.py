@@ -7,9 +7,9 @@ from functools import partial
 
 import pytest
 
-from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.asymmetric.atwb import ATWB, Side, SideRequest
+from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.afb import CPA, FBCPA, FBEstimate, NewSolution
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import after, assert_refused, replies, started_robot, value

@@ -16,13 +16,13 @@ from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized, told_cost
-from robochoc.model.message import Message
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.protocols.auctions.cbaa import WinningBids
 from robochoc.protocols.auctions.cbba import Bundles
 from robochoc.protocols.auctions.ssi import Bid, Won
+from robochoc.protocols.message import Message
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess

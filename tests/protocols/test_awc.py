@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.protocols.message import Value
 from robochoc.protocols.satisfaction.awc import AWC, NogoodList, StoredNogood
 from robochoc.protocols.satisfaction.awc_messages import AddLink, Nogood, Ok
 from tests.support.agents import replies, robot_of, started, started_robot, value

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.bnb_adopt_messages import Cost, Value
 from robochoc.protocols.optimization.bounding_messages import Terminate

@@ -8,10 +8,10 @@ from random import Random
 
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.cocoa import CoCoA, Costs, CostsAt, FinalSide, Hold, Inquiry, SetValue, State
+from robochoc.protocols.message import Value
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import after, assert_refused, replies, robot_of, started, started_robot, value
 from tests.support.asymmetric_problems import divided_pair as divided

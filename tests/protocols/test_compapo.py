@@ -10,9 +10,9 @@ from random import Random
 import pytest
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.compapo import (
     Assign,
     CompAPO,

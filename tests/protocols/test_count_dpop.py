@@ -13,11 +13,11 @@ from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.formats.result import result_json
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.model.wording import Wording
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.inference.count_dpop import MOST_BITS, CountDimensions, CountDPOP, Counts
 from robochoc.protocols.inference.dpop import UTIL, VALUE, Domain, Need, Proceed
 from robochoc.protocols.settings import equip
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Withdrawal
 from robochoc.solver.encoding import TooLargeError, UnsupportedError

@@ -18,10 +18,10 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.graphs import grid
 from robochoc.generators.random_csp import random_on
 from robochoc.journal.events import Event, Sent
-from robochoc.model.message import Message
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import Back, Token, TreeMessage, Wave

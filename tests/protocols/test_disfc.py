@@ -15,9 +15,9 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, ConstraintModel, Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.disfc import DisFC
 from robochoc.protocols.satisfaction.disfc_messages import AddLink, Nogood, Ok
 from robochoc.solver import filters

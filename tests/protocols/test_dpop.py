@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.expression import Type, parse
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.message import Message
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cost_problems import with_costs

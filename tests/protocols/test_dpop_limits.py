@@ -11,10 +11,10 @@ import pytest
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.protocols.inference.dpop_tables import Extent, bytes_of
+from robochoc.protocols.message import Message, encode
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError

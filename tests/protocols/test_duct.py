@@ -9,10 +9,8 @@ import pytest
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import Concurrent
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import DPOP
 from robochoc.protocols.local_search.duct import (
     DUCT,
@@ -23,7 +21,9 @@ from robochoc.protocols.local_search.duct import (
     Samples,
     Separator,
 )
+from robochoc.protocols.message import Message
 from robochoc.protocols.settings import settings_of
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost
 from tests.support.agents import replies, value
 from tests.support.cases import looped

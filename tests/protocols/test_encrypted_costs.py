@@ -8,9 +8,9 @@ from random import Random
 import numpy as np
 import pytest
 
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.key_stream import KeyStream
+from robochoc.protocols.message import Message
 from robochoc.protocols.private.ed25519 import Ed25519, Group
 from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.protocols.private.encrypted_costs import CostCipher, Pair

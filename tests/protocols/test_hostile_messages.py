@@ -19,8 +19,8 @@ import pytest
 from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.run_result import RobotsLostError
-from robochoc.model.message import Envelope, Message, Value
 from robochoc.model.problem import Constraint, Team
+from robochoc.protocols.message import Envelope, Message, Value
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import Ok

@@ -10,8 +10,8 @@ import pytest
 
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Sent
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.branching import Result
 from robochoc.protocols.optimization.hs_cai import (
     CPA,

@@ -11,15 +11,15 @@ from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.communication.run_result import RunResult
 from robochoc.formats.result import read_result, result_json
-from robochoc.model.message import Message
 from robochoc.model.outcome import Metrics, Optima, Verdict
 from robochoc.model.problem import Team
-from robochoc.model.wording import Wording
 from robochoc.protocols.findings import Findings, Listing
 from robochoc.protocols.inference.count_dpop import CountDimensions, Counts
 from robochoc.protocols.inference.dpop import UTIL, Domain, Proceed
 from robochoc.protocols.inference.list_dpop import ListDPOP, ListedValues
+from robochoc.protocols.message import Message
 from robochoc.protocols.settings import equip
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.listed_optima import put_together
 from robochoc.run.options import Preprocess, Withdrawal

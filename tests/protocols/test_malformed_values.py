@@ -10,8 +10,8 @@ from typing import get_type_hints
 import msgspec
 import pytest
 
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import Constraint
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.run.registry import protocol_named, protocol_names

@@ -7,12 +7,12 @@ from random import Random
 import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent
-from robochoc.model.message import Message
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.inference.maxsum import Q, R
 from robochoc.protocols.inference.maxsum_ad import MaxSumAD, MaxSumADSettings
+from robochoc.protocols.message import Message
 from robochoc.protocols.shared.cycles import Domain, Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost

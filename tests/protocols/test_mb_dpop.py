@@ -14,9 +14,9 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import UTIL, VALUE, Proceed
 from robochoc.protocols.inference.mb_dpop import MBDPOP, Axis, Context, DomainAtDepth, Label
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value

@@ -5,10 +5,10 @@ from __future__ import annotations
 from random import Random
 
 from robochoc.communication.simulator.schedule import Concurrent
-from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.mgm import MGM, Gain
 from robochoc.protocols.local_search.mgm2 import MGM2, Accept, Go, Offer, Reject
+from robochoc.protocols.message import Message
 from robochoc.protocols.shared.cycles import Domain, Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped

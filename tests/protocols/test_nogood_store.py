@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.nogood import NO_EXPLANATION, Explanation, LeftSide, NogoodStore, contradicts
 from tests.support.cases import looped

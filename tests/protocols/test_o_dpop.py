@@ -10,9 +10,9 @@ import pytest
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
-from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import VALUE, Proceed
 from robochoc.protocols.inference.o_dpop import ODPOP, Ask, Done, Good
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost

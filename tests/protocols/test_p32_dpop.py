@@ -13,11 +13,11 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.journal.journal import Header, JournalRecorder, read_journal
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.privacy import Kind, Measure, privacy_of
 from robochoc.protocols.key_stream import KeyStream
+from robochoc.protocols.message import Message
 from robochoc.protocols.private.ed25519 import Ed25519
 from robochoc.protocols.private.p32_dpop import P32DPOP
 from robochoc.protocols.private.rerooting import Join, Next, Setup, Stage, Vector

@@ -9,8 +9,6 @@ from random import Random
 import pytest
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import UTIL, VALUE, Proceed
 from robochoc.protocols.inference.mb_dpop import Axis, Context
 from robochoc.protocols.inference.rmb_dpop import (
@@ -23,6 +21,8 @@ from robochoc.protocols.inference.rmb_dpop import (
     SepDegree,
     best,
 )
+from robochoc.protocols.message import Message
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cases import looped

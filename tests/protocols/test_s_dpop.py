@@ -29,9 +29,9 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import UTIL, Dimensions, Need
 from robochoc.protocols.inference.s_dpop import SDPOP, Check, Reuse
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.agents import replies

@@ -11,10 +11,10 @@ import pytest
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
-from robochoc.model.message import Message, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.message import Message, encode
 from robochoc.protocols.optimization.run_lengths import expanded
 from robochoc.protocols.optimization.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.agent_problem import RunParameters

@@ -9,10 +9,10 @@ from random import Random
 
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, robot_of, started, started_robot, value

@@ -6,7 +6,7 @@ from typing import get_args
 
 import sexpdata
 
-from robochoc.model.message import Envelope, Message, encode
+from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run.registry import protocol_named, protocol_names

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import pytest
 
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems

@@ -6,10 +6,10 @@ import itertools
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.inference.dpop import DPOP, Dimensions, Domain, Need
 from robochoc.protocols.inference.mb_dpop import MBDPOP, DomainAtDepth
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import equip
 from tests.support.agents import replies

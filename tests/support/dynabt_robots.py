@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from robochoc.model.change import apply_changes
-from robochoc.model.message import Message
 from robochoc.model.problem import Change, Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.dynabt import DynABT
 from robochoc.solver.agent_problem import agent_problems

@@ -14,7 +14,7 @@ from typing import cast
 
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.message import Message
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 
 TEAM = queens3d(2)

@@ -23,8 +23,8 @@ from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.formats import PREDEFINED
-from robochoc.model.message import encode
 from robochoc.model.problem import Constraint, Team
+from robochoc.protocols.message import encode
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import Ok

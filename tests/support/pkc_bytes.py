@@ -16,8 +16,8 @@ from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided
-from robochoc.model.message import Envelope, encode
 from robochoc.model.problem import Constraint, ConstraintModel, Domain, Relation, Robot, Semantics, Team
+from robochoc.protocols.message import Envelope, encode
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from robochoc.model.message import Envelope
 from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.protocols.message import Envelope
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
-from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context
 from robochoc.protocols.shared.dfs import TreeProtocol
 from tests.support.agents import robot_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.message import Message
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.sfb import SFB, CPAs, SFBSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems

@@ -26,14 +26,15 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, counted
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted
 
 Nogood = tuple[int, str, tuple[tuple[str, Value], ...]]
 """The own value's place, the constraint that it violates, and what that constraint sees of the others."""

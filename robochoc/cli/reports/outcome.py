@@ -10,14 +10,14 @@ from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.ground_map import GroundMap
+from robochoc.formats.headline import describe_outcome
 from robochoc.formats.places import MapPlaces, Place
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import Cost, cost_shown
-from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Robot, Team
-from robochoc.model.wording import counted
+from robochoc.system.plain_text import counted
 
 WIDTH = 100
 _LARGE = 1 << 16

@@ -10,8 +10,8 @@ import msgspec
 
 from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
-from robochoc.model.wording import counted, listed
 from robochoc.privacy import Kind, Measure, PrivacyReport
+from robochoc.system.plain_text import counted, listed
 
 NOT_KNOWN = "not known"
 _MEASURE_TEXTS = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robochoc.communication.arrays.array_types import Floats, Integers
-from robochoc.model.message import Value, encode
+from robochoc.protocols.message import Value, encode
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.solver.agent_problem import AgentProblem

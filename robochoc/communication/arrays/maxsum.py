@@ -14,11 +14,11 @@ from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, least
 from robochoc.communication.arrays.factors import Ports, factors_of, ports_of
 from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import list_bytes
-from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.inference.maxsum import MaxSumSettings, Q, R
 from robochoc.protocols.inference.maxsum_factor import MOST
+from robochoc.protocols.message import encode
 from robochoc.protocols.shared.cycles import CycleCount, Domain
 from robochoc.solver.encoding import UnsupportedError
 

@@ -7,8 +7,8 @@ import numpy as np
 from robochoc.communication.arrays.array_types import Flags, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
 from robochoc.communication.arrays.tally import integer_bytes
-from robochoc.model.message import encode
 from robochoc.protocols.local_search.mgm import Gain
+from robochoc.protocols.message import encode
 
 _REST = len(encode(Gain(0, 0))) - 2
 """Bytes of a gain without its two numbers."""

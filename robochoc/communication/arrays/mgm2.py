@@ -13,8 +13,8 @@ from robochoc.communication.arrays.cycle_run import nth
 from robochoc.communication.arrays.mgm import ArrayGainers
 from robochoc.communication.arrays.pair_constraints import PairConstraints
 from robochoc.communication.arrays.tally import integer_bytes, list_bytes
-from robochoc.model.message import encode
 from robochoc.protocols.local_search.mgm2 import Accept, Go, MGM2Settings, Offer, Reject
+from robochoc.protocols.message import encode
 from robochoc.protocols.shared.cycles import Domain
 
 _NO_OFFER = len(encode(Offer(None)))

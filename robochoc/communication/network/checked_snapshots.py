@@ -15,8 +15,8 @@ from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import CheckRequest, CheckResult, Recall, ToRobot
 from robochoc.communication.network.members import Members
 from robochoc.communication.run_result import RunResult
-from robochoc.model.message import Value
 from robochoc.protocols.findings import Incumbent
+from robochoc.protocols.message import Value
 
 
 class _Part(NamedTuple):

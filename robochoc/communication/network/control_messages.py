@@ -28,7 +28,7 @@ from robochoc.communication.control import (
     WentOn,
 )
 from robochoc.communication.network.profile import Profile, Ranges
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.solver.encoding import Cost
 
 LATEST = 2**53

@@ -14,7 +14,7 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.journal_server import JournalServer
 from robochoc.communication.network.profile import Profile
-from robochoc.model.communicative_acts import Performative
+from robochoc.protocols.acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, notification, subscribe

@@ -55,7 +55,7 @@ from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.network.secure_channel import SecureChannel
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.robot_loop import IDLE_S
-from robochoc.model.message import Envelope
+from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import TooLargeError, UnsupportedError

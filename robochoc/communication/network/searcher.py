@@ -35,10 +35,10 @@ from robochoc.communication.network.profile import ProfileError, domain_of
 from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
 from robochoc.protocols.findings import NOTHING, Findings, Trail
+from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, TeamKnowledge

@@ -33,7 +33,7 @@ from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queues import LARGEST_BODY, QueueReader, QueueWriter
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import IDLE_S, RobotLoop
-from robochoc.model.message import Envelope
+from robochoc.protocols.message import Envelope
 
 MOST_IDLE_S = 0.032
 """The longest wait for a message, in seconds, before a robot reports its counters.

@@ -10,8 +10,8 @@ import random
 from collections import deque
 from collections.abc import Callable, Mapping
 
-from robochoc.model.message import Envelope
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Envelope
 
 Link = tuple[str, str]
 """Sender and receiver."""

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from robochoc.model.message import Envelope
+from robochoc.protocols.message import Envelope
 from robochoc.system.compiling import mypyc_attr
 
 NEVER: Final = -1

@@ -18,9 +18,9 @@ from robochoc.communication.session import Epoch, Session, is_past
 from robochoc.communication.simulator.losses import Losses
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Envelope
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters

@@ -15,7 +15,7 @@ from itertools import count
 
 from robochoc.communication.simulator.channel import NS_PER_MS, NS_PER_S, ChannelModel
 from robochoc.communication.simulator.schedule import Schedule
-from robochoc.model.message import Envelope
+from robochoc.protocols.message import Envelope
 
 _SEND, _WAKE = 0, 1
 """Kinds of events. At equal times, ready messages are sent before any robot reads its inbox."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from robochoc.formats.names import MAX_NAME, RESERVED, is_name
 from robochoc.model.problem import Team
-from robochoc.model.wording import counted
+from robochoc.system.plain_text import counted
 
 MAX_FILE = 256 * 1024 * 1024
 """The maximum size of a file, in bytes."""

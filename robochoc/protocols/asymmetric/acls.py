@@ -35,14 +35,14 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import INFINITE, NOTHING, Hearing, PartPays, Proof, can_take
-from robochoc.model.wording import Wording
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import INFINITE, NOTHING, Hearing, PartPays, Proof, can_take
 from robochoc.protocols.local_search.mgm import saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, CycleProtocol, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 

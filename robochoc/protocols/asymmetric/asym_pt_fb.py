@@ -40,17 +40,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, costs_text, counted
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.branching import Members, Number, Report, Request, Result, Terminate
 from robochoc.protocols.optimization.forward_bounding import CostsAbove
 from robochoc.protocols.optimization.pt_fb import CPA, PTFB, Reduce
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, costs_text
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted
 
 
 class RowRequest(Message, frozen=True):

@@ -45,14 +45,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.afb import AFB, CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.optimization.afb_bounds import Cost, CostLookup, stamp_of
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 
 

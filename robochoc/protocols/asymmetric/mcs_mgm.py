@@ -38,14 +38,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.local_search.mgm import Gain, Gainers, saving_in_words
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 

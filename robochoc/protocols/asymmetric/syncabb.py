@@ -45,16 +45,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Literal, assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, Total, can_take
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text, incumbent_text
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, Total, can_take
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.syncbb import Backtrack, BestPath, Cost, SyncBB, Terminate, best_proves
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text, incumbent_text
 from robochoc.solver.compiled import LocalProblem
 
 

@@ -51,16 +51,17 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, assert_never, cast
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, listed
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.auctions.cbaa import WinningBid, winning_bid_in_words, winning_bids_prove
 from robochoc.protocols.auctions.market import NO_LIMIT, Auction
+from robochoc.protocols.disclosure import Hearing, Proof
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import listed
 
 
 class Bundles(wire.Message, frozen=True):

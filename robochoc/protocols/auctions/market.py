@@ -17,14 +17,15 @@ from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
-from robochoc.model.disclosure import Hearing, Pays, Proof, SomeValuePays, can_take
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, listed
+from robochoc.protocols.disclosure import Hearing, Pays, Proof, SomeValuePays, can_take
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import Cost, UnsupportedError
+from robochoc.system.plain_text import listed
 
 Lot = tuple[int, int]
 """A task as a robot names it, by its own choice: the place of an interface variable, and its value.

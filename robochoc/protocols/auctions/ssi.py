@@ -43,15 +43,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import assert_never, cast
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, listed
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.auctions.market import NO_LIMIT, Auction, Lot, Offer, does_proves, lot_in_words, next_proves
+from robochoc.protocols.disclosure import Hearing, Proof
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import listed
 
 
 def _next_in_words(amount: int) -> str:

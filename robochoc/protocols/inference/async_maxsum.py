@@ -39,17 +39,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, assert_never, cast
 
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording
 from robochoc.protocols.inference import maxsum
 from robochoc.protocols.inference.maxsum_factor import Functions, Row, cheapest, checked, from_zero, total, without_each
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 

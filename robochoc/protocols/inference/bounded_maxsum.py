@@ -41,19 +41,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text, costs_text
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, checked, total
 from robochoc.protocols.inference.spanning import Choice, Fragment, Heaviest, Merged, NewRoot, SpanningProtocol
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text, costs_text
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import check_exact
 

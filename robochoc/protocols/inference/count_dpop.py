@@ -45,17 +45,18 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, counted
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, keep_once
 from robochoc.protocols.inference.dpop_tables import PIECE, Codes, Extent, Table, costs_for
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
+from robochoc.system.plain_text import counted
 
 MOST_BITS = 1 << 20
 """Stands for all that is longer, too: it ends the run."""

@@ -55,12 +55,10 @@ from typing import Annotated, ClassVar, TypeVar, assert_never, cast
 
 import msgspec
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof, StandsAt, table_proves
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import NOTHING, HasOnly, Hearing, Proof, StandsAt, table_proves
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.inference.dpop_tables import (
     Codes,
@@ -77,14 +75,17 @@ from robochoc.protocols.inference.dpop_tables import (
     project,
     width_of,
 )
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.system.plain_text import counted, listed
 
 GIB = 1 << 30
 

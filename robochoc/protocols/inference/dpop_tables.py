@@ -15,7 +15,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.wording import cost_text, counted
+from robochoc.protocols.wording import cost_text
+from robochoc.system.plain_text import counted
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.unsignedinteger[Any]]

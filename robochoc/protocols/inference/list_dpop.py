@@ -44,9 +44,7 @@ from typing import Annotated, ClassVar, NamedTuple, assert_never, cast
 
 import msgspec
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, counted
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings, Listing
 from robochoc.protocols.inference.count_dpop import (
     MOST_BITS,
@@ -59,10 +57,13 @@ from robochoc.protocols.inference.count_dpop import (
 )
 from robochoc.protocols.inference.dpop import UTIL, Domain, DPOPSettings, Proceed
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, cost_at, place_at, width_of
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted
 
 MOST_LISTED = 10_000
 

@@ -59,16 +59,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, costs_text
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, without_each
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, costs_text
 from robochoc.solver.compiled import LocalProblem
 
 MAX_SPLIT = 0.5

@@ -47,9 +47,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
-from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols import message as wire
 from robochoc.protocols.inference.maxsum import Q, R
 from robochoc.protocols.inference.maxsum_factor import Functions, Row, cheapest, checked, from_zero, total, without_each
 from robochoc.protocols.order import PriorityOrder

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from operator import add, sub
 from typing import TYPE_CHECKING, Self
 
-from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Value
 
 if TYPE_CHECKING:
     from robochoc.solver.cost_table import Array, CostTable

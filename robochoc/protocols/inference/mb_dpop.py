@@ -50,11 +50,9 @@ from typing import Annotated, ClassVar, assert_never, cast
 import msgspec
 import numpy as np
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import HasOnly, Hearing, Proof
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import HasOnly, Hearing, Proof
 from robochoc.protocols.inference.dpop import (
     DPOP,
     MOST_AXES,
@@ -79,10 +77,13 @@ from robochoc.protocols.inference.dpop_tables import (
     project,
     width_of,
 )
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted, listed
 
 
 class MBDPOPSettings(DPOPSettings, frozen=True):

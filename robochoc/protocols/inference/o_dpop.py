@@ -40,17 +40,18 @@ from typing import assert_never, cast
 
 import numpy as np
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, table_proves
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, cost_text, listed
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, table_proves
 from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of, keep_once
 from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import listed
 
 
 class Ask(Message, frozen=True):

@@ -53,9 +53,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, cost_text, counted, listed
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.inference.dpop import MOST_AXES, UTIL, VALUE, Cost, Dimensions, Need, Proceed, Size, keep_once
 from robochoc.protocols.inference.dpop_tables import (
     PIECE,
@@ -70,10 +68,13 @@ from robochoc.protocols.inference.dpop_tables import (
     width_of,
 )
 from robochoc.protocols.inference.mb_dpop import MBDPOP, Axis, Context, Depth, DomainAtDepth, Sizes, is_place
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted, listed
 
 
 class Candidate(msgspec.Struct, frozen=True, array_like=True):

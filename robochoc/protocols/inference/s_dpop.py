@@ -47,17 +47,18 @@ from typing import assert_never, cast
 
 import numpy as np
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording, listed
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Proceed, keep_once
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, IncomingTable, Table, Width, project, width_of
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage, Wave
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.system.plain_text import listed
 
 
 class Check(Message, frozen=True):

@@ -17,11 +17,11 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 
 Ends = tuple[str, str]

@@ -41,13 +41,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar, cast
 
-from robochoc.model import message as wire
-from robochoc.model.disclosure import Hearing, Proof, can_take
-from robochoc.model.wording import Wording
 from robochoc.protocols import acts
+from robochoc.protocols import message as wire
+from robochoc.protocols.disclosure import Hearing, Proof, can_take
 from robochoc.protocols.local_search.dsa import DSA, DSASettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 

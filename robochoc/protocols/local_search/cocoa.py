@@ -52,9 +52,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, ClassVar, assert_never, cast
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import (
+from robochoc.model.outcome import Verdict
+from robochoc.protocols import acts
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.chance import one_of
+from robochoc.protocols.disclosure import (
     INFINITE,
     NOTHING,
     EveryValuePays,
@@ -66,16 +69,14 @@ from robochoc.model.disclosure import (
     StandsAt,
     can_take,
 )
-from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, counted
-from robochoc.protocols import acts
-from robochoc.protocols.chance import one_of
 from robochoc.protocols.local_search.mgm import saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr
+from robochoc.system.plain_text import counted
 
 Burden = tuple[int, int | float]
 """Broken hard constraints, and the cost of all others."""

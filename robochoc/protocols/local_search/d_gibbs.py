@@ -50,18 +50,19 @@ from typing import ClassVar, assert_never, cast
 
 import msgspec
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof, can_take
-from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import Hearing, Proof, can_take
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, gain
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.system.plain_text import counted, listed
 
 
 class DGibbsSettings(CycleCount, frozen=True):

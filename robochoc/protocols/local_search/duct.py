@@ -52,9 +52,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal, assert_never, cast
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import (
+from robochoc.model.outcome import Verdict
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import (
     INFINITE,
     NOTHING,
     EveryValuePays,
@@ -64,14 +65,14 @@ from robochoc.model.disclosure import (
     StandsAt,
     can_take,
 )
-from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.system.plain_text import counted, listed
 
 
 class DUCTSettings(Settings, frozen=True):

@@ -47,14 +47,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
-from robochoc.model import message as wire
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording
+from robochoc.protocols import message as wire
 from robochoc.protocols.local_search.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.encoding import Cost
 from robochoc.solver.shared_constraint import OtherValues

@@ -56,19 +56,20 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Pays, Proof
-from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import Hearing, Pays, Proof
 from robochoc.protocols.local_search.mgm import saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, CycleSettings, Domain, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.system.plain_text import counted, listed
 
 MOST = 8
 """More robots at once than this are a search of their own."""

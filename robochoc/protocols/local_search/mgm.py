@@ -38,14 +38,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.wording import Wording, cost_text, counted, listed
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.system.plain_text import counted, listed
 
 
 def saving_in_words(broken: int, cost: float) -> str:

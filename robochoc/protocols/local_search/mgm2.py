@@ -47,17 +47,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import INFINITE, NOTHING, Hearing, Pays, Proof
-from robochoc.model.wording import Wording, counted
 from robochoc.protocols import acts
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import INFINITE, NOTHING, Hearing, Pays, Proof
 from robochoc.protocols.local_search.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Domain, Then, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.system.plain_text import counted
 
 
 class MGM2Settings(CycleSettings, frozen=True):

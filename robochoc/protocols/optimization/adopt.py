@@ -51,8 +51,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, assert_never, cast
 
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.adopt_messages import Cost, Threshold, Value
 from robochoc.protocols.optimization.bounding import BoundingProtocol, clamp_share, split_threshold
 from robochoc.protocols.optimization.bounding_messages import Entry, Number, Terminate

@@ -51,9 +51,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, cast
 
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization import bnb_adopt_messages as bnb_adopt
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.bnb_adopt_messages import BnBADOPTSettings, Cost, Domain, Floor
@@ -62,6 +61,7 @@ from robochoc.protocols.optimization.bounding_messages import Entry, Number, Ter
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model import message
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof, StandsAt
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, cost_text
-from robochoc.protocols import acts
+from robochoc.protocols import acts, message
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import Hearing, Proof, StandsAt
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
+from robochoc.protocols.wording import Wording, cost_text
 
 
 class Value(Message, frozen=True):

@@ -56,8 +56,10 @@ import math
 from collections.abc import Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import (
+from robochoc.model.outcome import Verdict
+from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import (
     NOTHING,
     EveryValuePays,
     Hearing,
@@ -67,11 +69,8 @@ from robochoc.model.disclosure import (
     Total,
     partial_assignment,
 )
-from robochoc.model.message import Message, Value
-from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, cost_text, costs_text, counted, incumbent_text
-from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.afb_bounds import (
     Assignment,
     Cost,
@@ -84,7 +83,9 @@ from robochoc.protocols.optimization.afb_bounds import (
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text, costs_text, incumbent_text
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted
 
 
 class CPA(Message, frozen=True):

@@ -57,8 +57,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, cast
 
-from robochoc.model import message
-from robochoc.model.message import Message
+from robochoc.protocols import message
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bnb_adopt_messages import BnBADOPTSettings, Cost, Domain, Floor, Value
 from robochoc.protocols.optimization.bounding_messages import Number, Terminate
 from robochoc.protocols.optimization.depth_first import DepthFirstProtocol

@@ -62,14 +62,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, cast
 
-from robochoc.model import message
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import FINITE, NOTHING, EveryValuePays, HasOnly, Hearing, Proof
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text
-from robochoc.protocols import acts
+from robochoc.protocols import acts, message
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import FINITE, NOTHING, EveryValuePays, HasOnly, Hearing, Proof
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization import bnb_adopt_messages as bnb_adopt
 from robochoc.protocols.optimization.bounding_messages import Number, Terminate, bounds_in_words, bounds_prove
 from robochoc.protocols.optimization.depth_first import DepthFirstProtocol
@@ -77,6 +75,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 
 Row = list[Number]

@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
-from robochoc.model import message
-from robochoc.model.disclosure import HasOnly, Hearing, Proof, StandsAt
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text
-from robochoc.protocols import acts
+from robochoc.protocols import acts, message
+from robochoc.protocols.disclosure import HasOnly, Hearing, Proof, StandsAt
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
 from robochoc.protocols.settings import Settings
+from robochoc.protocols.wording import Wording, cost_text
 
 
 class BnBADOPTSettings(Settings, frozen=True):

@@ -12,11 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 
-from robochoc.model import message
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols import message
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context, Entry, Number, Terminate
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from robochoc.model import message
-from robochoc.model.disclosure import EveryValuePays, Hearing, Proof, SomeValuePays, StandsAt
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, cost_text
-from robochoc.protocols import acts
+from robochoc.protocols import acts, message
+from robochoc.protocols.disclosure import EveryValuePays, Hearing, Proof, SomeValuePays, StandsAt
+from robochoc.protocols.message import Message
+from robochoc.protocols.wording import Wording, cost_text
 
 Entry = tuple[message.Value, int]
 """A robot's value, and the number of its changes (the ID of BnB-ADOPT)."""

@@ -19,8 +19,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import (
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import (
     AT_THE_END,
     NOTHING,
     EveryValuePays,
@@ -31,16 +34,14 @@ from robochoc.model.disclosure import (
     StandsAt,
     can_take,
 )
-from robochoc.model.message import Message, Value
-from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text, listed
-from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 from robochoc.system.compiling import mypyc_attr
+from robochoc.system.plain_text import listed
 
 Number = int | float
 """Infinite where a hard constraint is broken, or the cost is unknown; integers remain integers on the wire."""

@@ -10,8 +10,8 @@ from typing import assert_never, cast
 
 import msgspec
 
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bnb_adopt_messages import Cost, Value
 from robochoc.protocols.optimization.bounding import BoundingProtocol
 from robochoc.protocols.optimization.bounding_messages import Context, Number, Terminate

@@ -17,8 +17,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
-from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.branching import BranchingProtocol, Members, Number, Report, Request, Result
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem

@@ -46,20 +46,20 @@ from typing import ClassVar, NamedTuple, assert_never, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model import message
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import HasOnly, Hearing, Proof, table_proves
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text, listed
-from robochoc.protocols import acts
+from robochoc.protocols import acts, message
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import HasOnly, Hearing, Proof, table_proves
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.branching import BranchingProtocol, Number, Result, Terminate, allowance
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.system.plain_text import listed
 
 MOST_CELLS = 1 << 17
 """The maximum number of cells of a table and of its message; while it is computed, for each value of the robot."""

@@ -41,13 +41,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof, can_take
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import Hearing, Proof, can_take
 from robochoc.protocols.findings import Incumbent
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.branching import (
     Assignment,
     Members,
@@ -62,6 +61,7 @@ from robochoc.protocols.optimization.forward_bounding import ForwardBoundingProt
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 

@@ -45,15 +45,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof, SomeValuePays
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, cost_text, listed
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import Hearing, Proof, SomeValuePays
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.branching import Members, Number, Report, Request, Result, Terminate, allowance
 from robochoc.protocols.optimization.forward_bounding import ForwardBoundingProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text
+from robochoc.system.plain_text import listed
 
 
 class CPA(Message, frozen=True):

@@ -56,9 +56,9 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, assert_never, cast
 
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
+from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.run_lengths import expanded, fits
 from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.order import PriorityOrder
@@ -74,8 +74,8 @@ if TYPE_CHECKING:
 from collections.abc import Iterable, Iterator
 from typing import Self
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import (
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import (
     FINITE,
     INFINITE,
     HasOnly,
@@ -87,10 +87,11 @@ from robochoc.model.disclosure import (
     View,
     partial_assignment,
 )
-from robochoc.model.message import Value
-from robochoc.model.wording import Wording, along, cost_text, counted, incumbent_text, listed
+from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Run, cut_off, grouped
 from robochoc.protocols.settings import Settings
+from robochoc.protocols.wording import Wording, along, cost_text, incumbent_text
+from robochoc.system.plain_text import counted, listed
 
 MIB = 1 << 20
 

@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
 

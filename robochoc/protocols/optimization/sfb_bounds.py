@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.compiled import LocalProblem
 

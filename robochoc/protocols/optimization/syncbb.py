@@ -41,15 +41,15 @@ from typing import assert_never, cast
 
 import msgspec
 
-from robochoc.model.disclosure import EveryValuePays, Hearing, Pays, Proof, StandsAt, Total
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, cost_text, incumbent_text
 from robochoc.protocols import acts
+from robochoc.protocols.disclosure import EveryValuePays, Hearing, Pays, Proof, StandsAt, Total
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording, cost_text, incumbent_text
 from robochoc.solver.compiled import LocalProblem
 
 Cost = int | float

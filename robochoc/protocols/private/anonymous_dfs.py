@@ -15,13 +15,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.key_stream import shuffled
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 

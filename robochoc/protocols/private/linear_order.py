@@ -14,11 +14,10 @@ from typing import ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text, counted
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.key_stream import shuffled
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.encrypted_costs import CostCipher, Costs, Sources
 from robochoc.protocols.private.p32_dpop import MOST
@@ -26,9 +25,11 @@ from robochoc.protocols.private.p_dpop import Shape, cells_of
 from robochoc.protocols.private.rerooting import Next, RerootingProtocol
 from robochoc.protocols.private.ring import Ring
 from robochoc.protocols.settings import Settings
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.system.plain_text import counted
 
 MOST_CIPHERS = 1_000_000
 """A table of as many takes 64 MB, and each robot about eight minutes in each turn."""

@@ -69,12 +69,11 @@ from typing import assert_never, cast
 import msgspec
 import numpy as np
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage
 from robochoc.protocols.private.ed25519 import NEEDS
@@ -95,6 +94,7 @@ from robochoc.protocols.private.linear_order import (
 from robochoc.protocols.private.p_dpop import cells_of
 from robochoc.protocols.private.rerooting import Join, Next, RerootingMessage, Setup, Vector
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 

@@ -54,16 +54,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from robochoc.model.disclosure import EveryValuePays, Hearing, Proof
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording
+from robochoc.protocols.disclosure import EveryValuePays, Hearing, Proof
 from robochoc.protocols.findings import NOTHING, Findings
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage, Wave
 from robochoc.protocols.private.ed25519 import NEEDS
 from robochoc.protocols.private.p_dpop import PDPOP, UTIL, CellTable, Codes, PDPOPSettings
 from robochoc.protocols.private.rerooting import Join, Next, RerootingMessage, RerootingProtocol, Setup, Vector
 from robochoc.protocols.private.ring import Ring
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 MOST = 1_000

@@ -60,22 +60,23 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import NOTHING, EveryValuePays, HasOnly, Hearing, Proof, SomeValuePays, StandsAt
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, counted
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import NOTHING, EveryValuePays, HasOnly, Hearing, Proof, SomeValuePays, StandsAt
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.key_stream import shuffled
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage, AnonymousTreeProtocol
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.system.plain_text import counted
 
 MOST_CELLS = 100_000_000
 """A table of as many takes gigabytes."""

@@ -13,15 +13,15 @@ from abc import abstractmethod
 from enum import IntEnum
 from typing import ClassVar, assert_never
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording
+from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.key_stream import shuffled
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeProtocol
 from robochoc.protocols.private.ed25519 import Ed25519, Group
 from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.protocols.private.ring import Ring
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 
 

@@ -64,19 +64,20 @@ from fractions import Fraction
 from itertools import product
 from typing import Any, ClassVar, assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, listed
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.nogood import contradicts, joined
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.shared_constraint import Gap
+from robochoc.system.plain_text import listed
 
 Aggregate = tuple[Value, ...]
 """Values of one robot, each once; in nogoods None where a variable does not matter."""

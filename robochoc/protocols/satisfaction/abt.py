@@ -46,8 +46,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, assert_never, cast
 
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.backtracking import Backtracking

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import Hearing, Proof, can_take
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording, listed
 from robochoc.protocols import acts
+from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import Wording
+from robochoc.system.plain_text import listed
 
 Counters = tuple[tuple[int, str], ...]
 """For each place: how often the robots from there on were reordered, and by whom last; trailing zeros are omitted."""

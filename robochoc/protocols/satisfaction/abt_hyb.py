@@ -43,7 +43,7 @@ no-solution 416
 
 from __future__ import annotations
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import INFINITE, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import INFINITE, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import Wording
 
 Assignments = tuple[Value, ...]
 """A partial assignment: the values of the robots from the first one on, in priority order."""

@@ -51,8 +51,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final, assert_never, cast
 
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Assignment, Solved

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import AT_THE_END, Hearing, Proof, StandsAt, partial_assignment
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import AT_THE_END, Hearing, Proof, StandsAt, partial_assignment
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import Wording
 
 Assignment = tuple[Value, int]
 """A robot's value, and the number of values that it has taken so far."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.protocols.satisfaction.afc_ng_messages import Assignment
 
 

@@ -43,7 +43,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, assert_never, cast
 
-from robochoc.model.message import Message, Value
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder, PseudoTree
 from robochoc.protocols.satisfaction.afc_ng import AFCng
 from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved

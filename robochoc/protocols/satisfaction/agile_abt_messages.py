@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import Hearing, Proof, can_take
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.satisfaction.agile_order import (
     TerminationVector,
 )
+from robochoc.protocols.wording import Wording
+from robochoc.system.plain_text import counted, listed
 
 
 class Ok(Message, frozen=True):

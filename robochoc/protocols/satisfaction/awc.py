@@ -46,8 +46,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple, assert_never, cast
 
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.awc_messages import AddLink, Nogood, Ok

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import Hearing, Proof, StandsAt
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording, is_withdrawn, listed
 from robochoc.protocols import acts
+from robochoc.protocols.disclosure import Hearing, Proof, StandsAt
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import Wording, is_withdrawn
+from robochoc.system.plain_text import listed
 
 
 class Ok(Message, frozen=True):

@@ -68,17 +68,18 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import FINITE, Clash, HasOnly, Hearing, Pays, Proof, StandsAt
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import FINITE, Clash, HasOnly, Hearing, Pays, Proof, StandsAt
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.mediation import Mediation, Table, allows, distinct, own_tables, sizes_in
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.plain_text import counted, listed
 
 Changes = dict[str, tuple[int, int]]
 """New values of robots: the place in the robot's domain, and the number of changes of its value so far."""

@@ -53,17 +53,18 @@ from typing import Annotated, ClassVar
 
 import msgspec
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import FINITE, NOTHING, Hearing, Pays, Proof
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, counted
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import FINITE, NOTHING, Hearing, Pays, Proof
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Value
 from robochoc.protocols.traits import Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import Charged, LocalProblem
+from robochoc.system.plain_text import counted
 
 
 class DBASettings(CycleSettings, frozen=True):

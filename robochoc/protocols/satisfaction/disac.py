@@ -33,18 +33,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import HasOnly, Hearing, Proof
-from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, counted
 from robochoc.protocols import acts
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import HasOnly, Hearing, Proof
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.plain_text import counted
 
 
 class Domain(Message, frozen=True):

@@ -42,8 +42,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, assert_never, cast
 
-from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.disfc_messages import AddLink, Nogood, Ok

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import Hearing, Proof, StandsWhere
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
+from robochoc.protocols.disclosure import Hearing, Proof, StandsWhere
+from robochoc.protocols.message import Message
+from robochoc.protocols.wording import Wording
+from robochoc.system.plain_text import counted, listed
 
 
 class Ok(Message, frozen=True):

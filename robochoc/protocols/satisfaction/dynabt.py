@@ -37,9 +37,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.dynamic import DynamicProtocol
+from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, cast
 
-from robochoc.model.message import Message, Value
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.first_fit_messages import Placed

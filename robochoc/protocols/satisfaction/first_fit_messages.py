@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording
+from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, StandsAt
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import Wording
 
 
 class Placed(Message, frozen=True):

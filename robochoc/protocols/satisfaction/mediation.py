@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from robochoc.model.message import Value
+from robochoc.protocols.message import Value
 from robochoc.solver.compiled import LocalProblem
 
 

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.model.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
-from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording
 from robochoc.protocols import acts
+from robochoc.protocols.disclosure import (
+    INFINITE,
+    NOTHING,
+    EveryValuePays,
+    Hearing,
+    Proof,
+    StandsAt,
+    partial_assignment,
+)
+from robochoc.protocols.message import Message, Value
+from robochoc.protocols.wording import Wording
 
 
 class CPA(Message, frozen=True):

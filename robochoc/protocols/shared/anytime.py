@@ -29,13 +29,13 @@ from typing import Annotated
 
 import msgspec
 
-from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
+from robochoc.protocols import message as wire
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.disclosure import Hearing, Proof, can_take
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import Cost
 

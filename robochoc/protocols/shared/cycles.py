@@ -20,17 +20,17 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import ClassVar, Literal, TypeVar
 
-from robochoc.model import message as wire
-from robochoc.model.disclosure import HasOnly, Hearing, Proof, can_take
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording
 from robochoc.protocols import acts
+from robochoc.protocols import message as wire
 from robochoc.protocols.chance import one_of
+from robochoc.protocols.disclosure import HasOnly, Hearing, Proof, can_take
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.anytime import Anytime, Best, Paid, Place, Step
+from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 

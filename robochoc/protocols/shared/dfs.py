@@ -20,9 +20,9 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 
-from robochoc.model.message import Message
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.messages.dfs import Back, Token, Wave

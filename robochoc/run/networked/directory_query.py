@@ -12,7 +12,7 @@ from robochoc.communication.network.control_messages import DirectoryAnswer, Dir
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
 from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.transport import CannotConnectError, Transport
-from robochoc.model.communicative_acts import Performative
+from robochoc.protocols.acts import Performative
 from robochoc.run.networked.address import Address
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in

@@ -20,9 +20,9 @@ from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent, Settled
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.brute_force import solutions

@@ -27,10 +27,10 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Received, Sent
 from robochoc.model.expression import Name
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import AddAgent, Constraint, Parent, Robot, ScenarioEvent, Team, Topic
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import decided
 from robochoc.solver.encoding import UnsupportedError

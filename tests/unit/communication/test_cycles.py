@@ -12,9 +12,9 @@ from robochoc.communication.simulator.schedule import Cycles
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Improved, Received, Sent
 from robochoc.journal.recorder import improvements
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.recording import objective_to_record
 from tests.support import golden

@@ -10,7 +10,7 @@ from contextlib import suppress
 import pytest
 
 from robochoc.communication.processes.queue_robot import Action, DescriptorWatch
-from robochoc.model.message import Envelope
+from robochoc.protocols.message import Envelope
 
 Pipe = tuple[int, int]
 

@@ -6,8 +6,8 @@ import pytest
 
 from robochoc.communication.host import BadMessageError, Host, MessageCache
 from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
-from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok

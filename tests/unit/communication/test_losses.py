@@ -20,7 +20,6 @@ from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.tasks import tasks
 from robochoc.journal.events import AnyEvent, Received, Sent
-from robochoc.model.message import Envelope
 from robochoc.model.orders import constraint_graph
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
@@ -29,6 +28,7 @@ from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.lamdls import LAMDLS
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
+from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.replay import CannotReplayError, replay

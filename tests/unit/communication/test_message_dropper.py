@@ -19,10 +19,10 @@ from robochoc.communication.session import Epoch
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
-from robochoc.model.message import Envelope, Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Runtime, solve

@@ -14,10 +14,10 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from tests.support import golden

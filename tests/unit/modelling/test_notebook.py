@@ -11,8 +11,8 @@ from lxml import html
 
 import robochoc
 from robochoc.formats.result import result_json
-from robochoc.model.notebook.graph import MAX_ROBOTS
-from robochoc.model.notebook.tables import MAX_ROWS, table
+from robochoc.modelling.html_tables import MAX_ROWS, table
+from robochoc.modelling.team_html import MAX_ROBOTS
 from tests.support.program import ROOT
 
 HOSTILE = "<script>alert('1')</script>&\"'\u202e"

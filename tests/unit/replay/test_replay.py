@@ -26,7 +26,7 @@ from robochoc.journal.events import (
     actor,
 )
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
-from robochoc.model.message import Message, Value
+from robochoc.protocols.message import Message, Value
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.dynabt import DynABT
 from robochoc.protocols.satisfaction.nogood_messages import Nogood

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import robochoc.services.sl
-from robochoc.model.communicative_acts import Performative
+from robochoc.protocols.acts import Performative
 from robochoc.services.descriptions import AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robochoc.sniffer.acl
-from robochoc.model.communicative_acts import Performative
-from robochoc.model.message import Message
+from robochoc.protocols.acts import Performative
+from robochoc.protocols.message import Message
 from robochoc.run.registry import protocol_named
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory

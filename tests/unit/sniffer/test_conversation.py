@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import msgspec
 import pytest
 
-from robochoc.model.communicative_acts import Performative
-from robochoc.model.message import Message, encode
+from robochoc.protocols.acts import Performative
+from robochoc.protocols.message import Message, encode
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.protocols.satisfaction.first_fit import FirstFit

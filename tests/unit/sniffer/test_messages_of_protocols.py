@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Team
+from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.mediation import Table
 from robochoc.protocols.shared.anytime import AnytimeMessage

@@ -13,17 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.model.message import Message
 from robochoc.model.problem import Team
-from robochoc.model.wording import Wording, listed
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.shared.messages.dfs import Token
+from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.trace import Trace
+from robochoc.system.plain_text import listed
 from tests.support.acl_conversations import BUNDLED_PROTOCOLS, types_of
 from tests.support.cases import cases
 from tests.support.complex_problems import random_complex_team

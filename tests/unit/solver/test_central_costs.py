@@ -15,9 +15,9 @@ from robochoc.formats import PREDEFINED, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.message import Message
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, Withdrawal, solve

@@ -8,7 +8,6 @@ from random import Random
 
 import pytest
 
-from robochoc.model.message import Value
 from robochoc.model.orders import with_order
 from robochoc.model.problem import (
     INFINITE,
@@ -18,6 +17,7 @@ from robochoc.model.problem import (
     Semantics,
     Team,
 )
+from robochoc.protocols.message import Value
 from robochoc.solver import compiled
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem

@@ -12,8 +12,8 @@ import robochoc.run.orchestrator
 import robochoc.verification.checker
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
-from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE, Constraint, Domain, Predicate, Relation, Robot, Semantics, Team, Variable
+from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run import Options, Runtime, solve

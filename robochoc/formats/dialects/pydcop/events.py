@@ -9,7 +9,7 @@ from robochoc.formats.dialects.dialect import Names, Note
 from robochoc.formats.dialects.pydcop.hosting import text_of
 from robochoc.formats.dialects.yaml_tree import Node
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
-from robochoc.model.wording import counted
+from robochoc.system.plain_text import counted
 
 
 def read_scenario(

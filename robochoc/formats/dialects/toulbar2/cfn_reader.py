@@ -19,7 +19,7 @@ from robochoc.formats.dialects.tables import Amount, CostTable
 from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, imported
 from robochoc.formats.dialects.toulbar2.text import Reader, Words, read_words
 from robochoc.model.constraint import INFINITE
-from robochoc.model.wording import counted
+from robochoc.system.plain_text import counted
 
 _TOKEN = re.compile(r'[{}\[\]]|[^{}\[\]\s":,]+')
 

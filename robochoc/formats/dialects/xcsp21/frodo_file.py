@@ -23,8 +23,8 @@ from robochoc.formats.global_constraints import PREFIX, write_global
 from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
 from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.problem import Team
-from robochoc.model.wording import counted
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.plain_text import counted
 
 FORMAT = "XCSP 2.1_FRODO"
 TITLE = "FRODO's XCSP 2.1"

@@ -6,9 +6,10 @@ from typing import Annotated
 
 import msgspec
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message
-from robochoc.model.wording import Wording, counted, listed
+from robochoc.protocols.acts import Act, Performative
+from robochoc.protocols.message import Message
+from robochoc.protocols.wording import Wording
+from robochoc.system.plain_text import counted, listed
 
 
 class Wave(Message, frozen=True):

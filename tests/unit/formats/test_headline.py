@@ -6,7 +6,7 @@ from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
-from robochoc.model.headline import describe_outcome
+from robochoc.formats.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from tests.support.cases import looped
 

@@ -16,14 +16,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-if TYPE_CHECKING:
-    from robochoc.model.message import Message, Value
+from robochoc.model.problem import Value
 
-M = TypeVar("M", bound="Message")
+M = TypeVar("M")
 INFINITE = math.inf
-View = Mapping[str, "Value"]
+View = Mapping[str, Value]
 """Values by robot; None where a variable does not matter."""
 
 

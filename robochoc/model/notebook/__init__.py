@@ -1,1 +1,0 @@
-"""Teams as pieces of a notebook's page."""
