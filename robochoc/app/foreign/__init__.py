@@ -1,1 +1,1 @@
-"""Teams that were not drawn in the application: what is known of their files, in words and as a picture."""
+"""Imported teams, which were not drawn in the application: facts about their files, in words and as a picture."""

@@ -1,4 +1,4 @@
-"""The picture of a team that was not drawn here: its robots where their files say, or else side by side."""
+"""The picture of an imported team: its robots at the positions in their files, or else side by side."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _FEWEST_COLUMNS, _FEWEST_ROWS = 8, 6
 
 
 def drawn(team: ForeignTeam) -> Sketch:
-    """Return a sketch of a team's robots without decisions and rules: files say these."""
+    """Return a sketch of a team's robots, without decisions and rules, which are in the files."""
     robots = team.team.robots[:MAX_ROBOTS]
-    cells = _said_cells(robots) or _side_by_side(len(robots))
+    cells = _cells_in_files(robots) or _side_by_side(len(robots))
     columns = max(_FEWEST_COLUMNS, 1 + max((cell.x for cell in cells), default=0))
     rows = max(_FEWEST_ROWS, 1 + max((cell.y for cell in cells), default=0))
     placed = zip(robots, cells, strict=True)
     return Sketch(team.name, Area(columns, rows), tuple(SketchRobot(robot.name, cell) for robot, cell in placed))
 
 
-def _said_cells(robots: Sequence[Robot]) -> list[Cell] | None:
-    """Return where files say that robots are, whatever they decide; None: they do not, or a map is too small for it."""
+def _cells_in_files(robots: Sequence[Robot]) -> list[Cell] | None:
+    """Return the fixed cells of robots in their files; None if there are none, or they do not fit on a map."""
     if not all(map(has_place, robots)):
         return None
     found = [craft.cell for robot in robots for craft in crafts_of(robot, {})[:1]]

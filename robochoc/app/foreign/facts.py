@@ -1,4 +1,4 @@
-"""What pages tell of a team that was not drawn here. It is found once, when the team is opened, and kept."""
+"""The facts about an imported team that pages show. They are computed when the team is opened, and saved."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from robochoc.model.problem import (
 )
 
 MOST_VARIABLES = 20_000
-"""Decisions that are known by their robots. What others decide is told without."""
+"""The maximum number of decisions that are listed with their robots."""
 MOST_LINKS = 400
 MOST_EVENTS = 100
 MOST_CHANGES = 12
-"""Changes of an event that are told one by one."""
+"""The maximum number of changes of an event that are listed."""
 _MOST_RANGES = 8
 _LONGEST_VALUES = 160
 _LONGEST_NOTE = 400
@@ -40,7 +40,7 @@ _MOST_NOTES = 100
 
 
 class Decides(msgspec.Struct, frozen=True):
-    """A decision: the variable's name, how many values it has, and which, in words."""
+    """A decision: the variable's name, the number of its values, and the values in words."""
 
     variable: str
     size: int
@@ -52,9 +52,9 @@ class RobotFacts(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Its name.
-        decides: What it decides.
-        weight: How much its stepping aside counts.
-        joins: It is not there from the beginning.
+        decides: Its decisions.
+        weight: The weight of its withdrawal.
+        joins: Whether it joins later.
     """
 
     name: str
@@ -64,24 +64,24 @@ class RobotFacts(msgspec.Struct, frozen=True):
 
 
 class Facts(msgspec.Struct, frozen=True):
-    """What is known of a team.
+    """The facts about a team.
 
     Attributes:
-        robots: Its robots in their order, then those that join.
-        last: Who is there once all has happened.
-        variables: How many decisions there are.
-        constraints: How many constraints there are, at the beginning.
-        private: How many of them are about one robot alone.
-        partial: How many of them are parts of partially known ones.
-        links: Pairs of robots that share a constraint; of many, the first ones.
-        linked: How many such pairs there are.
+        robots: Its robots in order, followed by those that join later.
+        last: The robots after all events.
+        variables: The number of decisions.
+        constraints: The number of constraints at the start.
+        private: The number of constraints of a single robot.
+        partial: The number of parts of partially known constraints.
+        links: The pairs of robots with a common constraint, up to a maximum.
+        linked: The number of such pairs.
         costs: Whether there are costs.
-        maximised: Whether their sum is to be as large as can be.
-        events: What happens to it, event by event, in words.
-        flies: Whether its files say where robots are to be.
-        files: Files that were changed by hand since it was drawn here; none: it never was.
-        notes: What was changed when it was imported.
-        origin: The name of the file that was opened.
+        maximised: Whether costs are utilities, whose sum is maximised.
+        events: The events in words.
+        flies: Whether its files have positions of robots.
+        files: Of a team that was drawn here, the files that were changed later; else empty.
+        notes: Changes by the import.
+        origin: The name of the opened file.
     """
 
     robots: tuple[RobotFacts, ...]
@@ -102,12 +102,12 @@ class Facts(msgspec.Struct, frozen=True):
 
     @property
     def there(self) -> tuple[RobotFacts, ...]:
-        """The robots that are there from the beginning."""
+        """The robots at the start."""
         return tuple(robot for robot in self.robots if not robot.joins)
 
 
 def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = (), origin: str = "") -> Facts:
-    """Return what is known of a team. See `Facts` for the other arguments."""
+    """Return the facts about a team. See `Facts` for the other arguments."""
     constraints = [*team.constraints()]
     graph = constraint_graph(team)
     links = [(one, other) for one in team.order for other in graph[one] if one < other]
@@ -131,12 +131,12 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
 
 
 def events_in_words(team: Team) -> tuple[str, ...]:
-    """Return what happens to a team, a sentence for each event; of very many, the first ones."""
+    """Return a sentence for each event of a team, up to a maximum."""
     return tuple(_events(team.scenario, domains_of(team) if team.scenario else {}))
 
 
 def all_robots(team: Team) -> list[Robot]:
-    """Return a team's robots in their order, then those that join, each once."""
+    """Return a team's robots in order, followed by those that join later, without duplicates."""
     joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
     found = {robot.name: robot for robot in team.robots}
     for robot in joining:
@@ -145,7 +145,7 @@ def all_robots(team: Team) -> list[Robot]:
 
 
 def domains_of(team: Team) -> dict[str, Domain]:
-    """Return the domains of all variables, those of robots that join included."""
+    """Return the domains of all variables, also of robots that join later."""
     return {one.name: one.domain for robot in all_robots(team) for one in robot.variables}
 
 
@@ -170,7 +170,7 @@ def _values(domain: Domain) -> str:
 
 
 def has_place(robot: Robot) -> bool:
-    """Return whether files say where a robot is to be: by a topic, or by its name, such as `Robot3.1`."""
+    """Return whether a robot has a position: in a topic, or in its name, such as `Robot3.1`."""
     said = any(coordinate is not None for topic in robot.topics for coordinate in (topic.x, topic.y, topic.z))
     return said or row_and_column(robot.name) is not None
 

@@ -11,19 +11,19 @@ from robochoc.formats.robot import read_robot
 
 MOST_SENTENCES = 60
 MOST_SHOWN = 40_000
-"""Characters of a file that are shown."""
+"""The maximum number of characters of a file that are shown."""
 
 
-class Read(msgspec.Struct, frozen=True):
+class RobotFile(msgspec.Struct, frozen=True):
     """A robot's file.
 
     Attributes:
         name: The file's name.
-        text: What stands in it, or its beginning.
-        is_cut: Whether that is the beginning only.
-        neighbours: Whom it shares constraints with.
-        sentences: What its constraints say, each as often as it is there; of many, the first ones.
-        count: How many constraints it has.
+        text: Its content, or the beginning of it.
+        is_cut: Whether `text` is only the beginning.
+        neighbours: The robots with common constraints.
+        sentences: Its constraints in words, up to a maximum.
+        count: The number of its constraints.
     """
 
     name: str
@@ -34,15 +34,15 @@ class Read(msgspec.Struct, frozen=True):
     count: int
 
 
-def read(folder: Path, robot: str) -> Read:
-    """Return what the files in `folder` say of a robot of the team. Raises `InvalidInputError`, `OSError`."""
+def read_robot_file(folder: Path, robot: str) -> RobotFile:
+    """Return the file of a robot in the team's `folder`. Raises `InvalidInputError`, `OSError`."""
     file = _file_of(folder, robot)
     found = read_robot(file)
     constraints = [*found.constraints()]
     says = (sentence(one, found.symbol_table, found.costs) for one in constraints[:MOST_SENTENCES])
     with file.open(encoding="utf-8", errors="replace") as opened:
         text = opened.read(MOST_SHOWN + 1)
-    return Read(
+    return RobotFile(
         file.relative_to(folder).as_posix(),
         text[:MOST_SHOWN],
         len(text) > MOST_SHOWN,
@@ -53,6 +53,6 @@ def read(folder: Path, robot: str) -> Read:
 
 
 def _file_of(folder: Path, robot: str) -> Path:
-    """Return the file of a robot; one that joins has it in a folder of its own."""
+    """Return the path of a robot's file; robots that join later are in separate folders."""
     places = [folder, *sorted(folder.glob("late*"))]
     return next((file for place in places if (file := place / f"{robot}.xml").is_file()), folder / f"{robot}.xml")

@@ -1,4 +1,4 @@
-"""Constraints of files in words: what they say of their robots' decisions, and what it costs to break them."""
+"""Constraints of files in words, with their costs."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ _SIGNS = {
     "eq": "=", "ne": "≠", "lt": "<", "le": "≤", "gt": ">", "ge": "≥", "and": "and", "or": "or", "xor": "xor",
     "iff": "⇔",
 }  # fmt: skip
-"""Operators that are written between their arguments."""
+"""Infix operators."""
 
 _FORMS = {"abs": "|{0}|", "dist": "|{0} - {1}|", "neg": "-{0}", "sqr": "{0}²"}
 _WORDED = frozenset({"not", "in"})
 _CLOSED = frozenset({"abs", "not", "min", "max", "imp", "if"})
-"""Operators whose arguments stand alone, and need no parentheses."""
+"""Operators whose arguments need no parentheses."""
 
 
 def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUnits | None = None) -> str:
-    """Return what a constraint says, in one line: `V1 ≠ V2`, and what breaking it costs.
+    """Return a constraint in one line, such as `V1 ≠ V2`, with the cost of a violation.
 
     Args:
         constraint: The constraint.
         symbols: The names of the team's symbols, by their codes.
-        units: The units in which its robot's file has costs. None: whole ones.
+        units: The units of the costs in its robot's file. None: integers.
     """
     units = units or CostUnits()
     says = _says(constraint, symbols, units)
@@ -54,7 +54,7 @@ def _says(constraint: Constraint, symbols: Sequence[str], units: CostUnits) -> s
 
 
 def _table(constraint: Constraint, relation: Relation, symbols: Sequence[str], units: CostUnits) -> str:
-    """Return a table in words: over which decisions, and its first rows."""
+    """Return a table in words: its decisions and its first rows."""
     rows = []
     for number, row in enumerate(relation.tuples[:_MOST_ROWS]):
         told = ", ".join(_label(value, column in relation.symbolic, symbols) for column, value in enumerate(row))
@@ -82,13 +82,13 @@ def _priced(cost: float, units: CostUnits) -> str:
 
 
 class _Reading:
-    """Expressions as they are read: with signs between arguments, and what is passed in the place of parameters."""
+    """Converts expressions to infix notation, with parameters replaced by the arguments."""
 
     def __init__(self, given: Mapping[str, str | int], symbolic: Sequence[str], symbols: Sequence[str]) -> None:
         self._given, self._symbolic, self._symbols = given, frozenset(symbolic), symbols
 
     def text(self, expression: Expression, *, inner: bool = False) -> str:
-        """Return an expression; one that stands `inner` of another one has parentheses where it needs them."""
+        """Return the text of an expression, with parentheses if it is an `inner` one and needs them."""
         match expression:
             case Constant(value):
                 return str(value)

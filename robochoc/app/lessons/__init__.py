@@ -1,1 +1,1 @@
-"""Ten short lessons on how robots decide together: data, recorded runs, pictures. No web is in here."""
+"""Ten short lessons on how robots decide together: data, recorded runs and pictures, without NiceGUI."""

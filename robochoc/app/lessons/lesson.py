@@ -1,7 +1,7 @@
-"""A lesson: a team of four, runs of protocols on it, and steps that ask what comes next.
+"""A lesson: a team of four, runs of protocols on it, and steps with a question about the next event.
 
-A lesson is a file of data (`data/NN.toml`), which is also the catalogue of its texts: its teams, the runs, and the
-steps. What a choice claims is written beside its words, in fields that a program can hold against the recorded run.
+A lesson is a data file (`data/NN.toml`), which also has its texts: its teams, runs and steps. The claim of a choice is
+given in fields, too, which a test compares with the recorded run.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ ROBOTS = ("Ada", "Bob", "Cleo", "Dan")
 """The team of all lessons, in its order: the highest priority first."""
 COUNT = 10
 PLACES = {"Ada": (90, 72), "Bob": (310, 72), "Cleo": (90, 218), "Dan": (310, 218)}
-"""Where robots are drawn, unless a team says otherwise."""
+"""The default positions of the drawn robots."""
 Apart = tuple[str, str]
 
 
 class TeamSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A team: each robot takes a level, and two that are `apart` may not take the same.
+    """A team: each robot chooses a level, and pairs in `apart` must choose different ones.
 
     Attributes:
-        values: The levels of all robots; `values_of` says otherwise for some.
-        apart: Who may not be at the same level.
-        broken_costs: The cost of two at the same level; 0: it must not be.
-        low: Whether a robot's level is a cost, too: as much as its number.
-        chain: So many robots in a row instead of the four.
-        partly_known: Whether each rule is known to its first robot alone.
-        changes: Whether a level is lost after the first solution.
-        places: Where robots are drawn.
-        names: Where their names stand: `left` or `right` of them; otherwise above or below.
+        values: The levels of all robots, except those in `values_of`.
+        apart: The pairs of robots that must be at different levels.
+        broken_costs: The cost of a pair at the same level; 0: it is forbidden.
+        low: Whether a robot's level is also a cost, equal to its number.
+        chain: The number of robots in a row, instead of the four.
+        partly_known: Whether only its first robot knows each rule.
+        changes: Whether a level is removed after the first solution.
+        places: The positions of the drawn robots.
+        names: The side of a robot's name: `left` or `right`; otherwise above or below.
     """
 
     values: tuple[int, ...] = (1, 2)
@@ -46,16 +46,16 @@ class TeamSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     names: dict[str, str] = {}
 
     def levels(self, robot: str) -> tuple[int, ...]:
-        """Return the levels that a robot can take."""
+        """Return the levels of a robot."""
         return self.values_of.get(robot, self.values)
 
     def place(self, robot: str) -> tuple[int, int]:
-        """Return where a robot is drawn."""
+        """Return the position of a drawn robot."""
         return self.places.get(robot, PLACES[robot])
 
 
 class RunSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A run in the simulator; of `auto` only the choice is recorded. `turns`: so many are kept; 0: all."""
+    """A run in the simulator; for `auto` only the choice is recorded. `turns`: the number of recorded turns; 0: all."""
 
     team: str = "team"
     protocol: str
@@ -66,21 +66,21 @@ class RunSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One of the answers: its words, what it claims, and why it is right or wrong.
+    """One of the answers: its text, its claim, and the reason why it is right or wrong.
 
     Attributes:
-        text: Its words; a message is shown as it is.
-        why: Why it is the answer, or why not.
+        text: Its text; a message is shown unchanged.
+        why: The reason why it is right or wrong.
         right: Whether it is the answer.
-        to, words: The robot says this to that one.
-        silent: The robot says nothing.
-        undecided: The robot takes no level.
-        takes: The robot takes this level.
-        levels: The team's levels.
-        breaks: Why `levels` are wrong: these two may not be at the same level.
-        robots: These robots, and no others.
-        number: So many.
-        protocol: That protocol.
+        to, words: The claim that the robot sends this message to that robot.
+        silent: The claim that the robot sends nothing.
+        undecided: The claim that the robot chooses no level.
+        takes: The claim that the robot chooses this level.
+        levels: The claimed levels of the team.
+        breaks: A pair of robots for which `levels` are wrong.
+        robots: The claimed robots, and no others.
+        number: The claimed number.
+        protocol: The claimed protocol.
     """
 
     text: str = ""
@@ -107,15 +107,15 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """A moment of a run, and a question.
 
     Attributes:
-        title: What it is about.
-        text: What has happened so far, and what there is to know.
+        title: Its title.
+        text: The events so far, and further information.
         ask: The question.
-        about: What kind of question it is, with the names that belong to it (`tests/support/lesson_truth.py`).
-        run: The run; empty: nobody has spoken yet, and the picture shows the team.
-        turn: The turns that are over. The robot of the next one is asked.
-        team: The team, where there is no run.
-        levels: What the picture shows where there is no run.
-        choices: Three or four.
+        about: The kind of the question, with names (`tests/support/lesson_truth.py`).
+        run: The run; empty: there are no messages yet, and the picture shows the team.
+        turn: The number of past turns. The question is about the robot of the next turn.
+        team: The team, if there is no run.
+        levels: The levels in the picture, if there is no run.
+        choices: Three or four choices.
     """
 
     title: str
@@ -130,7 +130,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def is_spoken(self) -> bool:
-        """Whether the robot of the next turn is asked about what it does and says then."""
+        """Whether the question is about the actions and messages of the robot of the next turn."""
         return self.about == "next" or self.about.startswith("told ")
 
     @property
@@ -150,7 +150,7 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     end: str
 
     def team_of(self, step: Step) -> TeamSpec:
-        """Return the team that a step is about."""
+        """Return the team of a step."""
         return self.teams[self.runs[step.run].team if step.run else step.team]
 
 
@@ -159,7 +159,7 @@ def lesson(number: int) -> Lesson:
     """Return a lesson, counted from 1.
 
     Raises:
-        KeyError: if there is none of that number.
+        KeyError: if there is no lesson with this number.
     """
     if not 1 <= number <= COUNT:
         raise KeyError(number)

@@ -1,4 +1,4 @@
-"""Pictures of a team: SVG, whose colours are the page's (`picture.css`), and whose labels are text."""
+"""Pictures of a team as SVG, with the colours of the page (`picture.css`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Point = tuple[float, float]
 
 
 def picture(team: TeamSpec, moment: Moment) -> str:
-    """Return the team at a moment. No line of it is empty, so that it can stand in a page of Markdown."""
+    """Return the picture of a team at a moment, without empty lines, so that it can be part of a Markdown page."""
     if team.chain:
         return _chain(team.chain)
     parts = [
@@ -29,21 +29,21 @@ def picture(team: TeamSpec, moment: Moment) -> str:
 
 
 def in_words(team: TeamSpec, moment: Moment) -> str:
-    """Return what the picture shows, for who cannot see it."""
+    """Return a description of the picture, for screen readers."""
     levels = [
         f"{robot} is at level {moment.levels[robot]}" if robot in moment.levels else f"{robot} has no level yet"
         for robot in ROBOTS
     ]
     rules = [f"{one} and {other}" for one, other in team.apart]
-    said = [f"{one.sender} to {one.to}: {one.words}" for one in moment.messages]
-    told = f" Messages: {'; '.join(said)}." if said else ""
-    return f"{', '.join(levels)}. Not at the same level: {', '.join(rules)}.{told}"
+    sent = [f"{message.sender} to {message.to}: {message.words}" for message in moment.messages]
+    messages = f" Messages: {'; '.join(sent)}." if sent else ""
+    return f"{', '.join(levels)}. Not at the same level: {', '.join(rules)}.{messages}"
 
 
 def _framed(words: str, parts: list[str]) -> str:
-    whole = "\n".join(parts)
+    content = "\n".join(parts)
     box = f'viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(words)}"'
-    return f'<svg class="team-picture" xmlns="http://www.w3.org/2000/svg" {box}>\n{whole}\n</svg>'
+    return f'<svg class="team-picture" xmlns="http://www.w3.org/2000/svg" {box}>\n{content}\n</svg>'
 
 
 def _link(team: TeamSpec, one: str, other: str) -> str:
@@ -96,7 +96,7 @@ def _arrow(team: TeamSpec, sender: str, to: str, kind: str) -> str:
 
 
 def _beside(start: _Point, end: _Point) -> _Point:
-    """Return the point that an arrow bends to: beside the link, on the right of who goes along it."""
+    """Return the control point of an arrow: beside the link, on the right in the arrow's direction."""
     away = math.dist(start, end)
     x, y = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
     bend = 2 * _BEND
@@ -125,7 +125,7 @@ _SHOWN = 7
 
 
 def _chain(count: int) -> str:
-    """Return a row of so many robots, of which a few are drawn."""
+    """Return the picture of a row of robots, of which a few are drawn."""
     xs = [40 + 53 * place for place in range(_SHOWN)]
     y = HEIGHT // 2
     gap = _SHOWN - 2

@@ -1,4 +1,4 @@
-"""How far somebody is in the lessons: a small file in the folder of the teams."""
+"""The user's progress in the lessons, saved in a small file in the folder of the teams."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _MOST_BYTES = 1 << 16
 
 
 class Progress:
-    """The steps that are answered, by lesson, kept in `folder`. What cannot be read or written is begun again."""
+    """The answered steps by lesson, saved in `folder`. After an error of reading, the progress is empty."""
 
     def __init__(self, folder: Path) -> None:
         self._file = folder / _FILE
         self._done = self._read()
 
     def done(self, number: int) -> int:
-        """Return how many steps of a lesson are answered, from its first one on."""
+        """Return the number of answered steps of a lesson, from its first one on."""
         return min(max(self._done.get(number, 0), 0), len(lesson(number).steps))
 
     def is_over(self, number: int) -> bool:
@@ -28,18 +28,18 @@ class Progress:
         return self.done(number) == len(lesson(number).steps)
 
     def next(self) -> int:
-        """Return the first lesson that is not over; the first of all if all are."""
+        """Return the first lesson that is not completed; the first lesson if all are."""
         return next((number for number in range(1, COUNT + 1) if not self.is_over(number)), 1)
 
     def answered(self, number: int, step: int) -> None:
-        """Remember that a step, counted from 0, is answered."""
+        """Save that a step, counted from 0, is answered."""
         if step < self.done(number):
             return
         self._done[number] = step + 1
         self._write()
 
     def begin_again(self, number: int) -> None:
-        """Forget what was answered in a lesson."""
+        """Delete the progress of a lesson."""
         if self._done.pop(number, 0):
             self._write()
 
@@ -56,5 +56,5 @@ class Progress:
         try:
             fresh.write_bytes(msgspec.json.encode(self._done))
             fresh.replace(self._file)
-        except OSError:  # a full disk does not end a lesson
+        except OSError:  # the lesson continues if the disk is full, for example
             fresh.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Makes the recordings of a lesson: each run once, in the simulator. `robochoc app` itself never does."""
+"""Record the runs of a lesson in the simulator. `robochoc app` does not use this module."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ AUTO = "auto"
 
 
 def recorded(lesson: Lesson) -> dict[str, Recording]:
-    """Return the runs of a lesson, made now."""
+    """Run and return the recordings of a lesson."""
     return {name: _recorded(lesson.teams[run.team], run) for name, run in lesson.runs.items()}
 
 
 def model_of(spec: TeamSpec) -> Model:
-    """Return the team as a model: what is solved."""
+    """Return the model of a team."""
     model = robochoc.Model("lesson")
     names = [f"R{place + 1}" for place in range(spec.chain)] if spec.chain else ROBOTS
     robots = {name: model.robot(name, priority=len(names) - place) for place, name in enumerate(names)}
@@ -61,7 +61,7 @@ def _recorded(spec: TeamSpec, run: RunSpec) -> Recording:
         observer=events.append,
     )
     events.sort(key=lambda event: event.t)
-    messages, turns = _told(events, run)
+    messages, turns = _messages_and_turns(events, run)
     return Recording(
         run.protocol,
         messages=messages,
@@ -71,8 +71,8 @@ def _recorded(spec: TeamSpec, run: RunSpec) -> Recording:
     )
 
 
-def _told(events: list[AnyEvent], run: RunSpec) -> tuple[tuple[Message, ...], tuple[Turn, ...]]:
-    """Return the messages and turns, in the words that the sniffer and the replay have for them."""
+def _messages_and_turns(events: list[AnyEvent], run: RunSpec) -> tuple[tuple[Message, ...], tuple[Turn, ...]]:
+    """Return the messages and turns, in the words of the sniffer and the replay."""
     header = Header(team="lesson", protocol=run.protocol, runtime="simulator", seed=run.seed)
     trace = Trace(header)
     trace.add(events)

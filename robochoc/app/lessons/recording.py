@@ -1,6 +1,6 @@
-"""What happened in the runs of a lesson: made once from real runs (`record.py`), and kept beside the lesson.
+"""The recorded runs of a lesson, made from real runs (`record.py`) and stored with the lesson.
 
-A test makes the runs again and holds them against what is kept, so a lesson tells what the protocols do.
+A test repeats the runs and compares them with the recordings, so that lessons show the protocols' actual behaviour.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from robochoc.app.lessons.lesson import Step
 
 
 class Message(msgspec.Struct, frozen=True):
-    """A message that was sent, in the words of the sniffer."""
+    """A message in the words of the sniffer."""
 
     sender: str
     to: str
@@ -23,7 +23,7 @@ class Message(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What a robot did at once: the messages that it took in and sent, by number; its level, and why it has that."""
+    """One step of a robot: the received and sent messages by number, its level, and the reasons for the level."""
 
     robot: str
     heard: tuple[int, ...] = ()
@@ -33,7 +33,7 @@ class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Recording(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A run: its protocol (the one that was chosen, and why), messages and turns in their order, and its end."""
+    """A run: its protocol, the reason for its choice, messages and turns in order, verdict and cost."""
 
     protocol: str
     reason: str = ""
@@ -43,12 +43,12 @@ class Recording(msgspec.Struct, frozen=True, omit_defaults=True):
     cost: int | None = None
 
     def levels(self, turns: int) -> dict[str, int]:
-        """Return the robots' levels after so many turns."""
+        """Return the robots' levels after a number of turns."""
         return {turn.robot: turn.level for turn in self.turns[:turns] if turn.level is not None}
 
 
 class Moment(msgspec.Struct, frozen=True):
-    """What a picture of the team shows: levels, the messages that count now, and who is asked."""
+    """The content of a picture: levels, the present messages, and the robot of the question."""
 
     levels: dict[str, int]
     messages: tuple[Message, ...] = ()
@@ -63,19 +63,19 @@ def recordings(number: int) -> dict[str, Recording]:
 
 
 def before(number: int, step: Step) -> Moment:
-    """Return the moment of a step: the robot that is asked has heard what the arrows say, and not spoken yet."""
+    """Return the moment of a step: the robot of the question has received the drawn messages, and sent none yet."""
     if not step.run:
         return Moment(step.levels)
     run = recordings(number)[step.run]
     if step.turn >= len(run.turns):
         return Moment(run.levels(step.turn))
     turn = run.turns[step.turn]
-    moved = step.is_spoken and step.about != "next"  # it is known already that the robot has a new level
+    moved = step.is_spoken and step.about != "next"  # the robot's new level is already known
     return Moment(run.levels(step.turn + moved), tuple(run.messages[one] for one in turn.heard), _asked(step, turn))
 
 
 def after(number: int, step: Step) -> Moment:
-    """Return what the picture shows once the step is answered: what the robot has said, and its level."""
+    """Return the moment after the answer: the messages that the robot has sent, and its level."""
     if not step.run or not step.is_spoken:
         shown = before(number, step)
         return msgspec.structs.replace(shown, levels=step.answer.levels or shown.levels)
@@ -85,11 +85,11 @@ def after(number: int, step: Step) -> Moment:
 
 
 def reasons(number: int, step: Step) -> tuple[str, ...]:
-    """Return the robot's own reasons for its new level, as the replay of the run tells them."""
+    """Return the robot's reasons for its new level, from the replay of the run."""
     if not step.run or not step.is_spoken:
         return ()
     why = recordings(number)[step.run].turns[step.turn].why
-    return tuple(reason for reason in why if "bytes>" not in reason)  # a table that is packed tells nobody anything
+    return tuple(reason for reason in why if "bytes>" not in reason)  # packed tables are not readable
 
 
 def _asked(step: Step, turn: Turn) -> str:

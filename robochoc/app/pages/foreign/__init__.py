@@ -1,1 +1,1 @@
-"""The pages of a team that was not drawn here, where they are others than those of a team that was."""
+"""The pages of imported teams that differ from those of teams that were drawn here."""

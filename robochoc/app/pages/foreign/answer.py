@@ -1,4 +1,4 @@
-"""The answer of a team that was not drawn here: what stands at each robot, tables, and what happened on the way."""
+"""The answer of an imported team: texts at robots, tables, and the epochs."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from robochoc.app.sketch.sketch import Value
 from robochoc.app.texts import say
 
 MOST_ROWS = 300
-"""Decisions that a table lists."""
+"""The maximum number of rows of a table."""
 MOST_EPOCHS = 40
 _MOST_AT_ONE = 3
-"""Values that stand at a robot in the picture."""
+"""The maximum number of values at a robot in the picture."""
 _LONGEST = 160
 _VERDICTS = frozenset({"solution", "optimal", "no-solution", "unknown"})
 
 
 def says_of(facts: Facts, values: Mapping[str, Value]) -> dict[str, str]:
-    """Return what each robot has decided, in short, by its name."""
+    """Return each robot's decisions in short, by its name."""
     said: dict[str, str] = {}
     for robot in facts.robots:
         own = [str(values[one.variable]) for one in robot.decides if one.variable in values]
@@ -30,17 +30,17 @@ def says_of(facts: Facts, values: Mapping[str, Value]) -> dict[str, str]:
 
 
 def robots_of(facts: Facts, result: RunResult) -> int:
-    """Return how many robots decided at the end: some may have come or gone."""
+    """Return the number of robots in the last epoch."""
     return len(robots_in(result.epochs[-1])) if result.epochs else len(facts.there)
 
 
 def table_html(facts: Facts, result: RunResult) -> str:
-    """Return what each robot has decided, as a table. All that files have named is escaped in it."""
+    """Return each robot's decisions as a table. Names from files are escaped."""
     return _table(facts, result.assignment, frozenset(result.withdrawn))
 
 
 def epochs_html(facts: Facts, result: RunResult) -> str:
-    """Return what happened while the team decided: what came of it each time. All names are escaped in it."""
+    """Return the list of epochs with their events and verdicts. Names are escaped."""
     parts = []
     for number, epoch in enumerate(result.epochs[:MOST_EPOCHS]):
         verdict = str(epoch.get("verdict"))
@@ -72,7 +72,7 @@ def _table(facts: Facts, values: Mapping[str, Value], aside: frozenset[str]) -> 
 
 
 def rows_html(caption: str, heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Return a table whose rows begin with what they are about. All texts are escaped in it."""
+    """Return a table whose rows begin with a heading. All texts are escaped."""
     head = "".join(f'<th scope="col">{escape(one)}</th>' for one in heads)
     body = "".join(_row(*row) for row in rows)
     return f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -1,4 +1,4 @@
-"""What stands below the answer of a team that was not drawn here: what happened on the way, and what can be done."""
+"""The part below the answer of an imported team: the epochs, and the panel for a team without a solution."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _MOST_CONSTRAINTS = 60
 def show_foreign_below(
     project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]
 ) -> ForeignNoSolutionPanel | None:
-    """Fill the current container; return the ways out, where there is no solution.
+    """Fill the current container; return the panel for a team without a solution, if there is none.
 
     Args:
         project: The team.
-        facts: What is known of it.
-        result: What it has decided.
-        decide: Lets it decide again, with `withdraw` so that robots may step aside.
+        facts: The facts about the team.
+        result: The result of its run.
+        decide: Starts a new run; with `withdraw`, robots may withdraw.
     """
     ui.add_css(style())
     if result.epochs:
@@ -42,7 +42,7 @@ def show_foreign_below(
 
 
 class ForeignNoSolutionPanel:
-    """The ways out of a team without a solution; of one that cannot be gone, why. `decide`: as above."""
+    """The ways out for a team without a solution, with the reason if one is not available. `decide`: as above."""
 
     def __init__(self, project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]) -> None:
         self._project = project
@@ -58,22 +58,22 @@ class ForeignNoSolutionPanel:
             with ui.element("div").classes("two"):
                 if not facts.events:
                     _door("decide.door-aside", "decide.door-aside-help", partial(decide, withdraw=True))
-                _door("foreign.door-conflict", "foreign.door-conflict-help", self._look)
+                _door("foreign.door-conflict", "foreign.door-conflict-help", self._search_conflict)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
             ui.link(say("foreign.to-files"), f"/team/{project.id}/model")
         on_leave(self.end)
 
     def end(self) -> None:
-        """Search no more."""
+        """End the search."""
         if self._search:
             self._search.end()
 
-    async def _look(self) -> None:
+    async def _search_conflict(self) -> None:
         folder = self._project.foreign
-        if self._search or folder is None:  # it searches already
+        if self._search or folder is None:  # a search is running
             return
         self._search = search = ConflictSearch(TeamOfFiles(folder, self._events), folder=self._project.folder)
-        self._tell(say("decide.searching", seconds=int(PATIENCE_S)))
+        self._set_text(say("decide.searching", seconds=int(PATIENCE_S)))
         try:
             conflict = await search.found()
         finally:
@@ -82,20 +82,20 @@ class ForeignNoSolutionPanel:
         if conflict is not None and not self._found.is_deleted:
             self._show(conflict)
 
-    def _tell(self, text: str) -> None:
+    def _set_text(self, text: str) -> None:
         self._found.clear()
         with self._found:
             ui.label(text)
 
     def _show(self, conflict: Conflict) -> None:
         if conflict.why:
-            self._tell(say("decide.conflict-failed", why=conflict.why))
+            self._set_text(say("decide.conflict-failed", why=conflict.why))
         elif conflict.late:
-            self._tell(say("foreign.conflict-late"))
+            self._set_text(say("foreign.conflict-late"))
         elif not conflict.rules:
-            self._tell(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
+            self._set_text(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
         else:
-            self._tell(say("foreign.conflict", count=len(conflict.rules)))
+            self._set_text(say("foreign.conflict", count=len(conflict.rules)))
             with self._found:
                 with ui.element("ul").classes("foreign-notes"):
                     for words in conflict.words[:_MOST_CONSTRAINTS]:

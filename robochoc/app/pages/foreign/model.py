@@ -1,4 +1,4 @@
-"""The page "Model" of a team that was not drawn here: what its files say, to be read."""
+"""The page "Model" of an imported team, which shows its files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nicegui import run, ui
 from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.state import files_archive
 from robochoc.app.foreign.facts import Facts, RobotFacts
-from robochoc.app.foreign.reading import Read, read
+from robochoc.app.foreign.reading import RobotFile, read_robot_file
 from robochoc.app.projects import Project
 from robochoc.app.sketch.picture import MAX_LINES, picture
 from robochoc.app.sketch.words import listed
@@ -46,14 +46,14 @@ def build_foreign_model(project: Project) -> None:
         with ui.element("section").classes("panel foreign-part"):
             _heading("foreign.team")
             ui.label(counts(facts))
-            links = facts.links if facts.linked <= MAX_LINES else ()  # of many, nobody could follow one
+            links = facts.links if facts.linked <= MAX_LINES else ()  # many links are not readable
             ui.html(picture(project.sketch, links), sanitize=False).classes("foreign-picture")
         with ui.element("section").classes("panel foreign-part"):
             _Robots(project, facts, folder)
 
 
 def counts(facts: Facts) -> str:
-    """Return how large a team is, and what it asks for, in a few sentences."""
+    """Return the size and the objective of a team, in a few sentences."""
     told = [
         say(
             "foreign.counts",
@@ -111,7 +111,7 @@ def _events(facts: Facts) -> None:
 
 
 class _Robots:
-    """The robots, one at a time: what it decides, its constraints in words, its file."""
+    """One robot at a time: its decisions, its constraints in words, and its file."""
 
     def __init__(self, project: Project, facts: Facts, folder: Path) -> None:
         self._project, self._folder = project, folder
@@ -132,9 +132,9 @@ class _Robots:
         if robot is None:
             return
         self._chosen = robot.name
-        found: Read | str | None
+        found: RobotFile | str | None
         try:
-            found = await run.io_bound(read, self._folder, robot.name)
+            found = await run.io_bound(read_robot_file, self._folder, robot.name)
         except (InvalidInputError, OSError) as damaged:
             found = str(damaged)
         if found is None or self._chosen != robot.name or self._box.is_deleted:  # the server ends; another one is asked
@@ -143,7 +143,7 @@ class _Robots:
         with self._box:
             self._show(robot, found)
 
-    def _show(self, robot: RobotFacts, found: Read | str) -> None:
+    def _show(self, robot: RobotFacts, found: RobotFile | str) -> None:
         if robot.joins:
             ui.label(say("foreign.joins", robot=robot.name)).classes("soft")
         with ui.element("h3"):
@@ -166,7 +166,7 @@ class _Robots:
         with ui.element("pre").classes("foreign-file").props(f'tabindex=0 role=region aria-label="{found.name}"'):
             ui.label(found.text)
 
-    def _constraints(self, found: Read) -> None:
+    def _constraints(self, found: RobotFile) -> None:
         with ui.element("h3"):
             ui.label(say("foreign.keeps"))
         if found.neighbours:
@@ -183,7 +183,7 @@ class _Robots:
 
 
 def _elsewhere(folder: Path) -> None:
-    """Show what else can be done with the files: the command, and Python."""
+    """Show the command and the Python code for the team's files."""
     _heading("foreign.elsewhere")
     ui.label(say("foreign.command")).classes("soft")
     with ui.element("pre").classes("foreign-file command-text").props("tabindex=0"):
@@ -200,5 +200,5 @@ def _heading(key: str) -> None:
 
 @cache
 def style() -> str:
-    """Return the style of the pages of teams that were not drawn here."""
+    """Return the style of the pages of imported teams."""
     return (files(__package__) / "foreign.css").read_text(encoding="utf-8")

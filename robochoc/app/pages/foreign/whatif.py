@@ -1,4 +1,4 @@
-"""The page "What if" of a team that was not drawn here: robots fail, and the others decide again."""
+"""The page "What if" of an imported team: robots fail, and the others decide again."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def build_foreign_whatif(project: Project) -> None:
 
 
 class _Page:
-    """The page, as one tab shows it."""
+    """The page in one browser tab."""
 
     def __init__(self, project: Project, facts: Facts) -> None:
         self._project, self._facts, self._runs = project, facts, runs_of(project)
@@ -99,7 +99,7 @@ class _Page:
         with self._box, ui.element("div").classes("panel foreign-part"):
             epochs = run.result.epochs if run.result else ()
             if len(epochs) >= _TWICE:
-                self._told(run, epochs[-2], epochs[-1])
+                self._show_change(run, epochs[-2], epochs[-1])
             elif run.state == State.STOPPED:
                 ui.label(say("whatif.stopped"))
             else:
@@ -108,7 +108,7 @@ class _Page:
                     "error"
                 )
 
-    def _told(self, run: Run, before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
+    def _show_change(self, run: Run, before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
         with ui.element("h2"):
             ui.label(claim_words(run, _headline(self._facts, before, after)))
         gone = [name for name in robots_in(before) if name not in robots_in(after)]
@@ -125,7 +125,7 @@ class _Page:
 
 
 def moved(facts: Facts, before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Return the robots that are there before and after an event, and decide something else."""
+    """Return the robots whose decisions differ before and after an event."""
     was, now = _values(before), _values(after)
     return [
         robot.name
@@ -136,7 +136,7 @@ def moved(facts: Facts, before: Mapping[str, Any], after: Mapping[str, Any]) -> 
 
 
 def changes_html(facts: Facts, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    """Return what each robot decided before an event, and after it, as a table. All names are escaped in it."""
+    """Return each robot's decisions before and after an event as a table. Names are escaped."""
     was, now, others = _values(before), _values(after), frozenset(moved(facts, before, after))
     heads = say("foreign.decision"), say("whatif.before"), say("whatif.after")
     names = [say("decide.robot"), *heads]

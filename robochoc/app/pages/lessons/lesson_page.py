@@ -1,4 +1,4 @@
-"""One lesson: a picture on the left, the question on the right, a step at a time."""
+"""One lesson: step by step, a picture on the left and the question on the right."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.app.texts import say
 
 
 def build_lesson(number: str, progress: Progress) -> None:
-    """Fill the current container with the lesson of that number, at the step where somebody is."""
+    """Fill the current container with the lesson of this number, at the user's current step."""
     ui.add_css(style())
     if number in map(str, range(1, COUNT + 1)):
         _Page(int(number), progress)
@@ -25,12 +25,12 @@ def build_lesson(number: str, progress: Progress) -> None:
 
 
 class _Page:
-    """A lesson that somebody plays: which step is shown, and what was chosen in it."""
+    """The page of a lesson: the current step, and the user's choices in it."""
 
     def __init__(self, number: int, progress: Progress) -> None:
         self._number = number
         self._lesson = lesson(number)
-        self._client = ui.context.client  # what was clicked is gone when its click has been dealt with
+        self._client = ui.context.client  # a clicked element is deleted while its click is handled
         self._progress = progress
         self._place = 0 if progress.is_over(number) else progress.done(number)
         self._chosen: list[Choice] = []
@@ -53,7 +53,7 @@ class _Page:
     def _is_answered(self) -> bool:
         return any(choice.right for choice in self._chosen)
 
-    # What somebody does
+    # Events
 
     def _choose(self, choice: Choice) -> None:
         if choice in self._chosen or self._is_answered:
@@ -88,12 +88,12 @@ class _Page:
                 self._choose(choice)
 
     def _focus(self, element: ui.element) -> None:
-        """Move the keyboard's focus once the browser has drawn the element, whose name is ours."""
+        """Move the keyboard's focus when the browser has drawn the element."""
         found = f"document.getElementById('{element.html_id}')"
         again = "left && setTimeout(() => look(left - 1), 20)"
         self._client.run_javascript(f"(function look(left) {{ const it = {found}; it ? it.focus() : {again}; }})(100)")
 
-    # What is shown
+    # Content
 
     def _where(self) -> str:
         if self._is_end:

@@ -13,7 +13,7 @@ from robochoc.app.texts import say
 
 
 def build_lessons(progress: Progress) -> None:
-    """Fill the current container with the list, and how far somebody is."""
+    """Fill the current container with the list and the user's progress."""
     ui.add_css(style())
     with ui.element("div"):
         with ui.element("h1"):
@@ -44,7 +44,7 @@ def _state(number: int, progress: Progress) -> str:
 
 
 def bits(count: int, done: int, now: int | None = None) -> None:
-    """Draw a bar for each step; the words beside it say the same."""
+    """Draw a bar for each step, in addition to the text."""
     with ui.element("div").classes("bits").props("aria-hidden=true"):
         for place in range(count):
             ui.element("i").classes(f"{'done' if place < done else ''} {'now' if place == now else ''}")

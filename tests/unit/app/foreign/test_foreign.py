@@ -10,7 +10,7 @@ import pytest
 from robochoc.app.foreign import facts
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.foreign.facts import facts_of
-from robochoc.app.foreign.reading import read
+from robochoc.app.foreign.reading import read_robot_file
 from robochoc.app.foreign.sentences import sentence
 from robochoc.app.pages.decide.answer import headline
 from robochoc.app.pages.foreign.answer import epochs_html, says_of, table_html
@@ -79,7 +79,7 @@ def test_robots_are_drawn_where_their_files_say_or_else_side_by_side() -> None:
 def test_one_robot_is_read_with_its_file_and_its_constraints_in_words(tmp_path: Path) -> None:
     store, name = kept(RESCUE, tmp_path)
     folder = store.path(name) / "team"
-    spare = read(folder, "Spare")
+    spare = read_robot_file(folder, "Spare")
     assert spare.name.startswith("late")
     assert spare.text.startswith("<?xml")
     assert not spare.is_cut
