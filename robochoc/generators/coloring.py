@@ -44,7 +44,7 @@ def coloring(
     max_cost: int = 10,
     places: int = 0,
 ) -> Team:
-    """Return the graph colouring problem of `agents` robots with `degree` neighbours on average that `seed` stands for.
+    """Return the random graph colouring problem of `seed`, with `agents` robots and `degree` neighbours on average.
 
     `Robot3` owns `V3`. Two neighbours of the same colour cost 1, or as `conflicts` says.
 
@@ -59,7 +59,7 @@ def coloring(
         places: The decimal places of weights.
 
     Raises:
-        ValueError: if there is no such graph. The text says which number to change.
+        ValueError: if there is no such graph. The message names the number to change.
     """
     check_bounds({"agents": (agents, 1, MAX_NODES), "colors": (colors, 1, MAX_VALUES)})
     if not 0 <= degree <= agents - 1:

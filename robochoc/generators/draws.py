@@ -27,7 +27,7 @@ MAX_CONSTRAINTS = 200_000
 
 
 def seeded(seed: int) -> Random:
-    """Return the source of chance that `seed` stands for."""
+    """Return the random number generator of `seed`."""
     return Random(seed)  # noqa: S311 - a problem, not a secret
 
 

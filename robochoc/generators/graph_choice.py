@@ -91,7 +91,7 @@ class GraphChoice:
                 return graphs.tree(agents)
 
     def _refuse_agents(self, dashes: str) -> None:
-        """Raise `ValueError` if there is no file of that name, or `agents` are given beside it."""
+        """Raise `ValueError` if the file does not exist, or `agents` are given too."""
         if not Path(self.kind).exists():
             near = difflib.get_close_matches(self.kind, KINDS, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -35,11 +35,11 @@ def read_graph(path: Path) -> Graph:
     Nodes are numbered from 1: as their own numbers are ordered, where all are integers, else as in the file.
 
     Raises:
-        InvalidInputError: if it is no such graph, or networkx is not installed.
+        InvalidInputError: if the file is not a valid graph, or networkx is not installed.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise _invalid(path, f"'{path.suffix}' is no kind of graph file", f"there are {' '.join(READERS)}")
+        raise _invalid(path, f"'{path.suffix}' is not a type of graph files", f"supported: {' '.join(READERS)}")
     content = _content(path)
     try:
         import networkx as nx  # noqa: PLC0415 - an extra

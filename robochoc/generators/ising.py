@@ -23,7 +23,7 @@ SPINS = Domain("Spin", (range(2),))
 def ising(
     rows: int, columns: int, seed: int = 0, *, coupling: float = 1.6, field: float = 0.05, places: int = 3
 ) -> Team:
-    """Return the Ising model of rows x columns spins that `seed` stands for.
+    """Return the random Ising model of `seed` with rows x columns spins.
 
     `Robot2.3`, in row 2 and column 3, owns `V2.3`.
 

@@ -93,7 +93,7 @@ class Meetings:
         return range(1, self.slots - meeting.length + 2)
 
     def worth(self, meeting: Meeting, person: int, start: int) -> int:
-        """Return what it is worth to a participant that `meeting` begins in the slot `start`."""
+        """Return the utility of a participant if `meeting` begins in the slot `start`."""
         lost = sum(self.free[person][start - 1 : start - 1 + meeting.length])
         return meeting.worth[person] * meeting.length - lost
 
@@ -109,7 +109,7 @@ def meetings(
     max_value: int | None = 10,
     model: MeetingsModel | str = MeetingsModel.PEAV,
 ) -> Team:
-    """Return the problem of scheduling `meetings` of so many `participants` each that `seed` stands for.
+    """Return the random problem of `seed` of scheduling `meetings` with `participants` each.
 
     In `peav`, `Robot3` is a person, and `V3.2` is its part in meeting 2; who takes part in none is no robot. In `eav`,
     `Meeting2` owns `V2`. In `tsav`, `V3.2` is what `Robot3` does in slot 2: the parts of all meetings have numbers from

@@ -52,7 +52,7 @@ def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
     costs: CostUnits = PLAIN_COSTS,
     asymmetric: bool = False,
 ) -> Team:
-    """Return the team of the problem <agents, domain, density, tightness> that `seed` stands for.
+    """Return the random problem <agents, domain, density, tightness> of `seed`.
 
     `Robot3` owns `V3` and holds its constraints with robots of smaller numbers.
 
@@ -68,7 +68,7 @@ def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
         asymmetric: Whether each robot of a pair has costs of its own (partially known constraints).
 
     Raises:
-        ValueError: if there is no such problem, or it is too large. The text says which number to change.
+        ValueError: if there is no such problem, or it is too large. The message names the number to change.
 
     Example:
         >>> from robochoc.generators.random_csp import random_csp
@@ -96,7 +96,7 @@ def random_on(
     """Return a random problem on `graph`; all else is as in `random_csp`.
 
     Raises:
-        ValueError: if there is no such problem, or it is too large. The text says which number to change.
+        ValueError: if there is no such problem, or it is too large. The message names the number to change.
     """
     check_bounds({"domain": (domain, 1, MAX_VALUES), "tightness": (tightness, 0, 1)})
     check_places(costs.places)
@@ -132,7 +132,7 @@ def random_on(
 
 
 def places_told(costs: CostUnits) -> str:
-    """Return how a team's name says its decimal places: none, or `.000`."""
+    """Return the decimal places in a team's name: empty, or `.000`."""
     return f".{'0' * costs.places}" if costs.places else ""
 
 

@@ -90,7 +90,7 @@ def sensors(
     needed: int = 3,
     model: SensorsModel | str = SensorsModel.TARGETS,
 ) -> Team:
-    """Return the SensorDCSP problem that `seed` stands for.
+    """Return the random SensorDCSP problem of `seed`.
 
     Args:
         sensors: The number of sensors.
@@ -127,7 +127,7 @@ def grid_sensors(
     needed: int = 3,
     model: SensorsModel | str = SensorsModel.TARGETS,
 ) -> Team:
-    """Return the GSensorDCSP problem that `seed` stands for.
+    """Return the random GSensorDCSP problem of `seed`.
 
     Sensors are numbered row by row. The cells between them are one row and one column fewer.
 

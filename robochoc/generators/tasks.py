@@ -93,7 +93,7 @@ def tasks(
     model: TasksModel | str = TasksModel.ASSIGNMENT,
     capacity: int = 3,
 ) -> Team:
-    """Return the problem of allocating `tasks` to robots that `seed` stands for.
+    """Return the random problem of `seed` of allocating `tasks` to robots.
 
     In `assignment`, `Robot3` owns `V3`. Of `several`, `V3.2` says whether it does task 2; who can do none is no robot.
 

@@ -33,7 +33,7 @@ def rows(path: Path | str) -> list[Row]:
         path: The journal's file, as `--journal` writes it.
 
     Raises:
-        JournalError: if it is no journal.
+        JournalError: if the file is not a journal.
         OSError: if it cannot be read.
     """
     journal = read_journal(Path(path).read_bytes())

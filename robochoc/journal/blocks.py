@@ -82,7 +82,7 @@ class BlockReader:
         """Return the content of the next block. None: it is not complete yet.
 
         Raises:
-            JournalError: if it is no journal of this version.
+            JournalError: if it is not a journal of this version.
             JournalDamagedError: if a block is not as it was written.
         """
         if not self._before and not self._begin():
@@ -109,11 +109,11 @@ class BlockReader:
         """Return whether the preamble is there."""
         if len(self._buffer) < _PREAMBLE.size:
             if not MAGIC.startswith(self._buffer[: len(MAGIC)]):
-                raise JournalError("it is no journal")
+                raise JournalError("it is not a journal")
             return False
         magic, version, _ = _PREAMBLE.unpack_from(self._buffer)
         if magic != MAGIC:
-            raise JournalError("it is no journal")
+            raise JournalError("it is not a journal")
         if version != FORMAT:
             raise JournalError(f"it is a journal of format {version}, and this robochoc reads format {FORMAT}")
         self._before = blake2b(self._buffer[: _PREAMBLE.size], digest_size=_DIGEST).digest()

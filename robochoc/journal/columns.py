@@ -29,7 +29,7 @@ _Index = Annotated[int, Meta(ge=0)]
 
 
 class BlockError(ValueError):
-    """The content of a block that is no entries."""
+    """The content of a block cannot be decoded as entries."""
 
 
 class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -292,7 +292,7 @@ def _times(block: _Block) -> Sequence[float]:
 
 def _finite(times: Iterable[float]) -> None:
     if not all(map(isfinite, times)):
-        raise ValueError("a time is no number")
+        raise ValueError("a time is not a number")
 
 
 def _whole(numbers: Iterable[int]) -> list[int]:

@@ -29,7 +29,7 @@ _STAND_IN = (range(1),)
 
 
 class GivenProblemError(ValueError):
-    """An event of what robots were given that is no valid team."""
+    """The event with the robots' problems does not contain a valid team."""
 
 
 class TeamWriter:
@@ -48,7 +48,7 @@ class TeamWriter:
         fresh: Collection[str] = (),
         quiet: bool = True,
     ) -> Given:
-        """Return what `team`, in its order, is given. Its `why` says why a robot cannot be written."""
+        """Return the event with the problem of `team`, in its order. `why`: the reason if it cannot be written."""
         event = Given(
             t=0,
             order=team.order,
@@ -129,7 +129,7 @@ def told_by(given: Given | None, cost: float) -> Cost | float:
 
 
 def invalidated_of(given: Given) -> Invalidated:
-    """Return what of the epoch before does not stand."""
+    """Return the invalidated parts of the previous epoch."""
     return Invalidated(frozenset(given.void_keys), frozenset(given.void_agents))
 
 
@@ -170,7 +170,7 @@ def _check_costs(constraint: Constraint) -> None:
     costs = (*definition.costs, definition.default_cost) if isinstance(definition, Relation) else (constraint.cost,)
     for cost in costs:
         if type(cost) is float and cost != INFINITE:
-            raise ValueError(f"the cost {cost} of {constraint.name} is no integer")
+            raise ValueError(f"the cost {cost} of {constraint.name} is not an integer")
 
 
 # Events of unknown origin

@@ -37,7 +37,7 @@ __all__ = [
 
 
 def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
-    """Return what the events say of messages, bytes, NCCCs and checks. Wall-clock time is not in them: 0."""
+    """Return the messages, bytes, NCCCs and checks in the events. Wall-clock time, which they lack, is 0."""
     total = Metrics()
     messages: Counter[str] = Counter()
     size = largest = ncccs = 0

@@ -125,7 +125,7 @@ class Follower:
         Stops after the block with which there are more than `most`.
 
         Raises:
-            JournalError: when it turns out that the file is no journal.
+            JournalError: if the file is not a journal.
         """
         lines: list[JournalEntry] = []
         self._source.look()
@@ -333,5 +333,5 @@ class _Text:
         except RecursionError as error:
             raise JournalDamagedError(f"{self.place}: it is nested too deep") from error
         if not isfinite(entry.t):
-            raise JournalDamagedError(f"{self.place}: its time is no number")
+            raise JournalDamagedError(f"{self.place}: its time is not a number")
         return (entry,)

@@ -268,7 +268,7 @@ def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, .
 
 
 def _readable(header: Header) -> Header:
-    """Return `header`, whose team may be named for a folder whose name is no text."""
+    """Return `header`, with the team's name made encodable: the folder's name may not be valid text."""
     return msgspec.structs.replace(header, team=header.team.encode(errors="replace").decode())
 
 
@@ -293,7 +293,7 @@ def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
 
 
 def _instead(line: JournalEntry, why: str) -> JournalEntry:
-    """Return what is written for an entry that cannot be written as it is.
+    """Return a replacement for an entry that cannot be encoded.
 
     Raises `ValueError` where there is nothing.
     """

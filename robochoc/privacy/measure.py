@@ -1,4 +1,4 @@
-"""Measure the privacy loss of a recorded run: every message is heard by its receiver, and by nobody else."""
+"""Measures the privacy loss of a recorded run, in which only its receiver reads a message."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Edge = tuple[str, str]
 
 
 class PrivacyError(TransferableError):
-    """The privacy loss of a run cannot be told: why. `broken`: the journal is damaged, or a message's rule is wrong."""
+    """The privacy loss cannot be measured. `broken`: the journal is damaged, or a message's rule is wrong."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:
         super().__init__(why)
@@ -44,7 +44,7 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
         number: Which run, counted from 1. None: the last one.
 
     Raises:
-        PrivacyError: if there is no run, or not that one, or what is needed is missing.
+        PrivacyError: if the run does not exist, or required data are missing.
     """
     runs = list(runs_of(journal.events))
     if not runs:
@@ -92,7 +92,7 @@ class _Measured:
         }
 
     def report(self) -> PrivacyReport:
-        """Let every message be heard, and return the losses."""
+        """Process every message, and return the losses."""
         self._hear_all()
         for observer in self._observers.values():
             observer.knowledge.settle()
@@ -146,7 +146,7 @@ class _Measured:
         kind = self._types.get(sent.type)
         message = None if kind is None else message_of(kind, sent.content)
         if message is None:
-            raise PrivacyError(f"{sent.type} from {sent.sender} is no message of this protocol", broken=True)
+            raise PrivacyError(f"{sent.type} from {sent.sender} is not a message of this protocol", broken=True)
         return message
 
     # What it comes to
@@ -170,7 +170,7 @@ class _Measured:
                 yield from _there(loss_between(observer.name, subject, kind, numbers, known=known))
 
     def _numbers(self, observer: Observer, subject: str, secret: Secret) -> tuple[int, int]:
-        """Return how many states a secret has, and how many are possible. The true one must be among them."""
+        """Return the numbers of all and of possible states of a secret. The true state must be possible."""
         possible = observer.knowledge[secret]
         if not possible.contains(self._secrets.truths[secret]):
             raise self._wrong(observer, subject, "problem")
@@ -190,7 +190,7 @@ class _Measured:
         if self._number < self._runs:
             return {}, "only the last run of a journal comes to the team's decision"
         if not self._robots.protocol.traits.complete:
-            return {}, "the protocol is incomplete, and its robots need not tell their last values"
+            return {}, "the protocol is incomplete, and its robots need not send their last values"
         if outcome is None or outcome.verdict not in {Verdict.SOLUTION, Verdict.OPTIMAL}:
             return {}, "the run found no solution"
         last: dict[str, Mapping[str, int]] = {}
@@ -199,7 +199,7 @@ class _Measured:
                 last[event.robot] = event.assignment
         stands = {name: value for assignment in last.values() for name, value in assignment.items()}
         if stands != outcome.assignment:
-            return {}, "the answer is not the robots' last values, so messages do not tell it"
+            return {}, "the answer is not the robots' last values, so messages do not reveal it"
         decided: dict[str, Value] = {}
         for robot in self._team.robots:
             value = tuple(outcome.assignment.get(name) for name in robot.interface)

@@ -111,7 +111,7 @@ class Observer:
                 self._last[kind, sender, receiver] = message
 
     def possible_values(self, robot: str) -> list[Value]:
-        """Return the values at which `robot` may stand now, by what was heard of it, after `knowledge.settle()`."""
+        """Return the possible current values of `robot`, by its messages, after `knowledge.settle()`."""
         stand = self._stands.get(robot)
         if stand is None:
             return list(self._scene.secrets.declared[robot])
@@ -120,7 +120,7 @@ class Observer:
         return [stand.values[place] for place in self.knowledge.open_cases(stand.cases)]
 
     def _proofs(self, message: Message, sender: str, receiver: str) -> Sequence[Proof] | None:
-        """Return what a message proves; None: there is no rule."""
+        """Return the statements that a message proves. None: there is no rule."""
         proofs = message.proves(_Heard(self._scene, sender, receiver, self._values, self._last))
         if proofs is None or not self._scene.one_sided:
             return proofs

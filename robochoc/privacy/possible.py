@@ -43,12 +43,12 @@ class Possible(NamedTuple):
         return self.infinite if cost == INFINITE else self.least <= cost <= self.most
 
     def at_least(self, cost: float) -> Possible:
-        """Return what is left if the secret is at least `cost`."""
+        """Return the remaining states if the secret is at least `cost`."""
         least = self.most + 1 if cost == INFINITE else max(self.least, math.ceil(cost))
         return Possible(least, self.most, self.infinite)
 
     def at_most(self, cost: float) -> Possible:
-        """Return what is left if the secret is at most `cost`, which is finite."""
+        """Return the remaining states if the secret is at most `cost`, which is finite."""
         return Possible(self.least, min(self.most, math.floor(cost)), infinite=False)
 
 

@@ -223,5 +223,5 @@ class TeamSecrets:
 
 
 def exactly(cost: float) -> Possible:
-    """Return what is possible of a secret that is known."""
+    """Return the possible states of a known secret."""
     return Possible(0, -1, infinite=True) if cost == INFINITE else Possible(int(cost), int(cost), infinite=False)

@@ -130,7 +130,7 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
     """Yield contradictions between the header and the parameters that the robots were given.
 
     The first run is one of `placed_by` if a robot had no solution by itself, and the search was therefore left out.
-    What robots do before the search is no run of the protocol.
+    Preprocessing before the search is not a run of the protocol.
     """
     names = [run.began.protocol for run in runs if run.began and run.began.protocol != DisAC.__name__]
     # A class that is installed by no name may be played, too.

@@ -44,7 +44,7 @@ class Inspector:
 
     def __init__(self, part: AgentProblem) -> None:
         self._part = part
-        self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
+        self._problem = LocalProblem(part)  # separate, so that its checks are not counted
         self._own = ValueText(part.interfaces)
         self.agent = part.robot.name
         self._ranks = part.known.rank
@@ -119,12 +119,12 @@ class Inspector:
         return text
 
     def against(self, protocol: Protocol, index: int) -> str | None:
-        """Return what rules the value at `index` out, as far as the robot knows (None: nothing)."""
+        """Return the known reason that excludes the value at `index`. None: it is not excluded."""
         found = self.ruling(protocol, index)
         return None if found is None else found[0]
 
     def ruling(self, protocol: Protocol, index: int) -> tuple[str, Collection[str]] | None:
-        """Return what rules the value at `index` out, with the robots whose values it involves."""
+        """Return the reason that excludes the value at `index`, with the robots whose values it involves."""
         store = attributes_of(protocol).get("store")
         if isinstance(store, NogoodStore):
             lhs = store[index]

@@ -68,7 +68,7 @@ class Reasons:
             self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
 
     def told(self, heard: Sequence[tuple[Sent, Message]], step: RecordedStep) -> list[str]:
-        """Return why the value has changed, or the search was concluded, after `heard`; empty: neither has."""
+        """Return the reasons for a changed value, or the end of the search, after messages; empty: neither."""
         concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
         if self._protocol.value == self._value and not concluded:
             return []
@@ -90,7 +90,7 @@ class Reasons:
         return store if isinstance(store, NogoodStore) else None
 
     def _ruled_out(self) -> list[str]:
-        """Return what rules out each value; values with the same reason are grouped."""
+        """Return the reasons that exclude the values, each with its values."""
         count = len(self._protocol.problem.values)
         by_reason: dict[str, list[str]] = {}
         for index in range(min(count, MOST_VALUES)):
@@ -104,7 +104,7 @@ class Reasons:
         return [*shown, f"and {rest:,} more values"] if cut and rest else shown
 
     def _against_the_old(self, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
-        """Return what rules out the previous value, and which robot's message did; empty if unknown."""
+        """Return the reason that excludes the previous value, and the robot's message; empty if unknown."""
         protocol, old = self._protocol, self._value
         if old is None or self._text is None or old >= len(protocol.problem.values):
             return []

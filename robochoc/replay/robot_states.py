@@ -1,7 +1,7 @@
 """A robot's state after each of its own steps, and the reasons for a new value.
 
-The robot is played again, by what its journal says that it was told; nobody else has to be, but where a journal's
-text form has lost what a message said.
+Only this robot is replayed, from the messages in its journal; other robots are replayed only if the text form of a
+journal has lost the content of a message.
 """
 
 from __future__ import annotations

@@ -146,9 +146,9 @@ class RunReplay:
         """Return the message that was received. Raises `ReplayStopsError`."""
         sent, envelope = self._channels.deliver(received)
         if sent is None:
-            raise ReplayStopsError(f"what {received.sender} had said to it ({received.type}) is not in the journal")
+            raise ReplayStopsError(f"the message {received.type} from {received.sender} is not in the journal")
         if envelope is None:
-            why = f"what {received.sender} had said to it ({received.type}) cannot be made again from the journal"
+            why = f"the message {received.type} from {received.sender} cannot be restored from the journal"
             raise ReplayStopsError(why, unsaid=True)
         return sent, envelope
 

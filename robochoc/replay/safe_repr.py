@@ -76,7 +76,7 @@ class _Repr(reprlib.Repr):
 
 
 def _as_builtin(thing: object) -> dict[object, object] | list[object] | set[object] | None:
-    """Return a collection of a type of its own as one of Python's; None if it is no collection."""
+    """Return a collection of another type as a built-in one. None: it is not a collection."""
     if isinstance(thing, Mapping):
         return dict(islice(thing.items(), MAX_ENTRIES + 1))
     if isinstance(thing, AbstractSet):

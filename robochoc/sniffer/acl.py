@@ -73,10 +73,10 @@ class ACLMessage(msgspec.Struct, frozen=True):
 
     def __post_init__(self) -> None:
         if self.reply_by is not None and not _DATE_TIME.fullmatch(self.reply_by):
-            raise ValueError(f"reply-by {self.reply_by[:40]!r} is no DateTime such as 20260131T120000000Z")
+            raise ValueError(f"reply-by {self.reply_by[:40]!r} is not a DateTime such as 20260131T120000000Z")
         for key, _ in self.user:
             if not _USER_DEFINED.fullmatch(key):
-                raise ValueError(f"{key[:40]!r} is no name of a user-defined parameter, such as x-clock")
+                raise ValueError(f"{key[:40]!r} is not a valid name of a user-defined parameter, such as x-clock")
         if len(dict(self.user)) < len(self.user):
             raise ValueError("a user-defined parameter is given twice")
 
@@ -123,7 +123,7 @@ def _message(whole: Expression) -> ACLMessage:
     try:
         performative = Performative(act)
     except ValueError:
-        raise SymbolicExpressionError(f"{act[:40]!r} is no performative of FIPA00037", whole.at) from None
+        raise SymbolicExpressionError(f"{act[:40]!r} is not a performative of FIPA00037", whole.at) from None
     found = _parameters(whole, act)
     texts = {key: text_of(value, f":{key}") for key, value in found.items() if key in _TEXTS or key == "reply-by"}
     try:

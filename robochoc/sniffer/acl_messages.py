@@ -23,7 +23,7 @@ from robochoc.sniffer.trace import Trace
 
 _MARKS = {"base64", "float", "map"}
 PLATFORM = "localhost/robochoc"
-"""Journals do not tell which machine it was."""
+"""The name in place of the machine's, which journals do not record."""
 
 _FIELDS = tuple(field.name for field in msgspec.structs.fields(ACLMessage) if field.name != "user")
 

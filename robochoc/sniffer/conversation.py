@@ -61,7 +61,7 @@ class Conversation:
         It is a reply to the receiver's message number `reply_to`, if that is given.
 
         Raises:
-            ACLError: if the content is no message of the protocol.
+            ACLError: if the content is not a message of the protocol.
         """
         message = self._decoded(envelope.content)
         said = _json_of(envelope.content, self._fields)
@@ -85,7 +85,7 @@ class Conversation:
         """Return the envelope and the message of `acl`, checked by the protocol's own decoder.
 
         Raises:
-            ACLError: if the message is not of this conversation, or is no message of the protocol.
+            ACLError: if the message is not of this conversation, or not a message of the protocol.
         """
         for what, found, expected in (
             ("ontology", acl.ontology, ONTOLOGY),
@@ -110,7 +110,7 @@ class Conversation:
         try:
             message: Message = self._decoder.decode(content)
         except (msgspec.MsgspecError, RecursionError) as error:
-            raise ACLError(f"the content is no message of {self._protocol}: {error}") from None
+            raise ACLError(f"the content is not a message of {self._protocol}: {error}") from None
         return message
 
     def _content(self, acl: ACLMessage) -> bytes:
@@ -124,7 +124,7 @@ class Conversation:
         try:
             return b64decode(said, validate=True)
         except ValueError as error:
-            raise ACLError(f"the content is no base64: {error}") from None
+            raise ACLError(f"the content is not valid base64: {error}") from None
 
     def _local(self, agent: AgentIdentifier) -> str:
         if agent.platform != self._platform:
@@ -162,7 +162,7 @@ def _content_of(text: str, fields: Mapping[str, Sequence[str]]) -> bytes:
     except ACLError:
         raise
     except (msgspec.MsgspecError, ValueError, TypeError, OverflowError, RecursionError) as error:
-        raise ACLError(f'the content is no JSON like ["Ok",{{"value":[3]}}]: {error}') from None
+        raise ACLError(f'the content is not JSON like ["Ok",{{"value":[3]}}]: {error}') from None
 
 
 def _names(kind: str, given: Collection[str], fields: Mapping[str, Sequence[str]]) -> Sequence[str]:
@@ -211,7 +211,7 @@ def _raw(value: Any, depth: int) -> Any:  # noqa: ANN401 - any JSON
         return _NOT_FINITE[given]
     if mark == "map" and isinstance(given, list):
         return {_key(_raw(key, depth + 1)): _raw(one, depth + 1) for key, one in given}
-    raise ValueError(f"what stands for {mark} is wrong")
+    raise ValueError(f"invalid value for {mark}")
 
 
 def _is_mark(members: Mapping[Any, object]) -> bool:

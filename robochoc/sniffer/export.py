@@ -23,7 +23,7 @@ HEADINGS = (
 )  # fmt: skip
 """`message`, `step` and `causes` are numbers from 0 on, `run` from 1 on; clocks are NCCC clocks."""
 MOST_ARROWS = 400
-"""Mermaid's own limit is on its text, 50,000 characters; long before that nobody can read the diagram."""
+"""The maximum for readable diagrams, far below Mermaid's limit of 50,000 characters."""
 MOST_CHARACTERS = 50_000
 _LONGEST_LABEL = 60
 _encode = msgspec.json.encode

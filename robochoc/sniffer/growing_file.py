@@ -28,7 +28,7 @@ def open_to_read(path: Path) -> int:
 
 def _check_file(descriptor: int) -> None:
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        raise NoFileError("it is no file that can be read twice")
+        raise NoFileError("it is not a regular file")
 
 
 class GrowingFile(io.RawIOBase):

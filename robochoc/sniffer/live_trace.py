@@ -34,7 +34,7 @@ _AT_ONCE_S = 0.5
 """So much work may be done before anything is shown."""
 _EVENTS_AT_ONCE = 5_000
 _FORSAKEN_S = 30.0
-"""Without an end, and not written to for so long: whoever wrote it is gone."""
+"""The time without new entries after which the writer of an unfinished journal counts as ended."""
 
 
 class LiveTrace:

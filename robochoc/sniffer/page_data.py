@@ -85,7 +85,7 @@ class PageData:
         self.acl_messages = AclMessages(trace, self.protocols)
 
     def about(self) -> bytes:
-        """Return what was run, the robots, and the progress, as JSON."""
+        """Return the description of the run, the robots, and the progress, as JSON."""
         trace, header = self.trace, self.trace.header
         order = None if header.order is msgspec.UNSET else header.order
         return _encode(

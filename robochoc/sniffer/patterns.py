@@ -1,6 +1,6 @@
 """Names of robots, or patterns of them, as `robochoc sniff` and `robochoc journal` take them: `Robot3.1,Robot2.*`.
 
-`*` stands for anything, `?` for any one character, as in the properties of JADE's sniffer.
+`*` matches any characters, `?` any single character, as in the properties of JADE's sniffer.
 """
 
 from __future__ import annotations

@@ -115,12 +115,12 @@ class IncomingJournal:
         try:
             piece = piece_in(content)
             if piece.run != self._run:
-                return Followed(over=False, why=f"the master at {self._place} was started anew")
+                return Followed(over=False, why=f"the master at {self._place} was restarted")
             if piece.start != self._start:  # an answer to an earlier question
                 return None
             whole = self._blocks.take(piece.content)
         except (JournalError, JournalDamagedError) as bad:
-            return Followed(over=False, why=f"what the master at {self._place} sends is no journal: {bad}")
+            return Followed(over=False, why=f"the master at {self._place} sent an invalid journal: {bad}")
         if whole:
             self._sink(whole)
         self._start += len(piece.content)

@@ -25,7 +25,7 @@ from robochoc.view.drawing import path_of, still
 from robochoc.view.scene import DrawnDrone, Scene
 
 _MOST_DRONES = 2_000
-"""More than that no browser moves smoothly, nor can anybody tell them apart."""
+"""The maximum that browsers animate smoothly and readers can distinguish."""
 _MOST_PLACES = 1_000
 """Of all robots: when so many places are known, what is decided need not be looked at for the box to hold it."""
 
@@ -73,7 +73,7 @@ class TraceScene:
         return bool(self._owners)
 
     def answer(self, first: int = 0) -> dict[str, Any]:
-        """Return what the page draws, with the moves of the decisions from `first` on; JSON-compatible."""
+        """Return the page's data, with the moves of the decisions from `first`; JSON-compatible."""
         upto = len(self._trace.decisions)
         if first > upto:
             raise BadRequestError(f"there are {upto} decisions")

@@ -123,7 +123,7 @@ class SnifferSession:
         return trace
 
     def about(self) -> bytes:
-        """Return what was run, and the progress, as JSON."""
+        """Return the description of the run and its progress, as JSON."""
         return self._answers.about()
 
     def news(self) -> dict[str, Any]:

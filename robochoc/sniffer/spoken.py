@@ -19,7 +19,7 @@ Called = Callable[[str, int], str]
 
 
 class Spoken:
-    """Follows a journal, and tells its messages in words, as the sniffer does.
+    """Follows a journal, and returns its messages in words, as in the sniffer.
 
     `called` tells values as the reader knows them. None: as they stand in the journal, symbols by their names.
     """

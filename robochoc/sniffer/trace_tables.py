@@ -72,7 +72,7 @@ class Steps(NamedTuple):
 
 
 def note_of(event: AnyEvent, step: int) -> Note | None:
-    """Return a note for an event that is no message; None: the event needs no note."""
+    """Return a note for an event other than a message. None: the event needs no note."""
     match event:
         case Improved():
             return Note(event.t, step, "improved", "", f"the cheapest so far costs {cost_shown(event.cost)}")

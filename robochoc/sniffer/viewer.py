@@ -59,7 +59,7 @@ class Viewer:
         # Not as arguments: those can be read by everybody on this machine.
         shown = self._redirect.url if self._redirect else None
         settings = json.dumps({"token": token, "chosen": [*chosen][:_MOST_CHOSEN], "shown": shown}).encode()
-        with suppress(BrokenPipeError):  # it is gone already, which is said later
+        with suppress(BrokenPipeError):  # it has ended already, which is reported later
             os.write(lifeline, settings + b"\n")
 
     def __enter__(self) -> Self:

@@ -29,14 +29,14 @@ _SENTENCES = (
     (r"Expected `(?P<expected>[^`]*)`(?P<rest>.*)", "expected {expected}{rest}"),
     (r"Object missing required field `(?P<value>[^`]*)`", "the field '{value}' is missing"),
     (r"Object contains unknown field `(?P<value>[^`]*)`", "there is no field '{value}'{nearest}"),
-    (r"JSON is malformed: (?P<value>.*)", "it is no JSON: {value}"),
-    (r"Input data was truncated", "it is no JSON: it ends too early"),
+    (r"JSON is malformed: (?P<value>.*)", "it is not valid JSON: {value}"),
+    (r"Input data was truncated", "it is not valid JSON: it ends too early"),
 )
 """The messages of msgspec, and what they become."""
 
 
 def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  # noqa: ANN401 - a type
-    """Return what is wrong, where, what was expected, and the allowed values if there are few.
+    """Return the error, its place, the expected type, and the allowed values if there are few.
 
     Args:
         error: What msgspec raised.

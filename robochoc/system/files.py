@@ -61,7 +61,7 @@ class PendingFile:
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if _is_stream(path):
-            raise OSError(errno.ENOTSUP, "is no file that could be replaced", str(path))
+            raise OSError(errno.ENOTSUP, "is not a regular file and cannot be replaced", str(path))
         self._path = path
         self._named: Path | None = None
         with errors_naming(path):
@@ -217,7 +217,7 @@ class AppendableFile:
     def _append_to_stream(self, stream: BackgroundWriter, content: bytes) -> None:
         if self._torn:
             raise OSError(errno.EIO, "an interrupt came between two bytes")
-        self._torn = True  # after an interrupt nobody knows how much was written
+        self._torn = True  # after an interrupt, the written part is unknown
         fits = stream.write(content)
         self._torn = False
         if not fits:

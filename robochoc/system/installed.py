@@ -95,6 +95,6 @@ def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: 
 
 
 def _after_an_update(entry: EntryPoint, error: BaseException) -> str:
-    """Return what to do where a module of our own is not where it was when this was installed."""
+    """Return the hint for a missing module of robochoc itself."""
     ours = entry.value.startswith("robochoc.") and isinstance(error, ModuleNotFoundError)
     return "; robochoc has changed since it was installed: say make demo, or pip install -e . again" if ours else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import _signal  # type: ignore[import-not-found]  # what `signal` is made of: typeshed does not tell of it
+import _signal  # type: ignore[import-not-found]  # the C part of `signal`, unknown to typeshed
 import signal
 import threading
 from collections.abc import Iterator

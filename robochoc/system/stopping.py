@@ -2,7 +2,7 @@
 
     kill -USR1 PID
 
-Ctrl-C and SIGTERM end the program, and no answer is told.
+Ctrl-C and SIGTERM end the program without an answer.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class _Request:
 
 @contextmanager
 def stop_heard() -> Iterator[None]:
-    """Let the signal `STOP` ask for it, meanwhile. Elsewhere than in the main thread no signal is heard."""
+    """Handle the signal `STOP` inside the context; only possible in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         try:
             yield
@@ -35,7 +35,7 @@ def stop_heard() -> Iterator[None]:
         _Request.made = True
 
     before = signal.signal(STOP, hear)
-    mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # whoever has started us may have held it back
+    mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # the parent may have blocked it
     try:
         yield
     finally:

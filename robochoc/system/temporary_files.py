@@ -52,7 +52,7 @@ class PrivateFolder:
     thread, which they do not interrupt. A process that was forked does not remove it.
 
     Raises:
-        OSError: if there is no place for it.
+        OSError: if it cannot be created.
     """
 
     def __init__(self) -> None:

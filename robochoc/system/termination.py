@@ -2,4 +2,4 @@
 
 
 class Terminated(SystemExit):
-    """The program was told to end. Unlike another `SystemExit`, it is never that of a package's own code."""
+    """A signal ends the program. Unlike other `SystemExit`s, it never comes from a package's code."""

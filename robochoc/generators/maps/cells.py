@@ -21,7 +21,7 @@ from robochoc.generators.maps.room import Room
 from robochoc.generators.maps.turned import TurnedSquares
 
 _CHECKED_MAX = 10_000
-"""The largest number of cells that are looked at one by one. If more are found, they are too many anyway."""
+"""The maximum number of cells that are checked individually. More cells are too many for a problem."""
 
 
 @dataclass(frozen=True, eq=False)

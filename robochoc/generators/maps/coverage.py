@@ -82,7 +82,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
 
 
 def worth_of_a_cell(reach: Reach, seconds: Fraction) -> int:
-    """Return what it is worth to see a cell, in the unit of costs, if a square or cubic metre is worth so much."""
+    """Return the utility of seeing a cell, in units of costs, from the utility of a square or cubic metre."""
     exactly: Fraction = reach.cells.side ** len(reach.cells.first) * seconds * 10**PLACES
     return floor(exactly + Fraction(1, 2))
 

@@ -31,7 +31,7 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
         side: The side of a cell. None: the smallest multiple of a pixel's side that makes no more free cells than that.
 
     Raises:
-        ValueError: There is no free cell, or there are too many of them.
+        ValueError: if there is no free cell, or there are too many.
     """
     sized = _sized(grid, radius)
     if side is not None:

@@ -57,7 +57,7 @@ class TurnedSquares:
         return y, x
 
     def counts(self, flags: Flags) -> tuple[Counts, Counts]:
-        """Return how many pixels each square touches, those beside the map too, and how many of them are flagged."""
+        """Return the number of pixels that each square touches, also outside the map, and how many are flagged."""
         height, width = flags.shape
         sums = np.zeros((height + 2, width + 1), dtype=np.int64)
         np.cumsum(flags, axis=1, out=sums[1:-1, 1:])

@@ -58,7 +58,7 @@ def test_a_label_is_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
 @looped(
     ("name", "content", "said"),
     [
-        ("town.dot", "graph {}", "'.dot' is no kind of graph file"),
+        ("town.dot", "graph {}", "'.dot' is not a type of graph files"),
         ("town.graphml", "<graphml>", "networkx cannot read it"),
         ("town.gml", "graph [", "networkx cannot read it"),
         ("town.gml", "\0\0", "networkx cannot read it"),

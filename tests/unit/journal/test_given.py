@@ -114,7 +114,7 @@ def test_a_team_that_cannot_be_written_is_told_so() -> None:
     team = team_of({"A": [1, 2], "B": [1, 2]}, [Constraint("C", relation, ("A", "B"), ("A", "B"))])
     team = replace(team, robots=tuple(replace(robot, kind=ProblemKind.DISWCSP) for robot in team.robots))
     given = TeamWriter().given(team)
-    assert given.why == "RB cannot be written: the cost 5.0 of C is no integer"
+    assert given.why == "RB cannot be written: the cost 5.0 of C is not an integer"
     assert given.robots == {}
     with pytest.raises(GivenProblemError, match=r"could not be written: RB cannot be written: the cost 5\.0"):
         TeamReader().team(given)

@@ -105,7 +105,7 @@ def test_a_robot_that_was_told_what_is_lost_is_followed_up_to_there(four: Journa
     replayed = replay(with_events(four, events))
     assert replayed.identical
     assert {"Robot1.2", "Robot2.1"} <= {one.robot for one in replayed.stopped}
-    assert replayed.stopped[0].why == "what Robot1.1 had said to it (Ok) is not in the journal"
+    assert replayed.stopped[0].why == "the message Ok from Robot1.1 is not in the journal"
 
 
 def test_clocks_of_machines_differ() -> None:

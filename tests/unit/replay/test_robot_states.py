@@ -193,7 +193,7 @@ def test_a_robot_whose_news_is_lost_says_where_it_ends() -> None:
     events = [event for event in journal.events if actor(event) != "RA"]
     began, last = states_of(with_events(journal, events), "RB")
     assert began.value == {"B": 1}
-    assert last.more == {"replay": "ends here: what RA had said to it (Ok) is not in the journal"}
+    assert last.more == {"replay": "ends here: the message Ok from RA is not in the journal"}
 
 
 class Backwards(ABT):

@@ -57,19 +57,19 @@ FORGED: list[tuple[dict[str, Any], str]] = [
     ({"user": ()}, "x-clock ''"),
     ({"user": (("x-clock", "-1"),)}, "x-clock '-1'"),
     ({"language": "fipa-sl"}, "json in utf-8 or msgpack in base64"),
-    ({"language": "msgpack", "encoding": "base64"}, "no base64"),
-    ({"language": "msgpack", "encoding": "base64", "content": "AAAA"}, "no message of abt"),
-    ({"content": None}, "no JSON like"),
-    ({"content": "{}"}, "no JSON like"),
+    ({"language": "msgpack", "encoding": "base64"}, "not valid base64"),
+    ({"language": "msgpack", "encoding": "base64", "content": "AAAA"}, "not a message of abt"),
+    ({"content": None}, "not JSON like"),
+    ({"content": "{}"}, "not JSON like"),
     ({"content": '["Fly",{}]'}, "there is no message 'Fly', only Ok, Nogood, AddLink"),
     ({"content": '["Ok",{"price":[3]}]'}, "Ok has the fields ['value'], not ['price']"),
-    ({"content": '["Ok",{"value":["a"]}]'}, "no message of abt"),
-    ({"content": '["Ok",{"value":[36893488147419103232]}]'}, "no JSON like"),
-    ({"content": '["Ok",{"value":{"base64":"?"}}]'}, "no JSON like"),
-    ({"content": '["Ok",{"value":{"float":"1"}}]'}, "what stands for float is wrong"),
-    ({"content": '["Ok",{"value":{"float":[]}}]'}, "no JSON like"),
-    ({"content": '["Ok",{"value":{"map":[1]}}]'}, "no JSON like"),
-    ({"content": '["Ok",{"value":{"map":[[{"base64":"AA=="},1],[{"map":[]},1]]}}]'}, "no JSON like"),
+    ({"content": '["Ok",{"value":["a"]}]'}, "not a message of abt"),
+    ({"content": '["Ok",{"value":[36893488147419103232]}]'}, "not JSON like"),
+    ({"content": '["Ok",{"value":{"base64":"?"}}]'}, "not JSON like"),
+    ({"content": '["Ok",{"value":{"float":"1"}}]'}, "invalid value for float"),
+    ({"content": '["Ok",{"value":{"float":[]}}]'}, "not JSON like"),
+    ({"content": '["Ok",{"value":{"map":[1]}}]'}, "not JSON like"),
+    ({"content": '["Ok",{"value":{"map":[[{"base64":"AA=="},1],[{"map":[]},1]]}}]'}, "not JSON like"),
     ({"content": '["Ok",{"value":' + "[" * 40 + "]" * 40 + "}]"}, "deeper than 32"),
 ]
 
@@ -77,7 +77,7 @@ FORGED: list[tuple[dict[str, Any], str]] = [
 def test_what_no_robot_would_send_is_no_envelope() -> None:
     with cases() as each:
         long: list[tuple[dict[str, str], str]] = [
-            ({"content": "[" * 1_000_000}, "no JSON like"),
+            ({"content": "[" * 1_000_000}, "not JSON like"),
             ({"content": "[" + " " * MAX_JSON + "]"}, "too long"),
         ]
         for changed, message in (*FORGED, *long):
@@ -91,7 +91,7 @@ def test_what_no_robot_would_send_is_no_envelope() -> None:
 
 def test_what_is_no_message_has_no_acl_message() -> None:
     for content in (b"", b"\xc0", encode(Ok((3,)))[:-1], b"\x91" * 100_000):
-        with pytest.raises(ACLError, match="no message of abt"):
+        with pytest.raises(ACLError, match="not a message of abt"):
             conversation().acl_of(OK._replace(content=content), 1)
 
 

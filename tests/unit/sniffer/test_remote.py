@@ -91,6 +91,6 @@ def test_pieces_of_others_and_of_another_run() -> None:
     for content in (b"", b"junk", told(0, bytes(PIECE_BYTES + 1))):
         ending = Kept().journal.take(content)
         assert ending
-        assert "is no journal" in ending.why
+        assert "sent an invalid journal" in ending.why
     ending = kept.journal.take(told(0, WHOLE, run="another"))
-    assert ending == Followed(over=False, why="the master at master:7447 was started anew")
+    assert ending == Followed(over=False, why="the master at master:7447 was restarted")

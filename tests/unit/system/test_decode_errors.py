@@ -47,8 +47,8 @@ def test_what_is_wrong_where_and_what_is_allowed() -> None:
             ('{"name": "", "letter": "r"}', "letter: 'r' is not allowed; allowed: p, q"),
             ('{"name": "", "count": 1.5}', "count: expected an integer or null, found a number"),
             ('{"name": "", "pair": [1]}', "pair: expected a list of length 2"),
-            ('{"name": ', "it is no JSON: it ends too early"),
-            ('{"name" 1}', "it is no JSON: expected ':' (byte 8)"),
+            ('{"name": ', "it is not valid JSON: it ends too early"),
+            ('{"name" 1}', "it is not valid JSON: expected ':' (byte 8)"),
         ]:
             with each(content):
                 with pytest.raises(msgspec.MsgspecError) as caught:
