@@ -40,7 +40,7 @@ _FLOWN = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
 class News(NamedTuple):
-    """Changes that were reported while the team searched on. What comes until `until_s` belongs to the same event."""
+    """Changes that were reported during the search. Reports until `until_s` belong to the same event."""
 
     changes: list[Change]
     until_s: float
@@ -50,9 +50,9 @@ class Feedback(ABC):
     """A source of reports on the robots' situation: a simulated flight, or a source of messages."""
 
     publishers: Sequence[MissionPublisher] = ()
-    """Reports are published there as they come."""
+    """Publishers of the reports."""
     idle: Callable[[], None] = staticmethod(lambda: None)
-    """Called now and then while no report comes."""
+    """Called regularly while no report arrives."""
     simulated: bool = False
     """True if the robots are simulated here, and so do not publish their reports themselves."""
 
@@ -63,18 +63,18 @@ class Feedback(ABC):
 
     @abstractmethod
     def now_ns(self) -> int:
-        """Return the time, by the clock of the reports."""
+        """Return the time by the reports' clock, in nanoseconds."""
 
     @abstractmethod
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
-        """Take note of a decision that has been published. Reports that follow count for `left_s` seconds."""
+        """Handle a published decision. Reports count for `left_s` seconds from now."""
 
     @abstractmethod
     def next(self, until_s: float | None) -> Report | None:
-        """Return the next report, with `until_s` one that comes no later than that; None if no more comes."""
+        """Return the next report, if it arrives before `until_s`; None if no more follow."""
 
     def poll(self) -> Report | None:
-        """Return a report that has come, without waiting; None where time stands still while the team decides."""
+        """Return a received report without waiting; None where time stops while the team decides."""
         return None
 
 
@@ -134,7 +134,7 @@ class ClosedLoop:
             feedback.publishers = [one for one in publishers if feedback.simulated or not one.live]
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-        """Publish what `epoch` has decided for `team`; return the event that follows within `left_s` seconds."""
+        """Publish the decision of `epoch` for `team`; return the event that follows within `left_s` seconds."""
         self._happened += not self._lost
         self._lost = bool(epoch.lost)
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
@@ -176,7 +176,7 @@ class ClosedLoop:
         self._decide(replace(leg, goals=goals))
 
     def has_news(self, team: Team) -> bool:
-        """Return whether a report that has come changes the problem of `team`: it opens the next epoch."""
+        """Return whether a received report changes the problem of `team`: it opens the next epoch."""
         feedback, builder = self.feedback, self._builder
         if feedback is None or builder is None or self._improved is None:
             return False
@@ -251,7 +251,7 @@ class ClosedLoop:
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:
-    """Return all drones that ever take part. Where they stand is not known before the first decision."""
+    """Return all drones of the team and of its events. Their places are unknown before the first decision."""
     robots = all_robots(team)
     return MissionBuilder(robots, _values(robots, 0)).drones
 

@@ -45,7 +45,7 @@ def open_source(text: str) -> Source:
 
 
 def place_of(text: str) -> Path | str:
-    """Return what `text` names, the same however it is spelled: the file of a recording, else `text` itself.
+    """Return the resolved file of a recording, else `text` itself.
 
     Raises:
         OSError: Symbolic links form a circle.
@@ -83,7 +83,7 @@ def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception
 
 
 def lacking_for(name: str) -> str:
-    """Return what to install before the sink `name` can be used; empty if nothing is missing."""
+    """Return the missing packages of the sink `name`, as advice; empty if it can be used."""
     namesakes = entry_points_named(SINKS, name)
     return on_one_line(_lacking(namesakes[0])) if namesakes else ""
 
@@ -93,7 +93,7 @@ def _fault(found: object, base: type) -> str:
 
 
 def _lacking(entry: EntryPoint) -> str:
-    """Return what to install, if what `entry` needs is an extra of its package that is missing; else empty."""
+    """Return advice on a missing extra of the package of `entry`; else empty."""
     try:
         entry.load()
     except ModuleNotFoundError as error:

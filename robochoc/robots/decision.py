@@ -1,4 +1,4 @@
-"""A decision that others follow while it is made: feedback says how far it is, and it can be cancelled."""
+"""A decision with feedback on its progress, which can be cancelled."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ Tell = Callable[[str], None]
 """Takes feedback, as JSON on one line."""
 
 
-class FollowedDecision:
-    """Lets teams decide, one at a time. Any thread may cancel the decision that is being made.
+class CancellableDecision:
+    """Solves teams' problems, one at a time. Any thread may cancel the current search.
 
     Args:
-        tell: Gets feedback while a team decides (None: nobody wants it, and events are not looked at).
+        tell: Called with feedback during a search (None: no feedback, and events are ignored).
     """
 
     def __init__(self, tell: Tell | None = None) -> None:
@@ -45,7 +45,7 @@ class FollowedDecision:
         self._team = ""
 
     def __call__(self, team: Team, options: Options) -> Outcome:
-        """Return what the team decides. Raises as `solve`."""
+        """Return the outcome. Raises the errors of `solve`."""
         feedback = None if self._tell is None else _Feedback(team, options, self._tell)
         with stop_heard():
             self._is_now(team.name)

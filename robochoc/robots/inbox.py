@@ -1,4 +1,4 @@
-"""The inbox of a live source: messages received and not taken yet. Its size is bounded."""
+"""The inbox of a live source: a bounded queue of received messages."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import NamedTuple
 from robochoc.robots.source import ReceivedMessage
 
 PER_TOPIC_MAX = 100
-"""Of each topic the newest messages are kept, as they say what the situation is now."""
+"""The number of newest messages stored for each topic."""
 WEIGHT_MAX = 16_000_000
-"""Characters and fields that are kept of all topics together."""
+"""The number of characters and fields stored for all topics together."""
 
 
 class _Kept(NamedTuple):
@@ -22,7 +22,7 @@ class _Kept(NamedTuple):
 
 
 class MessageInbox:
-    """Messages in the order in which they came. Any thread may put some in; one takes them.
+    """Messages in the order of their arrival. Any thread may add some; one thread reads them.
 
     A topic with too many loses its own oldest messages, not those of others: batteries that report ten times a second
     while the team solves do not displace the message that a cell is blocked.
@@ -36,7 +36,7 @@ class MessageInbox:
         self._came = threading.Condition()
 
     def put(self, received: ReceivedMessage, weight: int = 1) -> None:
-        """Keep `received`, which weighs this many characters and fields."""
+        """Add `received`, with this number of characters and fields."""
         with self._came:
             kept = self._topics.setdefault(received.topic, deque())
             kept.append(_Kept(self._count, received, weight))
@@ -50,7 +50,7 @@ class MessageInbox:
             self._came.notify()
 
     def wake(self) -> None:
-        """Wake the thread that waits: nothing more will come."""
+        """Wake the waiting thread: nothing more will arrive."""
         with self._came:
             self._came.notify()
 
@@ -71,7 +71,7 @@ class MessageInbox:
 
 
 def weight_of(value: object) -> int:
-    """Return how many characters and fields `value` has."""
+    """Return the number of characters and fields of `value`."""
     match value:
         case dict():
             return 1 + sum(map(weight_of, value.values()))

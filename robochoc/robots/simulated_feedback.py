@@ -1,4 +1,4 @@
-"""Feedback from a simulated flight: decisions are flown, and what its drones meet is reported."""
+"""Feedback from a simulated flight: decisions are flown, and obstacles and failures are reported."""
 
 from __future__ import annotations
 
@@ -100,11 +100,11 @@ class SimulatedFeedback(Feedback):
     _broadcast: FlightBroadcast = field(default_factory=FlightBroadcast)
 
     def now_ns(self) -> int:
-        """Return the flight's own time."""
+        """Return the time of the flight, in nanoseconds."""
         return nanoseconds(self._now_s)
 
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
-        """Take note of a decision: it is flown by `next`."""
+        """Store a decision: `next` flies it."""
         if self._flight is None:
             homes = np.array([drone.home for drone in builder.drones], dtype=float).reshape(-1, 3)
             try:

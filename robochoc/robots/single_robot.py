@@ -1,4 +1,4 @@
-"""The ROS messages of one robot on its own machine. It knows its own decision, but not where others are."""
+"""The decision of one robot on its own machine, without the places of others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
 
 
 def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
-    """Return what the end of a run asks of the drones of `robot`, by their numbers in `drones_of_robot`.
+    """Return the goals of the drones of `robot` at the end of a run, by their numbers in `drones_of_robot`.
 
     A robot that has withdrawn lands where it stood, below its cell: that point is its own, while one at the edge might
     be another's. A drone without a cell in its file stays where it is; all drones do so if there is no solution.

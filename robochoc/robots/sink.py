@@ -21,7 +21,7 @@ class SinkError(Exception):
 
 
 class Sink(ABC):
-    """Takes messages. It is a context manager: the caller that opens it closes it.
+    """Receives messages. It is a context manager: the caller that opens it closes it.
 
     `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
     """
@@ -32,22 +32,22 @@ class Sink(ABC):
     arms: bool = False
     """True if it commands robots, which `allow_arming` lets it arm."""
     summary: str = ""
-    """What has become of the decisions, after `close`; empty if publishing is all."""
+    """The results of the decisions, after `close`; empty if it only publishes."""
 
     def __init__(self, place: str) -> None:
         self.place = place
 
-    def allow_arming(self) -> None:  # noqa: B027 - most command nothing
-        """Let robots be armed; without it a sink that `arms` only observes. Raises `SinkError`."""
+    def allow_arming(self) -> None:  # noqa: B027 - most send no commands
+        """Allow arming; without it a sink that `arms` only observes. Raises `SinkError`."""
 
-    def assign(self, drones: Sequence[Drone]) -> None:  # noqa: B027 - only who commands robots wants to know
-        """Take all drones that waypoints may be for, by their numbers. Raises `SinkError`."""
+    def assign(self, drones: Sequence[Drone]) -> None:  # noqa: B027 - only sinks that command robots need them
+        """Set the drones of the waypoints, by their numbers. Raises `SinkError`."""
 
-    def decide(self, waypoints: Sequence[Waypoint]) -> None:  # noqa: B027 - most publish each by itself
-        """Take all waypoints of a decision at once, before each is published. Raises `SinkError`."""
+    def decide(self, waypoints: Sequence[Waypoint]) -> None:  # noqa: B027 - most publish each waypoint separately
+        """Receive all waypoints of a decision, before they are published one by one. Raises `SinkError`."""
 
-    def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only a recording can keep it
-        """Take the names that topics (by their ROS names) have in the team's files. Raises `SinkError`."""
+    def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only recordings store them
+        """Set the names of topics in the team's files, by their ROS names. Raises `SinkError`."""
 
     def advertise(self, topics: Mapping[str, str]) -> None:  # noqa: B027 - nothing to do for files
         """Announce topics and the types of their messages, both by their ROS names. Raises `SinkError`."""
@@ -61,7 +61,7 @@ class Sink(ABC):
         """Finish: everything has been published. A file appears in its place only now. Raises `SinkError`."""
 
     def discard(self) -> None:
-        """Finish after an error: leave nothing half-written."""
+        """Finish after an error, without partial output."""
         self.close()
 
     def __enter__(self) -> Self:

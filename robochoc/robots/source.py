@@ -26,7 +26,7 @@ class SourceError(Exception):
 
 
 class ReceivedMessage(NamedTuple):
-    """A message: its topic, its ROS type, its fields (as a sink takes them), and when it was received."""
+    """A message: its topic, its ROS type, its fields (as in a sink), and the time of its receipt."""
 
     topic: str
     kind: str
@@ -35,7 +35,7 @@ class ReceivedMessage(NamedTuple):
 
 
 class Source(ABC):
-    """Gives messages. It is a context manager: the caller that opens it closes it.
+    """Yields messages. It is a context manager: the caller that opens it closes it.
 
     `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
     """
@@ -46,15 +46,15 @@ class Source(ABC):
     def __init__(self, place: str) -> None:
         self.place = place
         self.others: dict[str, str] = {}
-        """Topics of a recording that are not wanted, with their types; the first of them."""
+        """Further topics of a recording, with their types; only the first of them."""
 
     @property
     def is_busy(self) -> bool:
-        """Return whether robots are still on their way: the wait for their reports begins when they are there."""
+        """Return whether robots are still on their way: the wait for their reports begins at their arrival."""
         return False
 
-    def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only who knows robots by name wants them
-        """Take the namespaces in which drones report, by the drones' names. Raises `SourceError`."""
+    def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only sources that know robots by name need them
+        """Set the namespaces of drones' reports, by the drones' names. Raises `SourceError`."""
 
     @abstractmethod
     def listen(self, topics: Mapping[str, str]) -> None:

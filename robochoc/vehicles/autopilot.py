@@ -1,4 +1,4 @@
-"""An autopilot as a pilot sees it: what it tells, and the few commands it takes. Places are in the team's frame."""
+"""The interface of an autopilot: its telemetry, and the commands that it accepts. Places are in the team's frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OFFBOARD = "OFFBOARD"
 MANUAL = frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"})
 """Modes in which a person flies, by remote control."""
 AWAY = frozenset({"RETURN_TO_LAUNCH", "MISSION", "FOLLOW_ME"})
-"""Modes in which an autopilot flies on its own, and which we never ask for: a person did, or its failsafe."""
+"""Modes in which an autopilot flies by itself, requested by a person or its failsafe, never by us."""
 
 
 class RefusedError(Exception):
@@ -22,7 +22,7 @@ class RefusedError(Exception):
 
 @dataclass(frozen=True)
 class Telemetry:
-    """The state of a vehicle, as far as it has told it."""
+    """The reported state of a vehicle."""
 
     place: Point | None = None
     battery: float | None = None
@@ -31,34 +31,34 @@ class Telemetry:
     in_air: bool = False
     healthy: bool = False
     problem: str = ""
-    """Why the autopilot is not healthy, if it tells that."""
+    """The reason why the autopilot is not healthy, if it reports one."""
     alarm: str = ""
-    """Why it has to land at once, where its autopilot does not do that by itself."""
+    """The reason to land at once, where its autopilot does not land by itself."""
     connecting: bool = False
-    """True from its first message until it has told everything that is needed before it can fly."""
+    """True from its first message until everything that it needs to fly has been reported."""
     silent_s: float = 0.0
     """The time since the last heartbeat, in seconds."""
     place_age_s: float = 0.0
-    """The time since it last told its place, in seconds: a vehicle that is heard may no longer know where it is."""
+    """The time since its last position report, in seconds: a connected vehicle may have lost its position."""
 
     @property
     def is_heard(self) -> bool:
-        """Return whether the vehicle is heard. MAVSDK says of one that is not that its motors have stopped."""
+        """Return whether heartbeats arrive. Without them, MAVSDK reports stopped motors."""
         return self.silent_s <= SILENCE_S
 
     @property
     def not_ready(self) -> str:
-        """Return why its autopilot would not arm; empty if it would."""
+        """Return the reason why its autopilot refuses to arm; empty if it does not."""
         return "" if self.healthy else self.problem or "its autopilot is not ready to arm"
 
     @property
     def is_flown_by_others(self) -> bool:
-        """Return whether a person flies the vehicle, or its autopilot on its own."""
+        """Return whether a person flies the vehicle, or its autopilot by itself."""
         return self.armed and self.mode in MANUAL | AWAY
 
     @property
     def mode_and_who(self) -> str:
-        """Return the mode of a vehicle that others fly, and who that may be, in words."""
+        """Return the mode of a vehicle that others fly, and who they may be, in words."""
         who = "a person flies it" if self.mode in MANUAL else "a person flies it, or its own failsafe"
         return f"{self.mode_in_words} ({who})"
 
@@ -76,10 +76,10 @@ class Autopilot(ABC):
 
     @abstractmethod
     def connect(self) -> bool:
-        """Return whether the vehicle has been heard; the first call opens the link. Raises `RefusedError`."""
+        """Return whether the vehicle has answered; the first call opens the link. Raises `RefusedError`."""
 
     @abstractmethod
-    def look(self) -> Telemetry:
+    def telemetry(self) -> Telemetry:
         """Return the newest telemetry. Does not wait."""
 
     @abstractmethod
@@ -92,13 +92,13 @@ class Autopilot(ABC):
 
     @abstractmethod
     def take_off(self, height_m: float) -> None:
-        """Rise to a height above where it stands, and hold there."""
+        """Rise to a height above its present place, and hold there."""
 
     @abstractmethod
     def go_to(self, place: Point) -> None:
         """Fly straight to `place`, by set points that are repeated until another command comes.
 
-        Waits after another command only: it is called again and again on the way.
+        Called repeatedly on the way; waits for an answer only after another command.
         """
 
     @abstractmethod
@@ -111,4 +111,4 @@ class Autopilot(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Close the link. No command is sent by that."""
+        """Close the link without a command."""

@@ -97,7 +97,7 @@ class CflibAutopilot(Autopilot):
             self._block = self._listen(crazyflie)
         return bool(self._values)
 
-    def look(self) -> Telemetry:
+    def telemetry(self) -> Telemetry:
         """Return the newest telemetry. A link that is lost is opened anew."""
         if self._values:
             with suppress(RefusedError):

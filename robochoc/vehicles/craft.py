@@ -1,4 +1,4 @@
-"""A vehicle as traffic sees it, and what it may do now."""
+"""The state of a vehicle in traffic, and its clearance."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Craft:
 
     @property
     def step(self) -> Step | None:
-        """Return the step that it is about; None if it has none left."""
+        """Return its current step; None after the last."""
         return self.steps[self.done] if self.done < len(self.steps) else None
 
     @property
     def rest(self) -> Point:
-        """Return where it is bound for, by its newest set point."""
+        """Return its destination by its newest set point."""
         return self.setpoint or self.place or (math.nan,) * 3
 
     def ground(self, at: Point) -> Point:

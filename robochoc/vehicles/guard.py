@@ -43,7 +43,7 @@ from robochoc.vehicles.messages import (
     line_of,
 )
 from robochoc.vehicles.pilot import Pilot
-from robochoc.vehicles.route_planner import NoWayError
+from robochoc.vehicles.route_planner import RouteError
 from robochoc.vehicles.traffic import Traffic
 
 STEP_S = 0.1
@@ -132,7 +132,7 @@ class Guard:
     def _fly(self, order: Fly) -> None:
         try:
             self._traffic.fly(order.targets)
-        except NoWayError as error:
+        except RouteError as error:
             self._tell(NoWays(str(error)))
             return
         for name, target in order.targets.items():

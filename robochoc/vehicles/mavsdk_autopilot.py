@@ -79,7 +79,7 @@ class MavsdkAutopilot(Autopilot):
             self._heard_at = self._placed_at = time.monotonic()
         return True
 
-    def look(self) -> Telemetry:
+    def telemetry(self) -> Telemetry:
         """Return the newest telemetry; see `Autopilot`."""
         if self._telemetry is None:
             return Telemetry()

@@ -1,4 +1,4 @@
-"""What is said between robochoc and the guard process: one message a line, in JSON."""
+"""Messages between robochoc and the guard process: one a line, in JSON."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.vehicles.fleet import AtEnd, Fleet
 
 
 class Phase(StrEnum):
-    """What a vehicle is about."""
+    """The phase of a vehicle's flight."""
 
     CONNECTING = "connecting"
     READY = "ready"
@@ -26,7 +26,7 @@ class Phase(StrEnum):
 
 
 class Target(msgspec.Struct, frozen=True):
-    """Where a vehicle is to fly, in the team's frame; it `lands` there, or stays in the air."""
+    """The target of a vehicle, in the team's frame; it `lands` there, or stays in the air."""
 
     at: Point
     lands: bool = False

@@ -131,7 +131,7 @@ class Pilot:
     def step(self) -> State:
         """Execute the next transition, and return the state of the vehicle."""
         try:
-            self._seen = self._autopilot.look()
+            self._seen = self._autopilot.telemetry()
             self._react(self._seen)
         except Exception as error:  # noqa: BLE001 - whatever it was, no vehicle may be left in the air
             self._fail(f"its pilot failed: {type(error).__name__}: {shortened(on_one_line(str(error)))}")

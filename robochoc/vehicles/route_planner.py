@@ -30,19 +30,19 @@ _SPOTS = 2_000
 _RING = 8
 
 
-class NoWayError(Exception):
+class RouteError(Exception):
     """There are no ways that keep vehicles apart. The message says between whom, or what is in the way."""
 
 
 @dataclass(frozen=True)
-class Leg:
+class PlannedLeg:
     """A vehicle's way (K + 1, 3), in metres: from rest to rest."""
 
     name: str
     path: Array
 
 
-class Ways:
+class RoutePlanner:
     """Plans ways within the fence of `fleet`, `distance_m` from each other; more or less than the fleet file says.
 
     `standing` are the places of vehicles that stay, by name.
@@ -56,10 +56,12 @@ class Ways:
         self._distance_m = distance_m
         self._standing = {name: at for name, at in standing.items() if all(map(math.isfinite, at))}
 
-    def legs(self, starts: Mapping[str, Point], goals: Mapping[str, Point], climbing: Mapping[str, float]) -> list[Leg]:
+    def legs(
+        self, starts: Mapping[str, Point], goals: Mapping[str, Point], climbing: Mapping[str, float]
+    ) -> list[PlannedLeg]:
         """Return the legs that bring all from `starts` to `goals`, in an order in which each is safe.
 
-        `climbing` has the heights to which vehicles rise before all, by name. Raises `NoWayError`.
+        `climbing` has the heights to which vehicles rise before all, by name. Raises `RouteError`.
         """
         problem = ""
         for first in range(min(_ORDERS, max(len(starts), 1))):
@@ -67,26 +69,26 @@ class Ways:
             for lifts_first in (True, False) if climbing else (True,):
                 try:
                     found = self._legs(names, starts, goals, climbing, lifts_first=lifts_first)
-                except NoWayError as error:
+                except RouteError as error:
                     problem = problem or str(error)
                     continue
                 outside = next(self._outside(found), "")
                 if not outside:
                     return found
                 problem = problem if problem and not problem.startswith(_BY) else outside
-        raise NoWayError(problem)
+        raise RouteError(problem)
 
     def check(self, goals: Mapping[str, Point]) -> None:
-        """Raise `NoWayError` if two goals, or a goal and who stands, are nearer than the distance."""
+        """Raise `RouteError` if two goals, or a goal and who stands, are nearer than the distance."""
         called = [*goals, *self._standing]
         try:
             ends, still = self._flat([*goals.values()]), self._flat([*self._standing.values()])
             check_spacing(ends, still, self._distance_m, "goal")
         except TooCloseError as error:
-            raise NoWayError(self._too_close(error, called)) from None
+            raise RouteError(self._too_close(error, called)) from None
 
-    def descents(self, rests: Mapping[str, Point], grounds: Mapping[str, float]) -> list[Leg]:
-        """Return the legs by which all land from where they rest, the lowest first. Raises `NoWayError`.
+    def descents(self, rests: Mapping[str, Point], grounds: Mapping[str, float]) -> list[PlannedLeg]:
+        """Return the legs by which all land from where they rest, the lowest first. Raises `RouteError`.
 
         They land where they are. One that would land on another one's place lands beside it. `grounds` are heights.
         """
@@ -95,21 +97,21 @@ class Ways:
         for name, at in rests.items():
             spot = self.spot(at, taken)
             if spot is None:
-                raise NoWayError(f"there is no place for {name} to land")
+                raise RouteError(f"there is no place for {name} to land")
             goals[name] = (*spot[:2], grounds[name])
             taken.append(spot)
-        legs: list[Leg] = []
+        legs: list[PlannedLeg] = []
         now = {**rests}
         for name, at in rests.items():
             path = np.array([at, goals[name]])
             others = [other for one, other in now.items() if one != name]
             if at[:2] == goals[name][:2] and self.clear(path, [*others, *self._standing.values()]):
-                legs.append(Leg(name, path))
+                legs.append(PlannedLeg(name, path))
                 now[name] = goals[name]
         down = {name: at for name, at in now.items() if at == goals[name]}
         late = {name: at for name, at in now.items() if name not in down}
         if late:
-            rest = Ways(self._fleet, self._standing | down, self._distance_m)
+            rest = RoutePlanner(self._fleet, self._standing | down, self._distance_m)
             legs += rest.legs(late, {name: goals[name] for name in late}, {})
         return legs
 
@@ -135,7 +137,7 @@ class Ways:
         climbing: Mapping[str, float],
         *,
         lifts_first: bool,
-    ) -> list[Leg]:
+    ) -> list[PlannedLeg]:
         rests = {name: starts[name] for name in names}
         if lifts_first:
             legs = self._lifts(rests, climbing)
@@ -145,25 +147,25 @@ class Ways:
         legs += self._lifts(rests, climbing)
         return legs + self._moves(rests, goals, [*names])
 
-    def _lifts(self, rests: dict[str, Point], climbing: Mapping[str, float]) -> list[Leg]:
+    def _lifts(self, rests: dict[str, Point], climbing: Mapping[str, float]) -> list[PlannedLeg]:
         """Return how vehicles rise, and update where they rest."""
-        legs: list[Leg] = []
+        legs: list[PlannedLeg] = []
         left = [*climbing]
         while left:
             for name in left:
                 path = np.array([rests[name], (*rests[name][:2], climbing[name])])
                 others = {other: at for other, at in (rests | self._standing).items() if other != name}
                 if self.clear(path, [*others.values()]):
-                    legs.append(Leg(name, path))
+                    legs.append(PlannedLeg(name, path))
                     rests[name] = (*rests[name][:2], climbing[name])
                     left.remove(name)
                     break
             else:
                 nearest = min(others, key=lambda other: float(norms(path - np.array(others[other])).min()))
-                raise NoWayError(f"{left[-1]} cannot rise to {climbing[left[-1]]:g} m: {nearest} is too near")
+                raise RouteError(f"{left[-1]} cannot rise to {climbing[left[-1]]:g} m: {nearest} is too near")
         return legs
 
-    def _moves(self, rests: dict[str, Point], goals: Mapping[str, Point], names: Sequence[str]) -> list[Leg]:
+    def _moves(self, rests: dict[str, Point], goals: Mapping[str, Point], names: Sequence[str]) -> list[PlannedLeg]:
         """Return how `names` get to their goals, and update where they rest."""
         if not names:
             return []
@@ -177,13 +179,13 @@ class Ways:
             check_spacing(ends, still, self._distance_m, "goal")
             moves = moves_between(begins, ends, still, space, np.zeros(len(names)))
         except TooCloseError as error:
-            raise NoWayError(self._too_close(error, called)) from None
+            raise RouteError(self._too_close(error, called)) from None
         except NoRouteError as error:
             stuck = ", ".join(called[number] for number in error.drones)
-            raise NoWayError(f"no way was found for {stuck}: other vehicles enclose it") from None
+            raise RouteError(f"no way was found for {stuck}: other vehicles enclose it") from None
         for name in names:
             rests[name] = goals[name]
-        return [Leg(names[move.drone], squashed(move.path, 1 / self._downwash)) for move in moves]
+        return [PlannedLeg(names[move.drone], squashed(move.path, 1 / self._downwash)) for move in moves]
 
     def _too_close(self, error: TooCloseError, called: Sequence[str]) -> str:
         where = "are" if error.where == "start" else "would be"
@@ -192,7 +194,7 @@ class Ways:
         apart = f"{first} and {second} {where} {error.distance_m:.2f} m apart{unit}"
         return f"{apart}: less than 'distance', {self._distance_m:g} m"
 
-    def _outside(self, legs: Sequence[Leg]) -> Iterator[str]:
+    def _outside(self, legs: Sequence[PlannedLeg]) -> Iterator[str]:
         """Yield the ways that lead out of the fence, in words. They may begin outside, and rise there."""
         for leg in legs:
             for x, y, z in leg.path[1:].tolist():

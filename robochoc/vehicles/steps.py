@@ -18,13 +18,13 @@ import numpy as np
 
 from robochoc.flight.layout import Point
 from robochoc.flight.routes.spacing import SLACK_M, Array, line_distances, squashed
-from robochoc.vehicles.route_planner import Leg
+from robochoc.vehicles.route_planner import PlannedLeg
 
 _PARTS = 32
 """A straight piece has at most so many steps."""
 
 
-class Does(Enum):
+class StepKind(Enum):
     """The kind of a step: the first and the last are done by the vehicle's autopilot alone."""
 
     CLIMB = auto()
@@ -36,7 +36,7 @@ class Does(Enum):
 class Step:
     """A straight step of a vehicle's way, in metres."""
 
-    does: Does
+    kind: StepKind
     begin: Point
     end: Point
     is_corner: bool
@@ -59,7 +59,7 @@ class _Piece:
 
 
 def steps_of(
-    legs: Sequence[Leg], climbing: Collection[str], landing: Collection[str], distance_m: float, downwash: float
+    legs: Sequence[PlannedLeg], climbing: Collection[str], landing: Collection[str], distance_m: float, downwash: float
 ) -> dict[str, list[Step]]:
     """Return the steps of each vehicle that has legs.
 
@@ -78,9 +78,9 @@ def steps_of(
         lands = leg.name in landing and last[leg.name] == number
         path = _closed(leg.path) if lands else leg.path
         for begin, end, left in zip(path[:-1], path[1:], range(len(path) - 2, -1, -1), strict=True):
-            does = Does.CLIMB if leg.name in climbing and not mine else Does.FLY
-            does = Does.LAND if lands and not left else does
-            pieces.append(_piece(leg.name, number, mine, (does, begin, end), distance_m))
+            kind = StepKind.CLIMB if leg.name in climbing and not mine else StepKind.FLY
+            kind = StepKind.LAND if lands and not left else kind
+            pieces.append(_piece(leg.name, number, mine, (kind, begin, end), distance_m))
     for later, piece in enumerate(pieces):
         for earlier in pieces[:later]:
             if earlier.name != piece.name and earlier.leg != piece.leg:
@@ -94,14 +94,14 @@ def _closed(path: Array) -> Array:
     return path if down else np.vstack((path, path[-1]))
 
 
-def _piece(name: str, leg: int, steps: list[Step], what: tuple[Does, Array, Array], distance_m: float) -> _Piece:
-    does, begin, end = what
+def _piece(name: str, leg: int, steps: list[Step], what: tuple[StepKind, Array, Array], distance_m: float) -> _Piece:
+    kind, begin, end = what
     length = math.dist(begin, end)
-    parts = max(1, min(_PARTS, math.ceil(2 * length / distance_m))) if does is Does.FLY else 1
+    parts = max(1, min(_PARTS, math.ceil(2 * length / distance_m))) if kind is StepKind.FLY else 1
     points = begin + (end - begin) * (np.arange(parts + 1) / parts)[:, None]
     first = len(steps)
     steps += [
-        Step(does, _point(points[number]), _point(points[number + 1]), number == parts - 1) for number in range(parts)
+        Step(kind, _point(points[number]), _point(points[number + 1]), number == parts - 1) for number in range(parts)
     ]
     return _Piece(name, leg, first, points[:-1], points[1:])
 

@@ -1,4 +1,4 @@
-"""Take-over: whether a person, or a vehicle's own failsafe, flies it. Neither is fought, so that counts for good."""
+"""Detects that a person or the vehicle's failsafe has taken over. The vehicle then gets no further command."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ class Takeover:
         self._was_ours = self._is_taken = False
 
     def command(self) -> None:
-        """Take note that the vehicle has been commanded."""
+        """Record that the vehicle has been commanded."""
         self._commanded_s = min(self._commanded_s, self._clock())
 
     def note(self, seen: Telemetry) -> None:
-        """Take note of what a vehicle tells that is commanded."""
+        """Record the telemetry of a commanded vehicle."""
         self._was_ours = self._was_ours or (seen.armed and not seen.is_flown_by_others)
         self._foreign_s = min(self._foreign_s, self._clock()) if seen.is_flown_by_others else math.inf
         self._silence_s = max(self._silence_s, seen.silent_s)
 
     @property
     def is_known(self) -> bool:
-        """Return whether the vehicle was taken over, as was found out before."""
+        """Return whether a take-over was detected before."""
         return self._is_taken
 
     @property
     def lasts(self) -> bool:
-        """Return whether a mode that is not ours is more than what some tell for a moment after a landing."""
+        """Return whether another mode lasts longer than the moment for which some report it after a landing."""
         return self._clock() - self._foreign_s > MODE_S
 
     def has_come(self, seen: Telemetry) -> bool:
-        """Return whether the vehicle was taken over, by what it tells now or told before.
+        """Return whether the vehicle was taken over, by its telemetry until now.
 
         Before it has obeyed once its mode may be that of before its first command.
         """

@@ -1,14 +1,14 @@
-"""Traffic: which vehicle may fly where, now. Their telemetry is the truth; the plan says only who goes first.
+"""Traffic: clearances of vehicles for their next steps. The plan gives only their order; telemetry gives their places.
 
-`Ways` plans, `steps_of` says which steps wait for which. A vehicle gets a set point on its straight line, a short way
-ahead of where it is, and never beyond the last step that need not wait. So where one is late or stands still, those who
-need its place wait, and the others fly on.
+`RoutePlanner` plans, `steps_of` derives which steps wait for which. A vehicle gets a set point on its straight line, a
+short way ahead of its place, and never beyond the last step that need not wait. So if a vehicle is late or stops, those
+that need its place wait, and the others fly on.
 
-A vehicle that is blown off its way may come near to others, and its way back too. Then others do not fly towards it
-(`_in_the_way`), and where nobody gets on any more, all ways are planned anew from where vehicles are.
+A vehicle that is blown off its line may come near to others, also on its way back. The others then do not fly towards
+it (`_in_the_way`). When no vehicle can move, all routes are planned again from the present places.
 
-The distance between two vehicles so is `distance`, less what each of them is off its line: a vehicle counts as on its
-way within `tolerance_m` of it (`Fleet`), and others stop for one that is farther off.
+The distance between two vehicles is therefore `distance`, less the deviation of each from its line: a vehicle within
+`tolerance_m` of its line (`Fleet`) counts as on it, and others stop for a vehicle farther off.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from robochoc.flight.routes.spacing import SLACK_M, line_distances, squashed
 from robochoc.vehicles.craft import Clearance, Craft
 from robochoc.vehicles.fleet import Fleet
 from robochoc.vehicles.messages import Target
-from robochoc.vehicles.route_planner import Leg, NoWayError, Ways, spacing
-from robochoc.vehicles.steps import Does, Step, length_along, on_line, steps_of
+from robochoc.vehicles.route_planner import PlannedLeg, RouteError, RoutePlanner, spacing
+from robochoc.vehicles.steps import Step, StepKind, length_along, on_line, steps_of
 
 STILL_S = 3.0
 """The time for which vehicles may block each other before ways are planned anew, in seconds."""
@@ -54,7 +54,7 @@ class Traffic:
     # What happens
 
     def see(self, name: str, place: Point | None, *, in_air: bool) -> None:
-        """Take note of where a vehicle is."""
+        """Record the place of a vehicle."""
         with self._lock:
             craft = self._crafts[name]
             craft.place = place or craft.place
@@ -66,20 +66,20 @@ class Traffic:
                 self._replan()
 
     def fly(self, targets: Mapping[str, Target]) -> None:
-        """Plan ways to `targets`. Raises `NoWayError`, and all stay where they were bound for."""
+        """Plan ways to `targets`. Raises `RouteError`, and all stay where they were bound for."""
         with self._lock:
             before = {name: self._crafts[name].target for name in targets}
             for name, target in targets.items():
                 self._crafts[name].target = target
             try:
                 self._plan()
-            except NoWayError:
+            except RouteError:
                 for name, earlier in before.items():
                     self._crafts[name].target = earlier
                 raise
 
     def climbing(self, name: str) -> None:
-        """Take note that a vehicle's autopilot lifts it."""
+        """Record that a vehicle takes off."""
         with self._lock:
             craft = self._crafts[name]
             craft.flies = True
@@ -87,14 +87,14 @@ class Traffic:
                 craft.setpoint, craft.released = craft.step.end, craft.done + 1
 
     def climbed(self, name: str) -> None:
-        """Take note that it has."""
+        """Record that a vehicle has taken off."""
         with self._lock:
             craft = self._crafts[name]
-            if craft.step and craft.step.does is Does.CLIMB:
+            if craft.step and craft.step.kind is StepKind.CLIMB:
                 craft.done += 1
 
     def landing(self, name: str) -> None:
-        """Take note that a vehicle's autopilot lands it where it is."""
+        """Record that a vehicle lands where it is."""
         with self._lock:
             craft = self._crafts[name]
             craft.lands = True
@@ -102,7 +102,7 @@ class Traffic:
                 craft.setpoint = craft.ground(craft.place)
 
     def landed(self, name: str) -> None:
-        """Take note that a vehicle is on the ground."""
+        """Record that a vehicle is on the ground."""
         with self._lock:
             craft = self._crafts[name]
             craft.flies = craft.lands = False
@@ -113,7 +113,7 @@ class Traffic:
                 craft.target = None
 
     def lose(self, name: str) -> None:
-        """Take note that a vehicle no longer follows us: the others keep clear of it, and of what is below it."""
+        """Record that a vehicle is out of control: the others keep clear of it and of the space below it."""
         with self._lock:
             craft = self._crafts[name]
             if not craft.gone:
@@ -123,14 +123,14 @@ class Traffic:
     # What may be done
 
     def clearance(self, name: str) -> Clearance:
-        """Return what a vehicle may do now."""
+        """Return the clearance of a vehicle for its next step."""
         with self._lock:
             craft = self._crafts[name]
             self._advance(craft)
             step = craft.step
             if step is None or craft.place is None:
                 return Clearance(craft.setpoint, rests=True)
-            wanted = step.end if step.does is not Does.FLY else self._ahead(craft)
+            wanted = step.end if step.kind is not StepKind.FLY else self._ahead(craft)
             waits_for = self._waits_for(step)
             blocked = "" if waits_for else self._in_the_way(craft, wanted)
             if blocked:
@@ -138,9 +138,9 @@ class Traffic:
             craft.blocked_s = None
             if waits_for:
                 return Clearance(craft.setpoint, waits_for=waits_for)
-            if step.does is Does.FLY and self._is_due(craft, step):
+            if step.kind is StepKind.FLY and self._is_due(craft, step):
                 craft.setpoint = wanted
-            return Clearance(craft.setpoint, climbs=step.does is Does.CLIMB, lands=step.does is Does.LAND)
+            return Clearance(craft.setpoint, climbs=step.kind is StepKind.CLIMB, lands=step.kind is StepKind.LAND)
 
     def _is_due(self, craft: Craft, step: Step) -> bool:
         """Return whether a vehicle is to get a new set point: the one before is near, or not on its line."""
@@ -164,7 +164,7 @@ class Traffic:
 
     def _advance(self, craft: Craft) -> None:
         """Count the steps that a vehicle has done, and those that it may do."""
-        while (step := craft.step) and step.does is Does.FLY:
+        while (step := craft.step) and step.kind is StepKind.FLY:
             if craft.done == craft.released:
                 if self._waits_for(step):
                     return
@@ -178,7 +178,7 @@ class Traffic:
         is_corner = bool(following) and following[-1].is_corner
         while craft.released < len(craft.steps) and not is_corner:
             step = craft.steps[craft.released]
-            if step.does is not Does.FLY or self._waits_for(step):
+            if step.kind is not StepKind.FLY or self._waits_for(step):
                 return
             craft.released += 1
             is_corner = step.is_corner
@@ -215,7 +215,7 @@ class Traffic:
         now = self._clock()
         if craft.blocked_s is None:
             craft.blocked_s = now
-            if craft.flies and craft.step and craft.step.does is not Does.CLIMB:
+            if craft.flies and craft.step and craft.step.kind is not StepKind.CLIMB:
                 craft.setpoint = craft.place
         elif now - max(craft.blocked_s, self._planned_s) > STILL_S:
             self._replan()
@@ -269,25 +269,25 @@ class Traffic:
                 self.bring_down()
             else:
                 self._plan()
-        except NoWayError:
+        except RouteError:
             return
 
     def _plan(self) -> None:
-        """Plan ways from where all are bound for. Raises `NoWayError`."""
+        """Plan ways from where all are bound for. Raises `RouteError`."""
         self._planned_s = self._clock()
         crafts = [one for one in self._crafts.values() if one.place]
         standing = {one.name: self._standing(one) for one in crafts if not self._moves(one)}
         moving = [one for one in crafts if one.name not in standing]
-        first = [Leg(one.name, np.array([one.place, one.rest])) for one in moving if one.flies]
+        first = [PlannedLeg(one.name, np.array([one.place, one.rest])) for one in moving if one.flies]
         starts = {one.name: one.rest for one in moving}
         goals = self._goals(moving)
         climbing = {one.name: one.rest[2] + self._fleet.takeoff_m for one in moving if not one.flies and not one.in_air}
         distance_m = self._fleet.distance_m
-        Ways(self._fleet, standing, distance_m).check(goals)
+        RoutePlanner(self._fleet, standing, distance_m).check(goals)
         if any(one.flies for one in moving):
             distance_m = self._present_distance([*starts.values(), *standing.values()])
-        legs = Ways(self._fleet, standing, distance_m).legs(starts, goals, climbing)
-        lifted = {one.name for one in moving if one.flies and one.step and one.step.does is Does.CLIMB}
+        legs = RoutePlanner(self._fleet, standing, distance_m).legs(starts, goals, climbing)
+        lifted = {one.name for one in moving if one.flies and one.step and one.step.kind is StepKind.CLIMB}
         first.sort(key=lambda leg: leg.name not in lifted)
         landing = {one.name for one in moving if one.target and one.target.lands}
         self._take(steps_of([*first, *legs], lifted | {*climbing}, landing, distance_m, self._fleet.downwash))
@@ -320,7 +320,9 @@ class Traffic:
             above = [at for at in falling if math.dist(at[:2], goal[:2]) < self._fleet.distance_m and at[2] >= goal[2]]
             if above:
                 others = [at for other, at in found.items() if other != name]
-                found[name] = Ways(self._fleet, {}, self._fleet.distance_m).spot(goal, [*falling, *others]) or goal
+                found[name] = (
+                    RoutePlanner(self._fleet, {}, self._fleet.distance_m).spot(goal, [*falling, *others]) or goal
+                )
         return found
 
     def _goal(self, craft: Craft) -> Point:
@@ -353,11 +355,11 @@ class Traffic:
             rests = {one.name: one.rest for one in flying}
             grounds = {one.name: one.ground(one.rest)[2] for one in flying}
             distance_m = self._present_distance([*rests.values(), *standing.values()])
-            ways = Ways(self._fleet, standing, distance_m)
+            ways = RoutePlanner(self._fleet, standing, distance_m)
             try:
                 legs = ways.descents(rests, grounds)
                 steps = steps_of(legs, (), {one.name for one in flying}, distance_m, self._fleet.downwash)
-            except NoWayError:
-                steps = {one.name: [Step(Does.LAND, one.rest, one.ground(one.rest), True)] for one in flying}
+            except RouteError:
+                steps = {one.name: [Step(StepKind.LAND, one.rest, one.ground(one.rest), True)] for one in flying}
             self._take(steps)
             self._planned_s = self._clock()

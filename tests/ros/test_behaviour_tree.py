@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from robochoc.generators.queens3d import queens3d
-from robochoc.robots.decision import FollowedDecision
+from robochoc.robots.decision import CancellableDecision
 from robochoc.ros.decide_service import DecideService
 from robochoc.run import Options, Runtime, solve
 from tests.support.example_teams import hangar
@@ -55,14 +55,14 @@ def ticked(tree: Any) -> None:  # noqa: ANN401 - py_trees is untyped
 
 
 def test_the_assignment_is_on_the_blackboard(pool: ThreadPoolExecutor) -> None:
-    tree = behaviour(Client(DecideService([hangar()], FollowedDecision(), SIMULATED), pool), {"team": "hangar"})
+    tree = behaviour(Client(DecideService([hangar()], CancellableDecision(), SIMULATED), pool), {"team": "hangar"})
     ticked(tree)
     assert (tree.status.value, tree.feedback_message) == ("SUCCESS", "solution, 1 epoch")
     assert tree.board.get("assignment") == solve(hangar(), SIMULATED).assignment
 
 
 def test_a_refusal_is_a_failure(pool: ThreadPoolExecutor) -> None:
-    tree = behaviour(Client(DecideService([hangar()], FollowedDecision(), SIMULATED), pool), {"team": "yard"})
+    tree = behaviour(Client(DecideService([hangar()], CancellableDecision(), SIMULATED), pool), {"team": "yard"})
     ticked(tree)
     assert tree.status.value == "FAILURE"
     assert tree.feedback_message == "no team has the name 'yard'; known are hangar"
@@ -70,7 +70,7 @@ def test_a_refusal_is_a_failure(pool: ThreadPoolExecutor) -> None:
 
 def test_what_is_not_wanted_any_more_is_cancelled(pool: ThreadPoolExecutor) -> None:
     begun = threading.Event()
-    decision = FollowedDecision(lambda _: begun.set())
+    decision = CancellableDecision(lambda _: begun.set())
     client = Client(DecideService([queens3d(4)], decision, ENDLESS), pool)
     tree = behaviour(client, {}, lambda: decision.cancel({}))
     tree.tick_once()

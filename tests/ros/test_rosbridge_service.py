@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
-from robochoc.robots.decision import FollowedDecision
+from robochoc.robots.decision import CancellableDecision
 from robochoc.robots.sink import SinkError
 from robochoc.ros.decide_service import DECIDE, TRIGGER, DecideService, refusal
 from robochoc.ros.live import rosbridge_connection
@@ -127,7 +127,7 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(server: Server, offere
     ],
 )
 def test_what_is_no_request_is_answered(server: Server, offered: RosbridgeServices, args: object, told: str) -> None:
-    decider = DecideService([pair(values=3)], FollowedDecision(), Options(runtime=Runtime.SIMULATOR))
+    decider = DecideService([pair(values=3)], CancellableDecision(), Options(runtime=Runtime.SIMULATOR))
     with Client(server) as client:
         ask = {"op": "call_service", "id": "raw", "service": SERVICE, "args": args}
         client.connection.ros.call_async_service(client.connection.roslibpy.Message(ask), client._hear, client._hear)  # noqa: SLF001

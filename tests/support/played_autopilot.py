@@ -38,7 +38,7 @@ class Played(Autopilot):
         self.now, self.opens_s = self.now + self.opens_s, 0.0
         return self.connects
 
-    def look(self) -> Telemetry:
+    def telemetry(self) -> Telemetry:
         return self.seen
 
     def arm(self) -> None:

@@ -88,7 +88,7 @@ def serve(
         raise click.UsageError(f"--ros {place}: unknown middleware; use {', '.join(_MIDDLEWARES)}, such as dds:5")
     teams = _teams(paths)
     from robochoc.robots.connections import lacking_for
-    from robochoc.robots.decision import FollowedDecision
+    from robochoc.robots.decision import CancellableDecision
     from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
     from robochoc.ros.names import ros_name
     from robochoc.run.options import Options
@@ -106,7 +106,7 @@ def serve(
         with suppress(Exception):  # an error of the feedback must not end the decision
             offered.publish(_FEEDBACK, _TEXT, {"data": text})
 
-    decision = FollowedDecision(publish_feedback if feedback else None)
+    decision = CancellableDecision(publish_feedback if feedback else None)
     decider = DecideService(teams, decision, options)
     with ros_errors_as_failures(), _opened(kind, where, services, refusal, {_CANCEL: decision.cancel}) as offered:
         if feedback:

@@ -17,7 +17,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.robots import decision
-from robochoc.robots.decision import FollowedDecision
+from robochoc.robots.decision import CancellableDecision
 from robochoc.ros.decide_service import DECIDE, DecideService
 from robochoc.ros.message_types import types_of
 from robochoc.run import Options, Runtime, solve
@@ -47,7 +47,7 @@ def test_feedback_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch, runtime: 
     monkeypatch.setattr(decision, "PERIOD_S", 0.0)
     for seed in range(5):
         team, told = random_cost_team(Random(seed)), Told()
-        outcome = FollowedDecision(told)(team, Options(protocol="adopt", runtime=runtime, timeout=HANG_S))
+        outcome = CancellableDecision(told)(team, Options(protocol="adopt", runtime=runtime, timeout=HANG_S))
         assert outcome.assignment == solve(team, Options(protocol="adopt", runtime=runtime)).assignment
         assert [one["state"] for one in told] == ["deciding"] * (len(told) - 1) + ["decided"]
         last = told[-1]
@@ -65,7 +65,7 @@ def test_feedback_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch, runtime: 
 def test_feedback_of_a_team_that_changes_has_no_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decision, "PERIOD_S", 0.0)
     told = Told()
-    assert FollowedDecision(told)(example("rescue"), SIMULATED).epochs
+    assert CancellableDecision(told)(example("rescue"), SIMULATED).epochs
     assert told[-1]["state"] == "decided"
     assert not any("cost" in one for one in told)
 
@@ -73,7 +73,7 @@ def test_feedback_of_a_team_that_changes_has_no_cost(monkeypatch: pytest.MonkeyP
 def test_an_assignment_that_is_too_long_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decision, "FEEDBACK_CHARACTERS_MAX", 10)
     told = Told()
-    FollowedDecision(told)(random_cost_team(Random(1)), SIMULATED)
+    CancellableDecision(told)(random_cost_team(Random(1)), SIMULATED)
     assert "assignment" not in told[-1]
 
 
@@ -86,7 +86,7 @@ def test_it_can_be_cancelled() -> None:
         asks.wait(HANG_S)
         answers.append(followed.cancel({}))
 
-    followed = FollowedDecision(lambda _: asks.set())
+    followed = CancellableDecision(lambda _: asks.set())
     canceller = threading.Thread(target=cancel)
     canceller.start()
     outcome = DecideService([queens3d(4)], followed, ENDLESS).decide({})
@@ -99,7 +99,7 @@ def test_it_can_be_cancelled() -> None:
 
 
 def test_nothing_is_left_of_a_decision_that_failed() -> None:
-    followed = FollowedDecision(Told())
+    followed = CancellableDecision(Told())
     answer = DecideService([pair(values=3)], followed, Options("explode", Runtime.SIMULATOR)).decide({})
     assert "explode" in answer["message"]
     assert followed.cancel({})["success"] is False

@@ -66,7 +66,7 @@ def linked(at: Place = (0.0, 0.0, 0.0), **what: object) -> Iterator[tuple[Crazyf
 
 
 def seen(autopilot: CflibAutopilot, condition: Callable[[Telemetry], bool]) -> None:
-    wait_until(lambda: condition(autopilot.look()), lambda: str(autopilot.look()))
+    wait_until(lambda: condition(autopilot.telemetry()), lambda: str(autopilot.telemetry()))
 
 
 def fly(vehicle: Crazyfly, autopilot: CflibAutopilot, height_m: float = 1.0) -> None:
@@ -90,7 +90,7 @@ def going(autopilot: CflibAutopilot, to: Place) -> Callable[[], bool]:
 
 def test_what_is_told_is_in_the_frame_of_the_team() -> None:
     with linked(at=(3.0, 1.0, 0.5), battery=0.42) as (_, autopilot):
-        told = autopilot.look()
+        told = autopilot.telemetry()
         assert told.place == pytest.approx((3, 1, 0.5))
         assert told.battery == pytest.approx(0.42)
         assert told.healthy
@@ -114,7 +114,7 @@ def test_on_its_way_it_is_sent_elsewhere_in_a_straight_line() -> None:
         assert lasts < PEAK * 4 / SPEED_MS / 2
         autopilot.hold()
         assert vehicle.log[-1] == "hold"
-        assert autopilot.look().mode == OFFBOARD
+        assert autopilot.telemetry().mode == OFFBOARD
 
 
 def test_in_the_air_it_is_never_disarmed() -> None:
@@ -228,7 +228,7 @@ def test_a_link_that_was_opened_in_vain_is_opened_anew(monkeypatch: pytest.Monke
         seen(autopilot, lambda _: autopilot._crazyflie not in {first, None})  # noqa: SLF001
         missed = vehicle.missed
         seen(autopilot, lambda _: vehicle.missed > missed)
-        silent_s = autopilot.look().silent_s
+        silent_s = autopilot.telemetry().silent_s
         vehicle.silent = False
         seen(autopilot, lambda told: told.silent_s < silent_s)
         autopilot.arm()

@@ -41,10 +41,10 @@ class Hanging(Played):
         super().arm()
         self.when_armed()
 
-    def look(self) -> Telemetry:
+    def telemetry(self) -> Telemetry:
         if self.hangs:
             self.go.wait(HANG_S)
-        return super().look()
+        return super().telemetry()
 
     def close(self) -> None:
         self.is_closed = True
@@ -122,7 +122,7 @@ def an_order_that_fails(stand: Stand, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def an_end_that_cannot_be_planned(stand: Stand, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stand.guard, "_fly", broken)
-    monkeypatch.setattr("robochoc.vehicles.traffic.Ways.descents", broken)
+    monkeypatch.setattr("robochoc.vehicles.traffic.RoutePlanner.descents", broken)
     monkeypatch.setattr("robochoc.vehicles.pilot.TURN_S", 0.0)
     watch(stand.guard, Given([THERE]), threading.Event())
 

@@ -14,7 +14,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.routes.spacing import line_distances
 from robochoc.vehicles.fleet import Fence, Fleet, Link
 from robochoc.vehicles.messages import Target
-from robochoc.vehicles.route_planner import NoWayError, Ways, spacing
+from robochoc.vehicles.route_planner import RouteError, RoutePlanner, spacing
 from robochoc.vehicles.steps import length_along, on_line
 from robochoc.vehicles.traffic import STILL_S, Traffic
 from tests.support.cases import looped
@@ -235,13 +235,13 @@ def test_one_that_rises_past_its_place_goes_back_to_it(above_m: float) -> None:
 # What is refused
 
 
-def ways(fence_m: float = 9.0, **standing: Point) -> Ways:
+def ways(fence_m: float = 9.0, **standing: Point) -> RoutePlanner:
     fleet = Fleet({"a": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (fence_m, fence_m, fence_m)))
-    return Ways(fleet, standing, DISTANCE_M)
+    return RoutePlanner(fleet, standing, DISTANCE_M)
 
 
 def test_who_cannot_rise_is_told() -> None:
-    with pytest.raises(NoWayError, match=r"a cannot rise to 2\.5 m: b is too near"):
+    with pytest.raises(RouteError, match=r"a cannot rise to 2\.5 m: b is too near"):
         ways(b=(0.5, 0, 2)).legs({"a": (0, 0, 0)}, {"a": (4, 4, 2)}, {"a": 2.5})
 
 
@@ -252,7 +252,7 @@ def test_who_is_above_goes_away_before_another_one_rises() -> None:
 
 
 def test_places_that_are_too_near_are_told() -> None:
-    with pytest.raises(NoWayError, match=r"a and b would be 0\.50 m apart: less than 'distance', 1 m"):
+    with pytest.raises(RouteError, match=r"a and b would be 0\.50 m apart: less than 'distance', 1 m"):
         ways(b=(4, 4, 2)).check({"a": (4, 4, 2.5)})
 
 
@@ -261,9 +261,9 @@ def test_ways_stay_within_the_fence() -> None:
     assert all(-1 <= at <= 9 for leg in legs for at in leg.path.ravel())
     fleet = Fleet({"a": Link("udpin://0.0.0.0:1")}, Fence((0, 0, 0), (2, 0, 2)))
     with pytest.raises(
-        NoWayError, match=r"the only way found leads by .*, outside of the fence \(0, 0, 0 to 2, 0, 2\)"
+        RouteError, match=r"the only way found leads by .*, outside of the fence \(0, 0, 0 to 2, 0, 2\)"
     ):
-        Ways(fleet, {}, DISTANCE_M).legs({"a": (0, 0, 2), "b": (2, 0, 2)}, {"a": (2, 0, 2), "b": (0, 0, 2)}, {})
+        RoutePlanner(fleet, {}, DISTANCE_M).legs({"a": (0, 0, 2), "b": (2, 0, 2)}, {"a": (2, 0, 2), "b": (0, 0, 2)}, {})
 
 
 def test_lengths_along_lines() -> None:

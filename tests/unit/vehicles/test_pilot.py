@@ -276,7 +276,7 @@ def broken(*_: object, **__: object) -> None:
 FAILED = "its pilot failed: ValueError: nobody foresaw it"
 
 
-@pytest.mark.parametrize("what", ["look", "go_to"])
+@pytest.mark.parametrize("what", ["telemetry", "go_to"])
 def test_who_has_a_pilot_that_fails_is_out_and_lands(
     pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -305,7 +305,7 @@ def test_a_landing_that_fails_is_tried_again_and_given_up_at_last(
     pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arrived(pilot, played)
-    for method in ("look", "land"):
+    for method in ("telemetry", "land"):
         monkeypatch.setattr(played, method, broken)
     pilot.end(AtEnd.LAND, waits=True)
     steps(pilot, played, 3, 1.0)
@@ -328,7 +328,7 @@ def test_who_was_never_commanded_is_not_commanded_by_a_pilot_that_fails(
     pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     steps(pilot, played, 2)
-    monkeypatch.setattr(played, "look", broken)
+    monkeypatch.setattr(played, "telemetry", broken)
     pilot.end(AtEnd.LAND, waits=True)
     steps(pilot, played)
     assert is_over(pilot)
