@@ -19,14 +19,14 @@ from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
 
 MOST_NAMED = 3
-"""So many protocols are named in a refusal. Which of them suits whom, a guide says."""
+"""The number of protocols named in a refusal. A guide helps to choose between them."""
 GUIDE = "docs/guides/which-protocol.md"
 
 
 def alternatives(
     team: Team, options: Options, *, complete: bool = False, costs: bool = False, narrow: bool = False
 ) -> str:
-    """Return what would do instead of the protocol of `options`, as the end of a sentence that refuses it.
+    """Return the alternatives to the protocol of `options`, as the end of a sentence that rejects it.
 
     Every protocol is asked as if it had been chosen, but for those that take small problems only. The three that suit
     best are named.

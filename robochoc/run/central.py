@@ -93,7 +93,7 @@ def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
 
 
 def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Options) -> PhaseAnswer:
-    """Return what the central solver has `found` as an answer.
+    """Return the answer of the central solver.
 
     `price` is the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
     """

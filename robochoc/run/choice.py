@@ -35,12 +35,12 @@ FAILURES = (
     CompileError, CompileTimeoutError, TooManySolutionsError, SolverLostError, SolverMissingError,
     TeamCompileTimeoutError, UnsupportedError,
 )  # fmt: skip
-"""What compiling domains may end with. The run tells of it."""
+"""Errors that compiling domains may raise. The run reports them."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What was chosen for a team, and why.
+    """The choice for a team, with the reasons.
 
     Attributes:
         options: How to run: with the name of a protocol, and an order where one was chosen.
@@ -97,7 +97,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
         if not against:
             rejected.pop(rule.protocol, None)
             return _choice(facts, options, (rule.protocol, rule.why), rejected)
-        if against != LOSSY.otherwise:  # mostly no message is lost: that is nothing to tell
+        if against != LOSSY.otherwise:  # if no message is lost, nothing is worth reporting
             rejected.setdefault(rule.protocol, []).append(against)
     for name in _others(bearing_loss=facts.loss > 0):
         if accepts(name, team, options):

@@ -16,19 +16,19 @@ from robochoc.solver.filters import MAX_FILTER_BITS
 NARROW_CELLS = 65_536
 """No table on a narrow pseudo-tree has more entries."""
 FEW_ROBOTS = 12
-"""Up to so many, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
+"""Up to this number of robots, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
 MOST_IN_A_TREE = 30_000
-"""So many take half a minute in the simulator (docs/guides/large-teams.md)."""
+"""This many robots take half a minute in the simulator (docs/guides/large-teams.md)."""
 MANY_ROBOTS = 300
-"""With more, what SFB's messages tell of each robot adds up, and local search is all that ends with costs."""
+"""With more robots, SFB's messages grow too long, and with costs only local search ends in time."""
 MANY_COMBINATIONS = 100_000_000
-"""Up to so many combinations of all robots' values, `asym-pt-fb` takes seconds in the simulator."""
+"""Up to this many combinations of all robots' values, `asym-pt-fb` takes seconds in the simulator."""
 SPARSE = 8
 """The mean number of neighbours up to which a constraint graph is called sparse."""
 FEW_TO_BEGIN_ANEW = 25
-"""Up to so many robots `sfb` decides hard problems in the files' order, which a problem that changes keeps."""
+"""Up to this many robots, `sfb` decides hard problems in the files' order, which dynamic problems keep."""
 TIGHT = 0.7
-"""The constrainedness from which `sfb`, begun anew after each change, needs fewer messages than `dynabt`."""
+"""The constrainedness from which `sfb`, restarted after each change, needs fewer messages than `dynabt`."""
 LONG_ROW = 65_536
 """The values of all robots together up to which many partial assignments of SFB go into a message."""
 
@@ -37,7 +37,7 @@ FEW_LOSSES = 0.1
 
 
 class Condition(NamedTuple):
-    """What a rule asks of a team: whether it holds, and in words that it does, and that it does not."""
+    """A condition of a rule on a team: a predicate, and its wording when true and when false."""
 
     holds: Callable[[Facts], bool]
     text: str
@@ -140,7 +140,7 @@ RULES = (
                 f"a domain has more than {MAX_FILTER_BITS:,} values, too many for its filters",
             ),
         ),
-        "constraints are partially known: it takes them, and tells nobody a value",
+        "constraints are partially known: it supports them, and sends no value",
     ),
     Rule("abt", (PARTIAL,), "constraints are partially known, and it takes them"),
     Rule(
@@ -183,7 +183,7 @@ RULES = (
                 "domains are large",
             ),
         ),
-        "the problem changes and is hard: begun anew each time, it needs fewer messages than one that goes on",
+        "the problem changes and is hard: restarted each time, it needs fewer messages than a protocol that continues",
     ),
     Rule(
         "dynabt",

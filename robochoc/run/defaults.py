@@ -1,7 +1,7 @@
 """The protocols that are used unless another one is asked for."""
 
 AUTO = "auto"
-"""What stands for a protocol that is chosen for the team (`run/choice.py`). No protocol has this name."""
+"""Requests that a protocol is chosen for the team (`run/choice.py`). No protocol has this name."""
 DEFAULT_PROTOCOL = "abt"
 """For a problem without costs of which nothing else is known."""
 DEFAULT_COST_PROTOCOL = "sfb"

@@ -22,7 +22,7 @@ from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"
 STOPPED = "somebody has asked to stop"
-FOUND_NOTHING = "has come to its end, and all that it came by breaks a hard constraint"
+FOUND_NOTHING = "ended, and found no assignment that satisfies all hard constraints"
 
 
 class Deployment(ABC):
@@ -79,7 +79,7 @@ class Deployment(ABC):
 
     @property
     def unsettled(self) -> str:
-        """Return what kept the robots from finishing before a limit was reached, as far as it is known."""
+        """Return the reason why the robots did not finish before a limit was reached, as far as it is known."""
         return ""
 
     def solve(self, phase: Phase) -> PhaseAnswer:
@@ -124,11 +124,11 @@ class Deployment(ABC):
             return STOPPED
         if self.left_s() != 0:
             if options.messages is not None and sum(spent.messages.values()) >= options.messages:
-                return f"so many messages have been sent (--messages {options.messages})"
+                return f"the limit of messages was reached (--messages {options.messages})"
             if options.ncccs is not None and spent.ncccs >= options.ncccs:
-                return f"so many checks have been made one after the other (--ncccs {options.ncccs})"
+                return f"the limit of non-concurrent constraint checks was reached (--ncccs {options.ncccs})"
             if options.cycles is not None and spent.cycles >= options.cycles:
-                return f"so many cycles are over (--cycles {options.cycles})"
+                return f"the limit of cycles was reached (--cycles {options.cycles})"
         if options.deadline is not None:
             improve = "" if options.improve is None else f", --improve {options.improve:g}"
             return (

@@ -81,11 +81,12 @@ class PhaseAnswer(Answer):
 def evaluate_search(
     phase: Phase, search: Search, kind: ProblemKind, told: Callable[[float], Cost], deadline: float | None = None
 ) -> PhaseAnswer:
-    """Return the answer of a `search` in `phase`, for a problem of this `kind`; `told` tells a cost to the user.
+    """Return the answer of a `search` in `phase`, for a problem of this `kind`. `told` converts a cost to user units.
 
     A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
     protocol, and on whether it came to its end. A solution of a problem without costs needs no proof. Where a
-    `deadline` (in seconds) has ended the search, what is known by then is a solution if it breaks no hard constraint.
+    `deadline` (in seconds) has ended the search, the best known assignment is a solution if it
+    violates no hard constraint.
 
     Raises:
         RefutedError: when the check refutes what the protocol claims.
@@ -175,7 +176,7 @@ def is_proven(phase: Phase, result: RunResult) -> bool:
 
 @collection_paused()
 def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam) -> Answer | None:
-    """Return what a search has found, checked against every constraint of every file.
+    """Return the assignment that a search has found, checked against every constraint of every file.
 
     Args:
         phase: the phase of the search.

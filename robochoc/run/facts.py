@@ -18,14 +18,14 @@ _TWO = 2
 LARGE = 1_000_000
 """A table on a pseudo-tree with more entries is looked at no further."""
 DRAWS = 100
-"""So many combinations of values say how much a constraint forbids."""
+"""The number of sampled combinations of values that estimates a constraint's tightness."""
 Sizes = Mapping[str, int]
 """The number of values of each robot: the combinations that its neighbours see."""
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of a team before it searches.
+    """The properties of a team before the search.
 
     Attributes:
         team: The team with its scenario.

@@ -25,12 +25,12 @@ from robochoc.verification.checker import RefutedError
 PERIOD_S = 0.1
 """The shortest time between two snapshots. Where they take long, there are fewer: see `_SHARE`."""
 _SHARE = 10
-"""After a snapshot the search goes on for so many times as long as it took, at least."""
+"""After a snapshot the search continues for at least this many times the snapshot's duration."""
 _FOUND = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
 class Audience(Protocol):
-    """Observers that are told of each answer while a search goes on."""
+    """Observers that receive each answer during a search."""
 
     def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
         """Take in an answer that is better than all before in its epoch. The robots `withdrawn` do not fly.
@@ -189,7 +189,7 @@ class Improvements(SearchWatch):
         """Return the answer of the search, which has ended with `final`: that, or what is better of those before.
 
         It is published if nothing as good is, and the problem has not changed. If robots were `lost`, what was
-        published is no answer for the others.
+        published does not count for the others.
 
         Raises:
             RefutedError: when the protocol claims what an answer refutes.
@@ -224,7 +224,7 @@ class Improvements(SearchWatch):
         if best is None:
             return
         if final.verdict == Verdict.NO_SOLUTION:
-            raise RefutedError(f"the protocol says that there is no solution, and one ({best.cost}) was found")
+            raise RefutedError(f"the protocol claims that there is no solution, but one was found (cost {best.cost})")
         if final.verdict == Verdict.OPTIMAL and self._rank.of_answer(best) < self._rank.of_answer(final):
             raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
 
@@ -278,7 +278,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
 def _as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Options) -> RunResult:
     """Return `snapshot`, of which nothing is known but what can be checked where messages get lost.
 
-    Robots tell one after the other, so a message may be lost that none has missed yet.
+    Robots report one after the other, so a message may be lost that no robot has missed yet.
     """
     if not options.loss or phase.traits.bears_loss:
         return snapshot

@@ -1,4 +1,4 @@
-"""What is known of the least cost while a run goes on, from its events: the best so far, and a bound."""
+"""The known limits of the minimum cost during a run, from its events: the best cost so far, and a bound."""
 
 from __future__ import annotations
 

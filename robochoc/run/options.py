@@ -119,7 +119,7 @@ class Options:
         local: Limits on the compilation of each robot's domain.
         cache: Whether solutions of local problems are kept in the user's cache folder.
         count: Whether the central solver counts all solutions.
-        central_with: Which solver decides the merged problem, where there are no robots.
+        central_with: The solver of the merged problem, without robots.
         verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found; where
             OR-Tools is installed, it is asked as well.
         order: The total priority order of the robots, by name or as their names (None: that of the files).

@@ -146,7 +146,7 @@ def _solve_distributed(
 
 
 def _alternatives(team: Team, options: Options, *, complete: bool, costs: bool = False, narrow: bool = False) -> str:
-    """Return what would do instead. See `run/alternatives.py`."""
+    """Return the alternatives. See `run/alternatives.py`."""
     from robochoc.run.alternatives import alternatives  # noqa: PLC0415 - start-up: only refusals need it
 
     return alternatives(team, options, complete=complete, costs=costs, narrow=narrow)

@@ -23,5 +23,5 @@ def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, 
 
 
 def _finds_best_cycle(protocol: type[Protocol]) -> bool:
-    """Return whether robots can receive what is said of the best cycle."""
+    """Return whether robots can receive the messages about the best cycle."""
     return {*get_args(AnytimeMessage)} <= {*get_args(protocol.messages)}

@@ -1,4 +1,4 @@
-"""What a recording of a run begins with: its header, and what it weighs the robots' decisions by."""
+"""The beginning of a recording of a run: its header, and the objective for the robots' decisions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def objective_to_record(team: Team, options: Options) -> Callable[[], Objective] | None:
-    """Return what makes the objective of a run. None where nothing is minimised, or the problem changes."""
+    """Return the function that builds the objective of a run. None if nothing is minimised, or the problem changes."""
     minimum = options.withdraw == Withdrawal.MINIMUM
     if team.dynamic or not (minimum or team.kind == ProblemKind.DISWCSP):
         return None

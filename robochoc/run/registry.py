@@ -103,7 +103,7 @@ def protocol_named(name: str) -> type[Protocol]:
 
 
 def protocol_or_stage(name: str) -> type[Protocol]:
-    """Return what `protocol_named` does, or a protocol that cannot be asked for: `FIRST_FIT`, `PREPROCESSING`."""
+    """Return the protocol of that name, including the stages that users cannot choose: `FIRST_FIT`, `PREPROCESSING`."""
     return _STAGES[name] if name in _STAGES else protocol_named(name)
 
 
@@ -136,7 +136,7 @@ def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> InstalledProto
 def _fault(loaded: object) -> str:
     """Return why `loaded` cannot be used as a protocol; empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
-        return "is no subclass of Protocol"
+        return "is not a subclass of Protocol"
     # Methods of a compiled class are never marked as abstract.
     missing = {name for name in ("start", "receive") if getattr(loaded, name) is getattr(Protocol, name)}
     missing.update(getattr(loaded, "__abstractmethods__", ()))

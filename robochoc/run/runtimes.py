@@ -138,7 +138,7 @@ def open_simulator(request: SessionRequest) -> Session:
 
 
 def _losses_of(options: Options) -> Losses | None:
-    """Return what decides which messages are lost: by the option, or else by the channel model. None: none is."""
+    """Return the object that decides which messages are lost: by the option, or else by the channel model, or None."""
     from robochoc.communication.simulator.losses import Losses  # noqa: PLC0415 - one runtime is enough
 
     if options.message_loss or not options.loss or options.channel is None:

@@ -229,7 +229,7 @@ class ThisMachine(Deployment):
         )
 
     def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
-        """See `Deployment.concluded`. What was published for robots that are now lost is no answer."""
+        """See `Deployment.concluded`. Answers published for robots that are now lost do not count."""
         improvements = self._improvements
         return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
 

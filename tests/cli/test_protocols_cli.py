@@ -168,7 +168,7 @@ def test_what_is_broken_is_shown_with_its_reason() -> None:
             ("zz-half", "does not define receive"),
             ("zz-leaving", "cannot be imported: SystemExit: 3"),
             ("zz-garbled", "cannot be imported: SyntaxError"),
-            ("zz-number", "is no subclass of Protocol"),
+            ("zz-number", "is not a subclass of Protocol"),
             ("zz-odd", "traits that are no Traits"),
             ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
         ]:

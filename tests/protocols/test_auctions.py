@@ -203,7 +203,7 @@ def crews(able: int) -> Team:
 def test_other_teams_are_refused_with_the_reason(protocol: str) -> None:
     others = [(team_with(constraints), why) for constraints, why in OTHER_TEAMS] + [(crews(2), ""), (crews(3), "")]
     for team, why in others:
-        with pytest.raises(UnsupportedError, match="is no task allocation, and") as refused:
+        with pytest.raises(UnsupportedError, match="is not a task allocation, and") as refused:
             solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
         assert why in str(refused.value)
         assert "; these do: " in str(refused.value)

@@ -150,7 +150,7 @@ def test_where_no_cycle_is_a_solution_that_is_said_or_robots_withdraw() -> None:
     options = Options(protocol="maxsum", runtime=Runtime.SIMULATOR, settings={"cycles": "3"})
     outcome = solve(team, replace(options, protocol="dsa"))
     assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.reason == "dsa has come to its end, and all that it came by breaks a hard constraint"
+    assert outcome.reason == "dsa ended, and found no assignment that satisfies all hard constraints"
     outcome = solve(team, replace(options, withdraw=Withdrawal.MAXIMAL))
     assert outcome.verdict is Verdict.SOLUTION
     assert len(outcome.withdrawn) == 1

@@ -205,7 +205,7 @@ def test_no_protocol_begins_where_a_domain_becomes_empty() -> None:
 def test_a_limit_may_end_it() -> None:
     outcome = solve(random_csp(12, 4, 0.5, 0.4), replace(AC, protocol="abt", messages=3))
     assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.reason == "so many messages have been sent (--messages 3)"
+    assert outcome.reason == "the limit of messages was reached (--messages 3)"
 
 
 def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytest.MonkeyPatch) -> None:

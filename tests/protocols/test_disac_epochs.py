@@ -175,4 +175,4 @@ def test_its_journal_is_replayed(protocol: str, problems: int) -> None:
 def test_a_limit_ends_it_in_the_middle() -> None:
     outcome = solve(chain(LOOSER), replace(AC, protocol="abt", messages=3))
     assert outcome.epochs[0].verdict is Verdict.UNKNOWN
-    assert outcome.reason == "so many messages have been sent (--messages 3)"
+    assert outcome.reason == "the limit of messages was reached (--messages 3)"

@@ -10,7 +10,7 @@ from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Ru
 from robochoc.solver.encoding import UnsupportedError
 
 LEAST_SEED, LARGEST_SEED = -(2**63), 2**64 - 1
-"""Journals and robots on a network are told the seed in msgpack, whose integers are no longer."""
+"""Journals and robots on a network receive the seed in msgpack, whose integers are at most this long."""
 
 
 class OptionRule(NamedTuple):
@@ -65,7 +65,7 @@ OPTION_RULES = (
     OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
     OptionRule(
         lambda o: o.loss and (o.runtime == Runtime.ARRAYS or o.preprocess or o.wants_anytime),
-        "--message-loss goes with no --runtime arrays, --preprocess or --set anytime=yes",
+        "--message-loss cannot be used with --runtime arrays, --preprocess or --set anytime=yes",
     ),
     OptionRule(
         lambda o: o.ncccs is not None and o.runtime != Runtime.SIMULATOR,
@@ -173,7 +173,7 @@ ENVIRONMENT_RULES = (
 PRIVATE_RULES = (
     OptionRule(
         lambda o: o.deadline,
-        "--deadline counts what was checked by then, and --private hides the values that would be checked",
+        "--deadline uses checked values, and --private hides the values that would be checked",
         "--timeout",
     ),
 )

@@ -210,10 +210,10 @@ def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
         if unmet:
             raise UnfitProtocolError(f"{unmet}, which {name} does not support")
     if traits.allocates and (fault := allocation_fault(team, congestion=traits.congestion)):
-        raise UnfitProtocolError(f"{team.name} is no task allocation, and {name} takes nothing else: {fault}")
+        raise UnfitProtocolError(f"{team.name} is not a task allocation, and {name} accepts nothing else: {fault}")
 
 
 def max_total(team: Team, options: Options) -> float:
-    """Return what all costs of `team` could add up to; withdrawal costs are included where robots may withdraw."""
+    """Return the maximum sum of all costs of `team`; withdrawal costs are included if robots may withdraw."""
     times = sum(robot.weight for robot in team.robots) + 1 if options.withdraw is not None else 1
     return withdrawal_cost(team) * times

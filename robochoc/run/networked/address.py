@@ -15,7 +15,7 @@ _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
 class AddressError(ValueError):
-    """A text that is no address of a master."""
+    """A text that is not the address of a master."""
 
 
 class Address(NamedTuple):
@@ -43,7 +43,7 @@ class Address(NamedTuple):
 
     @property
     def anywhere(self) -> bool:
-        """Return whether this stands for all addresses of a machine. Robots cannot connect to such an address."""
+        """Return whether this means all addresses of a machine. Robots cannot connect to such an address."""
         try:
             return ipaddress.ip_address(self.host).is_unspecified
         except ValueError:

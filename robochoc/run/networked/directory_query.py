@@ -68,7 +68,7 @@ def search_request(place: Address, slots: Sequence[str], at_most: int | None = N
 
 
 def query_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:
-    """Return what the directory answers to `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
+    """Return the directory's answer to the request `words`, in SL0. Raises `CannotConnectError` and `NoAnswerError`."""
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
         return _Query(place, identity, transport).ask(words, Performative.INFORM)
 

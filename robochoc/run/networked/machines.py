@@ -132,7 +132,7 @@ class Machines(Deployment):
     # Answers while the robots search
 
     def _watch(self, phase: Phase) -> Improvements:
-        """Return what keeps the best answer of a search, and publishes it from the deadline on."""
+        """Return the object that stores the best answer of a search, and publishes it from the deadline on."""
         team = registered_team(self._master, self._name)
         options, audience = self.options, self._audience
         self._snapshot = self._kept = NO_SNAPSHOT
@@ -162,7 +162,7 @@ class Machines(Deployment):
         )
 
     def _check_snapshot(self, phase: Phase, snapshot: RunResult) -> Answer | None:
-        """Return what the robots had at a snapshot, which all of them have checked; None if something is against it.
+        """Return the robots' assignment at a snapshot, which all of them have checked; None if a check fails.
 
         Raises:
             RefutedError: when robots contradict each other.
@@ -275,7 +275,7 @@ def registered_team(master: Master, name: str) -> Team:
 def claimed(outcome: Outcome) -> Outcome:
     """Return `outcome` with the robots on whose word it rests (docs/guides/security.md, "One traitor").
 
-    One robot says that there is no solution. That none costs less, or what was not reported, rests on all of them.
+    `no-solution` is the claim of one robot. Optimality, and unreported values, rest on all robots.
     """
     by: str | None = None
     match outcome.verdict:

@@ -192,7 +192,7 @@ def _run(
     observers: tuple[Observer | None, Audience | None],
     concluded: Callable[[Outcome | None], None],
 ) -> MasterResult:
-    """Let the robots solve their problem, once the master listens, and tell them the outcome."""
+    """Let the robots solve their problem, once the master listens, and send them the outcome."""
     try:
         led = _solve(plan, master, *observers)
     except BaseException as error:

@@ -73,7 +73,7 @@ def test_a_local_search_takes_a_cycle_for_each_round_of_messages() -> None:
 def test_a_limit_on_cycles_is_exact(limit: int) -> None:
     found = solve(queens3d(4), replace(IN_STEP, cycles=limit))
     assert (found.verdict, found.metrics.cycles) == (Verdict.UNKNOWN, limit)
-    assert found.reason == f"so many cycles are over (--cycles {limit})"
+    assert found.reason == f"the limit of cycles was reached (--cycles {limit})"
 
 
 def test_a_limit_that_suffices_changes_nothing() -> None:
@@ -92,7 +92,7 @@ def test_a_limit_on_ncccs_ends_the_step_in_which_it_is_reached(schedule: Schedul
     events: list[AnyEvent] = []
     found = solve(queens3d(4), replace(IN_STEP, schedule=schedule, ncccs=20), observer=events.append)
     assert found.verdict is Verdict.UNKNOWN
-    assert found.reason == "so many checks have been made one after the other (--ncccs 20)"
+    assert found.reason == "the limit of non-concurrent constraint checks was reached (--ncccs 20)"
     assert 20 <= found.metrics.ncccs < solve(queens3d(4), replace(IN_STEP, schedule=schedule)).metrics.ncccs
 
 
@@ -106,7 +106,7 @@ def test_limits_are_on_all_epochs_together() -> None:
     cut = solve(team, replace(options, cycles=limit))
     assert cut.verdict is Verdict.UNKNOWN
     assert cut.metrics.cycles == limit
-    assert cut.reason == f"so many cycles are over (--cycles {limit})"
+    assert cut.reason == f"the limit of cycles was reached (--cycles {limit})"
 
 
 @looped("seed", range(20))

@@ -46,7 +46,7 @@ def named(refusal: str) -> list[str]:
 def test_whoever_is_named_takes_costs_that_tables_do_not_hold(name: str, withdraw: Withdrawal | None) -> None:
     team = costly_team(EXACT)
     said = refusal_of(team, options_for(name, withdraw))
-    assert "costs could add up to 2^53 or more" in said
+    assert "costs may add up to 2^53 or more" in said
     assert len(named(said)) == MOST_NAMED
     assert not {"dpop", "sfb"} & set(named(said))
     for other in named(said):

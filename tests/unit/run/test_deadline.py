@@ -118,7 +118,7 @@ def test_before_all_events_a_limit_on_messages_decides_nothing_either() -> None:
     outcome = solve(replace(team, scenario=(event,)), options)
     assert [epoch.verdict for epoch in outcome.epochs] == [Verdict.SOLUTION]
     assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
-    assert outcome.reason == "so many messages have been sent (--messages 600), and 1 event had not happened"
+    assert outcome.reason == "the limit of messages was reached (--messages 600), and 1 event had not happened"
 
 
 def test_who_is_done_before_has_the_same_answer_as_without_a_deadline() -> None:
@@ -134,7 +134,7 @@ def test_a_limit_on_messages_is_none_on_time() -> None:
     options = Options(protocol="syncbb", runtime=Runtime.SIMULATOR, deadline=3600, messages=3000)
     outcome = solve(hard_to_prove(), options)
     assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
-    assert outcome.reason == "so many messages have been sent (--messages 3000)"
+    assert outcome.reason == "the limit of messages was reached (--messages 3000)"
 
 
 def test_it_is_given_instead_of_a_timeout_and_to_robots() -> None:

@@ -141,10 +141,10 @@ def test_all_are_lost() -> None:
 
 def test_why_there_is_no_verdict() -> None:
     for options, result, reason in [
-        (Options(messages=2), BROKEN_OFF, "so many messages have been sent (--messages 2)"),
+        (Options(messages=2), BROKEN_OFF, "the limit of messages was reached (--messages 2)"),
         (Options(timeout=1.5, messages=3), BROKEN_OFF, "the time was over (--timeout 1.5)"),
         (Options(), replace(BROKEN_OFF, witness="C"), "C gave up, as its protocol has it"),
-        (Options(protocol="dsa"), SOLVED, "dsa has come to its end, and all that it came by breaks a hard constraint"),
+        (Options(protocol="dsa"), SOLVED, "dsa ended, and found no assignment that satisfies all hard constraints"),
     ]:
         outcome = solve_distributed(MadeUp(options, [result]), DSA if options.protocol == "dsa" else ABT, HEADER)
         assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, reason)

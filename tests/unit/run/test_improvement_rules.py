@@ -111,7 +111,7 @@ def test_who_ends_before_the_deadline_has_published_once_and_improved_nothing(be
 
 def test_a_limit_before_the_deadline_decides_nothing(bench: Bench) -> None:
     bench.tick(0.5, answer(5))
-    unknown = PhaseAnswer(Verdict.UNKNOWN, reason="so many messages have been sent (--messages 3)")
+    unknown = PhaseAnswer(Verdict.UNKNOWN, reason="the limit of messages was reached (--messages 3)")
     assert bench.made.concluded(unknown, lost=False) == unknown
     assert bench.published == []
 
@@ -126,7 +126,7 @@ def test_a_protocol_that_an_answer_refutes_is_not_believed(monkeypatch: pytest.M
     for claim in (PhaseAnswer(Verdict.NO_SOLUTION), answer(6, Verdict.OPTIMAL)):
         bench = Bench(monkeypatch)
         bench.tick(1.0, answer(5))
-        with pytest.raises(RefutedError, match=r"5\)? was found"):
+        with pytest.raises(RefutedError, match="5"):
             bench.made.concluded(claim, lost=False)
 
 

@@ -56,7 +56,7 @@ def test_a_limit_on_messages_ends_the_run_after_a_cycle() -> None:
     assert result.verdict is Verdict.UNKNOWN
     assert result.metrics.messages == {"Value": 6}
     found = solve(team, replace(ARRAYS, messages=5))
-    assert (found.verdict, found.reason) == (Verdict.UNKNOWN, "so many messages have been sent (--messages 5)")
+    assert (found.verdict, found.reason) == (Verdict.UNKNOWN, "the limit of messages was reached (--messages 5)")
 
 
 def test_a_limit_on_time_ends_the_run() -> None:
