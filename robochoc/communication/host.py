@@ -93,7 +93,7 @@ class Host:
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0
-        self.said_at: list[int] = []
+        self.checks_at_send: list[int] = []
         """The value of `checks` at each message of the last step."""
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
@@ -282,8 +282,8 @@ class Host:
         """Count the checks of a finished step, and return its messages in envelopes."""
         self._tick()
         protocol = self.protocol
-        self.said_at = protocol.said_at
-        envelopes = self._envelopes() if self.said_at else []
+        self.checks_at_send = protocol.checks_at_send
+        envelopes = self._envelopes() if self.checks_at_send else []
         self._step_began = self.counted
         if self._observer:
             self._report_state(self._observer)
@@ -295,7 +295,9 @@ class Host:
         found = []
         last: Message | None = None
         content, kind = b"", ""
-        for (receiver, message), clock, checks in zip(self.protocol.outbox, self._stamps, self.said_at, strict=True):
+        for (receiver, message), clock, checks in zip(
+            self.protocol.outbox, self._stamps, self.checks_at_send, strict=True
+        ):
             if message is not last:
                 last, content, kind = message, encode(message), type(message).__name__
                 self.largest = max(self.largest, len(content))
@@ -324,12 +326,12 @@ class Host:
     def _tick(self) -> None:
         """Advance the clock by one for each new check, and stamp the messages written since the last call."""
         protocol = self.protocol
-        stamps, said_at = self._stamps, protocol.said_at
+        stamps, checks_at_send = self._stamps, protocol.checks_at_send
         checks = protocol.problem.checks
         self._answers = answered = len(stamps)
-        if len(said_at) > answered:
+        if len(checks_at_send) > answered:
             before = self.clock - self.counted
-            stamps += [before + done for done in said_at[answered:]]
+            stamps += [before + done for done in checks_at_send[answered:]]
         if checks != self.counted:
             self.clock += checks - self.counted
             self.counted = checks
@@ -340,7 +342,7 @@ class Host:
 
     def _forget_said(self) -> None:
         self.protocol.outbox.clear()
-        self.protocol.said_at = []
+        self.protocol.checks_at_send = []
         self._stamps.clear()
 
     def _report_state(self, observer: Observer) -> None:

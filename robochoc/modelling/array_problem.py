@@ -23,7 +23,7 @@ from robochoc.communication.arrays.layout import Layout
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.message import encode
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
 from robochoc.run.option_values import texts_by_name
 from robochoc.run.options import Options
@@ -160,7 +160,7 @@ class ArrayProblem:
         form = array_run_for(kind)
         if not issubclass(kind, CycleProtocol):
             raise UnsupportedError(f"{options.protocol} does not work in cycles")
-        known = settings_of(kind, options.settings)
+        known = read_settings(kind, options.settings)
         chosen = known if isinstance(known, type(kind.settings)) else kind.settings
         return form(self.layout, chosen, options.seed, clocks=ncccs)
 

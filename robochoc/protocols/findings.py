@@ -54,4 +54,4 @@ class Findings(msgspec.Struct, frozen=True):
     listing: Listing | None = None
 
 
-NOTHING = Findings()
+NO_FINDINGS = Findings()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, MutableSequence
 from typing import Any, ClassVar
 
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.findings import NOTHING, Findings, Incumbent
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Incumbent
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import NO_SETTINGS, Settings
@@ -46,7 +46,7 @@ class Protocol(ABC):
         self.order = order
         self.outbox: list[tuple[str, Message]] = []
         """Receivers and messages."""
-        self.said_at: list[int] = []
+        self.checks_at_send: list[int] = []
         """For each message in the outbox: `problem.checks` at the time of sending. The host computes the message's
         clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
         self.value: int | None = None
@@ -80,7 +80,7 @@ class Protocol(ABC):
         # A replay has its own kind of list: for a `list`, mypyc would not call its `append`.
         outbox: MutableSequence[tuple[str, Message]] = self.outbox
         outbox.append((receiver, message))
-        self.said_at.append(self.problem.checks)
+        self.checks_at_send.append(self.problem.checks)
 
     def conclude(self, verdict: Verdict) -> None:
         """End the search of the whole team with `verdict`.
@@ -106,7 +106,7 @@ class Protocol(ABC):
     @property
     def findings(self) -> Findings:
         """This robot's knowledge of the whole search besides its own value. May be read at any time."""
-        return NOTHING
+        return NO_FINDINGS
 
     # Optional: what a replay shows of the state (`replay/inspection.py`), which finds agent views, nogood stores,
     # contexts and partial assignments by itself. None of these may check constraints or change the state.

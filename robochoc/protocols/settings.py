@@ -43,10 +43,10 @@ def equip(protocol: HasSettings, given: Mapping[str, str]) -> None:
     """Give one robot's protocol the settings that are `given`. Raises `SettingsError`."""
     if given:
         # For mypyc settings belong to the class, not to its objects. Protocols with settings are not compiled.
-        setattr(protocol, "settings", settings_of(type(protocol), given))  # noqa: B010
+        setattr(protocol, "settings", read_settings(type(protocol), given))  # noqa: B010
 
 
-def settings_of(protocol: type[HasSettings], given: Mapping[str, str]) -> Settings:
+def read_settings(protocol: type[HasSettings], given: Mapping[str, str]) -> Settings:
     """Return the settings of `protocol`: the `given` ones, and defaults for the others. Raises `SettingsError`."""
     known = type(cast("Settings", protocol.settings))
     names = known.__struct_fields__

@@ -34,7 +34,19 @@ ALWAYS = "what holds whatever the others take"
 VIEWS = ("view", "cpa", "path", "assignments", "context")
 """Attributes in which protocols keep what they know of others' values."""
 _KNOWN = {
-    *("problem", "order", "outbox", "said_at", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed")
+    *(
+        "problem",
+        "order",
+        "outbox",
+        "checks_at_send",
+        "value",
+        "verdict",
+        "chance",
+        "settings",
+        "store",
+        "nogoods",
+        "allowed",
+    )
 }
 """Attributes that are shown elsewhere, or say nothing."""
 

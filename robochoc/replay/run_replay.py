@@ -116,7 +116,7 @@ class RunReplay:
         host.observe(events.append, lambda: 0.0)
         recorded = sum(isinstance(event, Sent) for event in step.done)
         host.protocol.outbox = _Outbox(recorded + MAX_EXTRA_MESSAGES, listener)
-        host.protocol.said_at.clear()
+        host.protocol.checks_at_send.clear()
         self.taken_in = []
         sent: Sequence[Envelope] = ()
         packet: list[Sent] = []

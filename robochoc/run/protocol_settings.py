@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import get_args
 
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings
 from robochoc.solver.encoding import UnsupportedError
@@ -15,7 +15,7 @@ from robochoc.solver.encoding import UnsupportedError
 def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, str]) -> None:
     """Raise `UnsupportedError` for `settings` that the protocol called `name` does not have, or does not accept."""
     try:
-        known = settings_of(protocol, settings)
+        known = read_settings(protocol, settings)
     except SettingsError as wrong:
         raise UnsupportedError(f"--set: {wrong} (protocol {name})") from None
     if isinstance(known, CycleSettings) and known.anytime == "yes" and not _finds_best_cycle(protocol):

@@ -13,7 +13,7 @@ from robochoc.communication.network.members import Members
 from robochoc.communication.network.searcher import SnapshotValues, values_for_recall
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint
-from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Incumbent, Trail
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.agents import robot_of
@@ -48,7 +48,7 @@ class Round:
         sent, self.sent = [word for name, word in self.sent if name == "RB"], []
         return sent
 
-    def tell(self, number: int, have: dict[str, dict[str, int]], findings: Findings = NOTHING) -> None:
+    def tell(self, number: int, have: dict[str, dict[str, int]], findings: Findings = NO_FINDINGS) -> None:
         for name in ROBOTS:
             assert not self.state.handle(name, Snapshot(1, number, have[name], 0, findings))
 

@@ -15,7 +15,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.findings import NO_FINDINGS
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -155,7 +155,7 @@ def test_a_private_run_tells_no_values() -> None:
     result, _ = run_over_network(CHAIN, "abt", NetworkSettings(private=True))
     assert result.verdict is Verdict.SOLUTION
     assert not any(result.assignments.values())
-    assert all(findings == NOTHING for findings in result.findings.values())
+    assert all(findings == NO_FINDINGS for findings in result.findings.values())
 
 
 def test_what_the_robots_check_is_what_the_checker_checks() -> None:

@@ -9,7 +9,7 @@ from robochoc.communication.control import Counters, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import DetailedReport, Exchanged
 from robochoc.model.outcome import Metrics, PseudoTreeNode
-from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Incumbent, Trail
 from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.traits import Traits
@@ -120,7 +120,7 @@ def reported(kind: str = "Ok", checks: int = 0, **exchanged: Exchanged) -> Detai
         1,
         {},
         Metrics({kind: sent}, sent, 0, checks, largest=min(sent, 1)),
-        NOTHING,
+        NO_FINDINGS,
         assigned=False,
         exchanged=exchanged,
     )

@@ -6,7 +6,7 @@ from robochoc.communication.control import Conclusion, Counters, EpochMessage, R
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, ProtocolMessage
 from robochoc.model.outcome import Metrics, Verdict
-from robochoc.protocols.findings import NOTHING, Findings
+from robochoc.protocols.findings import NO_FINDINGS, Findings
 from tests.support.cases import looped
 
 ROBOTS = ("R1", "R2", "R3")
@@ -17,7 +17,7 @@ def account(epoch: int = 1, values: dict[str, int] | None = None, to: str = "R3"
     sent = spent.pop("ok", 0)
     exchanged = {to: Exchanged(sent)} if sent else {}
     return DetailedReport(
-        epoch, values or {}, Metrics(messages={"Ok": sent}, **spent), NOTHING, bool(values), exchanged
+        epoch, values or {}, Metrics(messages={"Ok": sent}, **spent), NO_FINDINGS, bool(values), exchanged
     )
 
 
@@ -49,7 +49,7 @@ def test_nothing_is_awaited_before_the_first_search() -> None:
     state = AuditedSearchState()
     assert state.ready
     assert not state.handle("R1", Ready(0))
-    assert not state.handle("R1", DetailedReport(0, {"X": 1}, Metrics(), NOTHING, assigned=True))
+    assert not state.handle("R1", DetailedReport(0, {"X": 1}, Metrics(), NO_FINDINGS, assigned=True))
     assert state.result(0).verdict is Verdict.UNKNOWN
     assert not state.assigned
 

@@ -29,7 +29,7 @@ from robochoc.communication.robot_loop import EVENTS_AT_ONCE
 from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Received
 from robochoc.model.problem import INFINITE, Constraint, Team
-from robochoc.protocols.findings import NOTHING, Trail
+from robochoc.protocols.findings import NO_FINDINGS, Trail
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.message import Envelope, encode
 from robochoc.protocols.optimization.syncbb import BestPath, Path, SyncBB
@@ -207,7 +207,7 @@ def test_who_never_was_ready_reports_all_the_same() -> None:
     one.pause()
     (account,) = around.said
     assert isinstance(account, DetailedReport)
-    assert (account.assigned, account.assignment, account.findings) == (False, {}, NOTHING)
+    assert (account.assigned, account.assignment, account.findings) == (False, {}, NO_FINDINGS)
 
 
 def test_in_a_private_run_values_stay_at_home() -> None:
@@ -301,7 +301,7 @@ def test_costs_that_another_has_made_up_are_not_passed_on() -> None:
     best = BestPath(-5, ((1,), (2,), (1,)))
     one.receive([Envelope("RA", "RB", encode(Path([((1,), 0)], best)), 0)])
     one.pause()
-    assert believed(around).findings == NOTHING
+    assert believed(around).findings == NO_FINDINGS
 
 
 def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.anytime import Anytime, Best, BreadthFirstTree, Paid, Place, Step
 from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run import Options, Runtime, solve
@@ -193,7 +193,7 @@ def test_a_robot_remembers_twice_the_height_and_a_few(monkeypatch: pytest.Monkey
 def robot(cycles: str = "3", **settings: str) -> DSA:
     """X01 between X00, the root, and X02."""
     it = robot_of(DSA, path(3), "X01".replace("X", "RX"))
-    it.settings = settings_of(DSA, {"cycles": cycles, "anytime": "yes", **settings})  # type: ignore[assignment, misc]
+    it.settings = read_settings(DSA, {"cycles": cycles, "anytime": "yes", **settings})  # type: ignore[assignment, misc]
     started(it)
     return it
 
@@ -264,7 +264,7 @@ def test_if_all_steps_break_something_the_last_values_stay() -> None:
 )
 def test_who_cannot_refuses_the_setting(protocol: str, value: str, why: str) -> None:
     with pytest.raises(SettingsError, match=why):
-        settings_of(protocol_named(protocol), {"anytime": value})
+        read_settings(protocol_named(protocol), {"anytime": value})
 
 
 def test_arrays_refuse_it() -> None:

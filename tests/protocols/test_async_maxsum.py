@@ -12,7 +12,7 @@ from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.inference.async_maxsum import AsyncMaxSum, AsyncMaxSumSettings, Q, R
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import after, assert_refused, replies, robot_of, started, value
@@ -138,4 +138,4 @@ def test_on_any_graph_it_falls_silent_and_what_is_proven_is_true(teams: int) -> 
 )
 def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: str) -> None:
     with pytest.raises(SettingsError, match=rule):
-        settings_of(AsyncMaxSum, {name: given})
+        read_settings(AsyncMaxSum, {name: given})

@@ -20,7 +20,7 @@ from robochoc.protocols.local_search.cocoa import CoCoA
 from robochoc.protocols.local_search.d_gibbs import DGibbs
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_known
@@ -75,7 +75,7 @@ def test_the_trail_has_an_entry_for_each_change_and_after_so_many_cycles_a_robot
         replies(robot, ("RA", Value((value,))))
     assert robot.findings.trail == Trail([(0, 0), (1, 1), (4, 0)], 4)
     robot = robot_of(DSA, chain(names="AB"), "RB")
-    robot.settings = settings_of(DSA, {"cycles": "2"})  # type: ignore[assignment, misc]
+    robot.settings = read_settings(DSA, {"cycles": "2"})  # type: ignore[assignment, misc]
     started(robot)
     assert replies(robot, ("RA", Value((1,))))
     assert replies(robot, ("RA", Value((2,)))) == []
@@ -162,7 +162,7 @@ def test_there_is_at_least_one_cycle_and_unconnected_parts_of_the_team_end_with_
 ) -> None:
     for cycles, why in (("0", "cycles is 0; it must be 1 or more"), ("-1", "cycles is -1; it must be 1"), ("x", "int")):
         with pytest.raises(SettingsError, match=why):
-            settings_of(protocol, {"cycles": cycles})
+            read_settings(protocol, {"cycles": cycles})
     result = played(chain(), protocol, Concurrent(0), cycles=7)
     assert {found.trail.cycle for found in result.findings.values() if found.trail} == {7}
 

@@ -11,7 +11,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.local_search.d_gibbs import DGibbs, DGibbsSettings, Difference, Finish, Value
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.run.incumbent import costs_by_cycle
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -146,4 +146,4 @@ def test_a_cycle_takes_two_messages_for_each_link_and_one_for_each_child(teams: 
 def test_settings_that_cannot_be_are_refused(setting: str) -> None:
     name, number = setting.split("=")
     with pytest.raises(SettingsError, match="it must be"):
-        settings_of(DGibbs, {name: number})
+        read_settings(DGibbs, {name: number})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa_sdp import DSASDP
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
@@ -16,7 +16,7 @@ def robot(now: float, other: float, *chances: float, **settings: str) -> DSASDP:
     relation = Relation("T", 2, Semantics.SOFT, ((1, 1), (2, 1)), (now, other))
     team = team_of({"A": (1, 2), "B": (1,)}, [Constraint("C", relation, ("A", "B"), ("A", "B"))])
     it = robot_of(DSASDP, team, "RA", 0.0, *chances)
-    it.settings = settings_of(DSASDP, settings)  # type: ignore[assignment, misc]
+    it.settings = read_settings(DSASDP, settings)  # type: ignore[assignment, misc]
     started(it)
     return it
 

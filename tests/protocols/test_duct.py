@@ -22,7 +22,7 @@ from robochoc.protocols.local_search.duct import (
     Separator,
 )
 from robochoc.protocols.message import Message
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.wording import Wording
 from robochoc.solver.compiled import LexicographicCost
 from tests.support.agents import replies, value
@@ -41,7 +41,7 @@ def robot(name: str, **settings: float | str) -> DUCT:
     """One of A, B and C on a branch; its children have told their separators, and what it said is gone."""
     parent, children = {"A": (None, ["RB"]), "B": ("RA", ["RC"]), "C": ("RB", [])}[name]
     made = placed(DUCT, priced("ABC", PRICES), f"R{name}", parent, children=children)
-    made.settings = settings_of(DUCT, {key: str(number) for key, number in settings.items()})  # type: ignore[misc, assignment]
+    made.settings = read_settings(DUCT, {key: str(number) for key, number in settings.items()})  # type: ignore[misc, assignment]
     made.outbox.clear()
     return made
 
@@ -118,7 +118,7 @@ def test_values_are_compared_by_the_mean_or_by_the_best(by: str, chosen: int) ->
     for cost in (0, 10):
         made.add(0, (0, cost), [cost])
         made.add(1, (0, 4), [4] if cost else [5])
-    settings = settings_of(DUCT, {"by": by, "bound": "0"})
+    settings = read_settings(DUCT, {"by": by, "bound": "0"})
     assert isinstance(settings, DUCTSettings)
     made.add(0, (0, 10), [0])
     assert made.next(settings) == chosen

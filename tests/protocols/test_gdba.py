@@ -10,7 +10,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.gdba import GDBA, MOST, Improve
 from robochoc.protocols.local_search.mgm import MGM
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
@@ -33,7 +33,7 @@ def pair(relation: Relation = TABLE) -> Team:
 def robot(team: Team, **settings: str) -> GDBA:
     """A, which begins with the value 1."""
     it = robot_of(GDBA, team, "RA", 0.0)
-    it.settings = settings_of(GDBA, settings)  # type: ignore[assignment, misc]
+    it.settings = read_settings(GDBA, settings)  # type: ignore[assignment, misc]
     started(it)
     return it
 

@@ -7,7 +7,7 @@ from random import Random
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.mixed_dsa import MixedDSA
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
@@ -22,7 +22,7 @@ def moves(now: float, other: float, chance: float, variant: str) -> bool:
     relation = Relation("T", 2, Semantics.SOFT, ((1, 1), (2, 1)), (now, other))
     team = team_of({"A": (1, 2), "B": (1,)}, [Constraint("C", relation, ("A", "B"), ("A", "B"))])
     it = robot_of(MixedDSA, team, "RA", 0.0, chance)
-    it.settings = settings_of(MixedDSA, {"variant": variant, "hard": "0.6", "soft": "0.3"})  # type: ignore[assignment, misc]
+    it.settings = read_settings(MixedDSA, {"variant": variant, "hard": "0.6", "soft": "0.3"})  # type: ignore[assignment, misc]
     started(it)
     replies(it, ("RB", Value((1,))))
     return value(it) == (2,)

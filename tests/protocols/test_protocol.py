@@ -82,7 +82,7 @@ def test_a_message_carries_the_checks_that_were_done_when_it_was_sent() -> None:
     robot.problem.checks += 3
     robot.send("RA", AddLink())
     assert robot.outbox == [("RA", AddLink()), ("RA", AddLink())]
-    assert robot.said_at == [0, 3]
+    assert robot.checks_at_send == [0, 3]
 
 
 def test_a_robot_without_a_value_has_no_assignment_and_nothing_to_tell() -> None:

@@ -10,7 +10,7 @@ from random import Random
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.local_search.regret_matching import UNIT, RegretMatching
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
@@ -29,7 +29,7 @@ def robot(costs: tuple[tuple[float, ...], ...], *chances: float, **settings: str
     relation = Relation("T", 2, Semantics.SOFT, pairs, tuple(itertools.chain.from_iterable(costs)))
     team = team_of({"A": values, "B": B_SAYS}, [Constraint("C", relation, ("A", "B"), ("A", "B"))])
     it = robot_of(RegretMatching, team, "RA", 0.0, *chances)
-    it.settings = settings_of(RegretMatching, settings)  # type: ignore[assignment, misc]
+    it.settings = read_settings(RegretMatching, settings)  # type: ignore[assignment, misc]
     started(it)
     return it
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.run.registry import protocol_named
 from tests.support.cases import looped
 
@@ -53,5 +53,5 @@ PART, POSITIVE_PART = "it must be from 0 to 1", "it must be more than 0 and at m
 def test_a_setting_outside_its_range_is_refused(protocol: str, setting: str, values: str, rule: str) -> None:
     for value in values.split():
         with pytest.raises(SettingsError, match=rule) as refused:
-            settings_of(protocol_named(protocol), {setting: value})
+            read_settings(protocol_named(protocol), {setting: value})
         assert setting in str(refused.value), value

@@ -13,7 +13,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.findings import NO_FINDINGS
 from robochoc.protocols.message import Message, encode
 from robochoc.protocols.optimization.run_lengths import expanded
 from robochoc.protocols.optimization.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
@@ -312,7 +312,7 @@ def test_costs_that_floats_do_not_hold_exactly_are_refused() -> None:
 
 
 def test_before_anything_is_known_there_is_nothing_to_tell() -> None:
-    assert agents(team(CHAIN))["RA"].findings == NOTHING
+    assert agents(team(CHAIN))["RA"].findings == NO_FINDINGS
 
 
 def test_the_first_robot_tells_the_least_bound_of_what_is_not_explored() -> None:

@@ -19,7 +19,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -55,7 +55,7 @@ class ArraysRun(Session):
         self._progress = progress
         form = array_run_for(protocol)
         assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
-        given = settings_of(protocol, parameters.settings)
+        given = read_settings(protocol, parameters.settings)
         settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
         self._layout = _laid_out(Epoch(self.compiled, parameters=parameters).parts(protocol))
         self._run = form(self._layout, settings, parameters.seed, changes=True)

@@ -37,7 +37,7 @@ from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
 from robochoc.model.outcome import Metrics
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
-from robochoc.protocols.findings import NOTHING, Findings, Trail
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Trail
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
@@ -236,7 +236,7 @@ class Searcher(RobotLoop):
 
     def _report_end(self) -> None:
         if self._host is None:  # the constraints of a child have not arrived, and may never arrive
-            self._context.send_to_master(DetailedReport(self.epoch, {}, Metrics(), NOTHING, assigned=False))
+            self._context.send_to_master(DetailedReport(self.epoch, {}, Metrics(), NO_FINDINGS, assigned=False))
             return
         metrics = self._host.metrics()
         metrics = replace(metrics, ncccs=min(metrics.ncccs, LATEST), memory=own_memory())
@@ -246,7 +246,7 @@ class Searcher(RobotLoop):
 
     def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
         """See `RobotLoop`. Nothing in private runs."""
-        return ({}, NOTHING) if self._context.private else (host.protocol.assignment, self._findings(host.protocol))
+        return ({}, NO_FINDINGS) if self._context.private else (host.protocol.assignment, self._findings(host.protocol))
 
     def _findings(self, protocol: Protocol) -> Findings:
         """Return the findings; nothing if one that comes from other robots is invalid.
@@ -257,7 +257,7 @@ class Searcher(RobotLoop):
         findings = protocol.findings
         if findings.trail is not None and self._snapshot_values.is_used:
             findings = msgspec.structs.replace(findings, trail=Trail([], findings.trail.cycle))
-        return NOTHING if fault_of_findings(findings, self._task.order) else findings
+        return NO_FINDINGS if fault_of_findings(findings, self._task.order) else findings
 
     def _exchanged(self) -> dict[str, Exchanged]:
         """Return the counts of messages with each other robot."""
@@ -275,7 +275,7 @@ class Searcher(RobotLoop):
         private = self._context.private
         values = {} if private else values_for_recall(order, host.protocol, self._own.domain)
         self._snapshot_values.note(order.number, values)
-        findings = NOTHING if private else self._findings(host.protocol)
+        findings = NO_FINDINGS if private else self._findings(host.protocol)
         lost = 0 if host.dropper is None else host.dropper.count
         self._send_to_master(Snapshot(self.epoch, order.number, values, lost, findings))
 

@@ -274,7 +274,7 @@ class Simulation(Session):
         if envelopes:
             self._sent += len(envelopes)
             losses = self._losses
-            for envelope, checks in zip(envelopes, host.said_at, strict=True):
+            for envelope, checks in zip(envelopes, host.checks_at_send, strict=True):
                 if losses is not None and losses.loses(envelope):
                     schedule.lose(envelope, checks - before)
                 else:

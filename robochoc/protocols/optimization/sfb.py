@@ -57,7 +57,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, assert_never, cast
 
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.findings import NOTHING, Findings, Incumbent
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Incumbent
 from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.run_lengths import expanded, fits
 from robochoc.protocols.optimization.sfb_bits import ForwardBits
@@ -561,7 +561,7 @@ class SFB(Protocol):
     def findings(self) -> Findings:
         """The best known solution; for the first robot also the minimum lower bound of all unexplored CPAs."""
         if not self.ceiling:
-            return NOTHING
+            return NO_FINDINGS
         bound = None
         if self.previous is None:
             left = [batch.bound for batch in self.batches if batch.bound is not None]

@@ -55,7 +55,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from robochoc.protocols.disclosure import EveryValuePays, Hearing, Proof
-from robochoc.protocols.findings import NOTHING, Findings
+from robochoc.protocols.findings import NO_FINDINGS, Findings
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage, Wave
@@ -131,7 +131,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
     @property
     def findings(self) -> Findings:
         """Return the place in the last turn's tree; for its root also the optimum."""
-        return super().findings if self.turn + 1 >= self.turns else NOTHING
+        return super().findings if self.turn + 1 >= self.turns else NO_FINDINGS
 
     def receive(self, sender: str, message: Message) -> None:
         """Process what goes round the circle; keep what is of the next turn until that begins."""

@@ -210,7 +210,7 @@ class CycleProtocol(Protocol):
         """Send the same message to several robots."""
         said = [(name, message) for name in names]
         self.outbox += said
-        self.said_at += [self.problem.checks] * len(said)
+        self.checks_at_send += [self.problem.checks] * len(said)
 
     def tell_value(self, then: Then) -> None:
         """Send the own value to all neighbours, wait for theirs, then call `then`."""

@@ -68,7 +68,7 @@ def test_a_message_carries_the_clock_of_when_it_was_said() -> None:
     said = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=7)])
     assert [envelope.clock for envelope in said] == [7, 8, 9]
     assert b.clock == 10
-    assert b.said_at == [0, 1, 2]
+    assert b.checks_at_send == [0, 1, 2]
     # Nothing rules out B = 2, so it is checked each time; what ruled out B = 1 is known.
     again = b.handle([Envelope("RA", "RB", encode(Ok((1,))), clock=0)])
     assert [envelope.clock for envelope in again] == [10, 10, 11]

@@ -8,13 +8,13 @@ from robochoc.communication.network.plausibility import Declarations
 from robochoc.communication.search_state import SearchState
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Domain
-from robochoc.protocols.findings import NOTHING, Findings, Incumbent
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Incumbent
 from tests.support.cases import looped
 
 NAMES = ("A", "B")
 
 
-def has(value: int, number: int = 1, *, epoch: int = 0, lost: int = 0, findings: Findings = NOTHING) -> Snapshot:
+def has(value: int, number: int = 1, *, epoch: int = 0, lost: int = 0, findings: Findings = NO_FINDINGS) -> Snapshot:
     return Snapshot(epoch, number, {f"x{value}": value}, lost, findings)
 
 
@@ -51,7 +51,7 @@ def test_what_was_not_asked_for_is_a_fault_and_of_another_epoch_it_is_nothing() 
     ("said", "fault"),
     [
         (has(9), "it has reported values that it cannot have"),
-        (Snapshot(0, 1, {"x1": 1, "x2": 2}, 0, NOTHING), "it has reported a value of x2, which is B's"),
+        (Snapshot(0, 1, {"x1": 1, "x2": 2}, 0, NO_FINDINGS), "it has reported a value of x2, which is B's"),
         (has(1, lost=-1), "it has reported counts that cannot be"),
         (has(1, findings=Findings(bound=-1)), "it has reported impossible costs"),
         (has(1, findings=Findings(best=Incumbent(1, {"C": (1,)}))), "it has reported a robot that is not in the team"),
