@@ -284,8 +284,8 @@ def test_a_protocol_from_outside_is_told_which_messages_it_lacks() -> None:
     class Own(CycleProtocol):
         messages = Value
 
-        def begin(self) -> None:
-            self.take(0)
+        def start_cycles(self) -> None:
+            self.choose(0)
 
     with pytest.raises(UnsupportedError, match="needs `AnytimeMessage` among the `messages` of protocol own"):
         refuse_settings("own", Own, {"anytime": "yes"})

@@ -109,9 +109,9 @@ def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_co
 
     def noted(robot: BoundingProtocol) -> None:
         ends.append(robot)
-        family.protocol.begin(robot)
+        family.protocol.start_in_tree(robot)
 
-    noting = type("Noting", (family.protocol,), {"begin": noted})  # a compiled class cannot be patched
+    noting = type("Noting", (family.protocol,), {"start_in_tree": noted})  # a compiled class cannot be patched
     chance = Random(f"quiet {longest} {batch}")
     for seed in range(10 if batch else 5):
         team = random_cost_team(chance)

@@ -33,7 +33,7 @@ def robot(name: str, *chances: float, cycles: int = 100, temperature: float = 1.
     made.settings = DGibbsSettings(cycles=cycles, temperature=temperature)  # type: ignore[misc]
     made.chance = iter([*chances, *[0.0] * 9]).__next__
     made.placed = True
-    made.begin()
+    made.start_in_tree()
     return made
 
 
@@ -67,7 +67,7 @@ def test_what_breaks_a_hard_constraint_is_drawn_seldom() -> None:
         made = unplaced(DGibbs, priced("AB", {"AB": [0, INFINITE, 0, 0]}), "RA")
         made.children, made.placed = ("RB",), True
         made.chance = iter([0.0, 1 - lot, 0.0]).__next__
-        made.begin()
+        made.start_in_tree()
         replies(made, ("RB", Value((2,), True)))
         assert value(made) == (drawn,)
 

@@ -97,12 +97,12 @@ def test_the_counter_counts_while_nobody_near_violates_anything_and_at_the_large
     is_told(it, Improve(0, 0, 0), Improve(0, 0, 5))
     assert hears(it, 2, 2).counter == 1
     is_told(it, Improve(0, 0, 1), Improve(0, 1, 0))
-    assert (it.counter, it.over) == (0, False)
+    assert (it.counter, it.finished) == (0, False)
     hears(it, 2, 2)
     is_told(it, Improve(0, 0, 0), Improve(0, 0, 0))
     hears(it, 2, 2)
     assert replies(it, ("RA", Improve(0, 0, 1)), ("RC", Improve(0, 0, 1))) == []
-    assert it.over
+    assert it.finished
     assert it.verdict is None
 
 

@@ -58,7 +58,7 @@ class Greeter(TreeProtocol):
         self.early += isinstance(message, Hello) and not self.placed
         super().receive(sender, message)
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         assert self.placed
         assert not self.greeted
         self.begun += 1

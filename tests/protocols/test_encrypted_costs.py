@@ -151,7 +151,7 @@ def robot(name: str = "RB") -> P2DPOP:
     one.secret = KeyStream(0, name)
     one.parent = "RA"
     one.placed = True
-    one.take_place(Ring("RA", ()))
+    one.join_ring(Ring("RA", ()))
     one.costs = CostRange(0, 6)
     one.turns = 2
     return one

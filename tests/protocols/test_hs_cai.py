@@ -44,7 +44,7 @@ def middle(k: int = 1, t: int = 1) -> HSCAI:
     robot = unplaced(HSCAI, TEAM, "RB")
     robot.settings = HSCAISettings(k, t)  # type: ignore[misc]  # as the host does
     robot.parent, robot.children, robot.placed = "RA", ("RC",), True
-    robot.begin()
+    robot.start_in_tree()
     return robot
 
 

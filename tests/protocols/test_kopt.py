@@ -151,7 +151,7 @@ def test_places_that_are_none_are_refused() -> None:
 
 
 def test_a_message_of_another_phase_is_refused() -> None:
-    with pytest.raises(ValueError, match="RB tells something else"):
+    with pytest.raises(ValueError, match="RB sent an unexpected message"):
         replies(pair(), ("RB", Values({})))
 
 

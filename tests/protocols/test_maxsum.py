@@ -101,7 +101,7 @@ def test_a_cycle_is_r_of_all_functions_and_then_q_of_all_variables() -> None:
 def test_in_the_last_cycle_no_q_is_said() -> None:
     robot = informed(cycles=1)
     assert replies(robot, ("RC", R([[0, 0]]))) == []
-    assert robot.over
+    assert robot.finished
 
 
 def test_damping_keeps_a_share_of_the_last_q() -> None:

@@ -104,7 +104,7 @@ def test_after_the_last_phase_nothing_is_awaited() -> None:
     robot = middle(cycles=1)
     assert len(said(robot, ("RC", R([[0, 0]])))) == 1
     assert said(robot, ("RA", Q([[0, 0]]))) == []
-    assert robot.over
+    assert robot.finished
 
 
 def test_before_values_are_told_a_robot_without_a_value_has_a_proof_and_afterwards_it_breaks_the_fewest() -> None:

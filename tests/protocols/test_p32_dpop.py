@@ -169,7 +169,7 @@ def robot(name: str = "RB") -> P32DPOP:
     pair = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [priced("A", "B", {(1, 1): 5})]))
     one = unplaced(P32DPOP, pair, name)
     one.secret = KeyStream(0, name)
-    one.take_place(Ring("RA", ()))
+    one.join_ring(Ring("RA", ()))
     return one
 
 

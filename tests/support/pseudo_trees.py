@@ -53,7 +53,7 @@ def placed(
     robot.parent, robot.pseudo_parents = parent, tuple(pseudo_parents)
     robot.children, robot.pseudo_children = tuple(children), tuple(pseudo_children)
     robot.placed = True
-    robot.begin()
+    robot.start_in_tree()
     robot.settle()
     return robot
 

@@ -134,10 +134,10 @@ class ACLS(CycleProtocol):
         self.after: LexicographicCost = NO_GAIN
         self._values: dict[str, wire.Value] = {}
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._propose)
+        self.choose(self.any_value())
+        self.exchange_values(self._propose)
 
     def _propose(self, messages: Mapping[str, wire.Message]) -> None:
         """Draw a value that improves this robot's side, and propose it."""
@@ -149,7 +149,7 @@ class ACLS(CycleProtocol):
         if self.proposal is not None:
             self.after = costs[self.proposal]
         value = None if self.proposal is None else self.problem.values[self.proposal]
-        self.tell(self.problem.neighbours, Proposal(value))
+        self.multicast(self.problem.neighbours, Proposal(value))
         self.listen(self.problem.neighbours, self._answer)
 
     def _drawn(self, gains: Sequence[LexicographicCost]) -> int | None:
@@ -183,9 +183,9 @@ class ACLS(CycleProtocol):
             after = _sum([self.after, *(side.proposed for side in sides)])
             if self._cheap(before, after) and self.chance() < self.settings.probability:
                 index = self.proposal
-        self.take(index)
-        if not self.over:
-            self.tell_value(self._propose)
+        self.choose(index)
+        if not self.finished:
+            self.exchange_values(self._propose)
 
     def _cheap(self, before: LexicographicCost, after: LexicographicCost) -> bool:
         """Return whether to accept a proposal that costs `after` instead of `before`."""

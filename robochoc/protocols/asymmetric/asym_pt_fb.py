@@ -133,11 +133,11 @@ class AsymPTFB(PTFB):
         """Return the costs of this robot with robots above, which store the sides received."""
         return CostsOfBothSides(self.problem)
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Compute the least costs of this robot's sides; then begin as PT-FB."""
         self.least = {name: self.problem.least_side(name) for name in self.descendants}
         self.above.alone = [sum(costs) for costs in zip(self.problem.charges, *self.least.values(), strict=True)]
-        super().begin()
+        super().start_in_tree()
 
     def handle(self, sender: str, message: Message) -> None:
         match cast("Members | Request | Report | CPA | Reduce | Result | Terminate | RowRequest | Row", message):

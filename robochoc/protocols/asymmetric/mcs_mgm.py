@@ -100,10 +100,10 @@ class MCSMGM(Gainers):
         self.last_gains: dict[str, LexicographicCost] = {}
         self._values: dict[str, wire.Value] = {}
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._transfer)
+        self.choose(self.any_value())
+        self.exchange_values(self._transfer)
 
     def side(self, neighbour: str, value: wire.Value) -> LexicographicCost:
         """Return this robot's cost for its present value and `value`, including all transfers."""
@@ -147,7 +147,7 @@ class MCSMGM(Gainers):
             if isinstance(message, Transfer) and message.entry is not None and name in self._values:
                 self._add(name, self._values[name], message.entry)
         self.best_of(self.burdens(self._values))
-        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.multicast(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
@@ -158,9 +158,9 @@ class MCSMGM(Gainers):
         if len(self.last_gains) < len(messages):
             raise ValueError(f"a neighbour of {self.problem.agent} sends another message than its gain in this phase")
         moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
-        self.take(self.target if moves else self.present)
-        if not self.over:
-            self.tell_value(self._transfer)
+        self.choose(self.target if moves else self.present)
+        if not self.finished:
+            self.exchange_values(self._transfer)
 
     def _add(self, neighbour: str, value: wire.Value, cost: LexicographicCost) -> None:
         """Add `cost` to the entry of this robot's side for its present value and `value` of a neighbour."""

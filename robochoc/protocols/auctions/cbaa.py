@@ -109,7 +109,7 @@ class CBAA(Auction):
         self._known = {rival: dict[int, tuple[str, int]]() for rival in self.market.shared}
         """For each rival the best bids that it has told, or was told."""
 
-    def begin(self) -> None:
+    def start_auction(self) -> None:
         """Bid for the best task."""
         self._select()
         self._tell()
@@ -145,7 +145,7 @@ class CBAA(Auction):
             if offer is not None:
                 self.bundle = [offer.task]
                 self.y[offer.task], self.z[offer.task] = offer.amount, own
-        self.take()
+        self.choose_bundle()
 
     def _tell(self) -> None:
         """Tell each rival the bids that are above those that it has told, or was told."""

@@ -185,7 +185,7 @@ class CBBA(Auction):
                 found[tasks] = Rivalry(tasks, near, {name: place for place, name in enumerate(near)}, {})
         return {rival: found[frozenset(tasks)] for rival, tasks in self.market.shared.items()}
 
-    def begin(self) -> None:
+    def start_auction(self) -> None:
         """Build a first bundle."""
         self._build()
         self._tell()
@@ -328,7 +328,7 @@ class CBBA(Auction):
             self.know(task, NOBODY)
         for task, bid in bids.items():
             self.know(task, bid)
-        self.take()
+        self.choose_bundle()
 
     def _released(self) -> set[int]:
         """Return the tasks that are given up: all of the bundle that nobody else has won.

@@ -106,7 +106,7 @@ class GRAPE(Auction):
         self._heard: dict[str, Partition] = {}
         """The partitions that rivals have told in this step."""
 
-    def begin(self) -> None:
+    def start_auction(self) -> None:
         """Join the best coalition."""
         if self._decide():
             self._tell()
@@ -157,7 +157,7 @@ class GRAPE(Auction):
                 best, most = task, utility
         self.satisfied = True
         self.bundle = [] if best is None else [best]
-        self.take()
+        self.choose_bundle()
         if best == present:
             return False
         others = {name: lot for name, lot in self.partition.coalitions.items() if name != own}

@@ -205,7 +205,7 @@ class Auction(Protocol):
         self.bundle: list[int] = []
 
     @abstractmethod
-    def begin(self) -> None:
+    def start_auction(self) -> None:
         """Begin to bid, for a robot that has values, and neighbours."""
 
     def start(self) -> None:
@@ -215,10 +215,10 @@ class Auction(Protocol):
         elif not self.market.shared:
             self.value = self.problem.charges.index(min(self.problem.charges))
         else:
-            self.take()
-            self.begin()
+            self.choose_bundle()
+            self.start_auction()
 
-    def take(self) -> None:
+    def choose_bundle(self) -> None:
         """Take the value with the tasks of the bundle."""
         self.value = self.market.place(self.bundle)
 

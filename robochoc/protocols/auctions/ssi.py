@@ -118,7 +118,7 @@ class SSI(Auction):
         self._limit = NO_LIMIT
         self._told = -1
 
-    def begin(self) -> None:
+    def start_auction(self) -> None:
         """Make the first bid."""
         self._bid()
         self._tell([])
@@ -171,7 +171,7 @@ class SSI(Auction):
         self.bundle.append(offer.task)
         self.sold.add(offer.task)
         self._limit = offer.amount
-        self.take()
+        self.choose_bundle()
         self._bid()
 
     def _tell(self, bought: list[int]) -> None:

@@ -203,7 +203,7 @@ class BoundedMaxSum(SpanningProtocol):
 
     # Costs go up the tree
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Count what was cut: its weight where it is held, its rest where that stays."""
         for name, weight in self.weights.items():
             if name not in self.joined:

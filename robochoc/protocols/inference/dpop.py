@@ -276,7 +276,7 @@ class DPOP(TreeProtocol):
         self._axes: dict[str, tuple[str, ...]] = {}
         self._joined: list[Table] = []
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Send the own domain to the neighbours below."""
         for name in self.descendants:
             self.send(name, Domain(list(self.problem.values)))
@@ -414,9 +414,9 @@ class DPOP(TreeProtocol):
             wanted = self.dimensions[child].separator
             self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in wanted)
             self.send(child, Proceed(list(self._axes[child])))
-        self._begin_utils()
+        self._start_utils()
 
-    def _begin_utils(self) -> None:
+    def _start_utils(self) -> None:
         """Make the tables of the own constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
         self._joined = [self._aligned(table.charges, (*table.agents, self.problem.agent)) for table in tables]

@@ -174,12 +174,12 @@ class MaxSum(CycleProtocol):
         self._shape: list[tuple[str, int]] = []
         """Of whom `edges` are: how many, by robot."""
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
         preference = self.settings.preference
         self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
-        self.take(cheapest(self.preferred))
-        self.tell(self.below, Domain(list(self.problem.values)))
+        self.choose(cheapest(self.preferred))
+        self.multicast(self.below, Domain(list(self.problem.values)))
         self.listen(self.above, self._build)
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
@@ -216,7 +216,7 @@ class MaxSum(CycleProtocol):
             self._hear(name, message)
         self._tell_r()
 
-    def hear_late(self, sender: str, message: wire.Message) -> None:
+    def receive_late(self, sender: str, message: wire.Message) -> None:
         """Note what is new in a message whose phase is over."""
         self._hear(sender, message)
 
@@ -262,8 +262,8 @@ class MaxSum(CycleProtocol):
         if min(z) == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
             return
-        self.take(cheapest(z))
-        if self.over:
+        self.choose(cheapest(z))
+        if self.finished:
             return
         self.edges = self._q(rows, z, damped=before == self._shape)
         done = len(self.factors)

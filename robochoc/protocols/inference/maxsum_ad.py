@@ -109,12 +109,12 @@ class MaxSumAD(CycleProtocol):
         self._nothing: list[Row] = []
         self._domains: dict[str, list[wire.Value]] = {}
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
         preference = self.settings.preference
         self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
-        self.take(cheapest(self.preferred))
-        self.tell(self.below, Domain(list(self.problem.values)))
+        self.choose(cheapest(self.preferred))
+        self.multicast(self.below, Domain(list(self.problem.values)))
         self.listen(self.above, self._build)
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
@@ -140,7 +140,7 @@ class MaxSumAD(CycleProtocol):
         _, said = self.functions.answers(self._q()[: len(self._nothing)])
         for name in self.above:
             self.send(name, R(said[name]) if name in said else Domain(list(self.problem.values)))
-        if not self.over:
+        if not self.finished:
             self.listen(self.above, self._down)
 
     def _down(self, messages: Mapping[str, wire.Message]) -> None:
@@ -158,7 +158,7 @@ class MaxSumAD(CycleProtocol):
             told = {name: Q([next(rows) for _ in heard]) for name, heard in self.from_below.items()}
         for name in self.below:
             self.send(name, told.get(name) or Domain(list(self.problem.values)))
-        if not self.over:
+        if not self.finished:
             self.listen(self.below, self._up)
 
     @property
@@ -191,7 +191,7 @@ class MaxSumAD(CycleProtocol):
         elif isinstance(message, Q) and len(message.rows) == len(self.functions.q[name]):
             self.functions.hear(name, message.rows)
 
-    def hear_late(self, sender: str, message: wire.Message) -> None:
+    def receive_late(self, sender: str, message: wire.Message) -> None:
         """Note what is new in a message whose phase is over."""
         if isinstance(message, R | Q | Domain):
             self._hear(sender, message)
@@ -208,14 +208,14 @@ class MaxSumAD(CycleProtocol):
         rows = self._rows
         z = total(self.preferred, rows)
         if min(z) < INFINITE:
-            self.take(cheapest(z))
+            self.choose(cheapest(z))
             return True
         if self.settings.variant == "AD" or self.cycle + 1 < FIRST_WITH_VALUES:
             self.conclude(Verdict.NO_SOLUTION)
             return False
         columns = list(zip(self.preferred, *rows, strict=True))
         burdens = [(column.count(INFINITE), sum(cost for cost in column if cost < INFINITE)) for column in columns]
-        self.take(burdens.index(min(burdens)))
+        self.choose(burdens.index(min(burdens)))
         return True
 
     def _q(self) -> list[Row]:

@@ -203,7 +203,7 @@ class MBDPOP(DPOP):
         self._best_context: Codes | None = None
         self._final: Sequence[int] | None = None
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Send the own place to the neighbours below; other robots than the root wait for their parent's."""
         if self.parent is None:
             self._send_place()
@@ -296,14 +296,14 @@ class MBDPOP(DPOP):
         """The robots of the own table's axes."""
         return tuple(name for name in self.separator or () if name not in self.cut)
 
-    def _begin_utils(self) -> None:
+    def _start_utils(self) -> None:
         """Make the tables of the own constraints; who waits for nothing computes at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
         self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
-        self._begin_inference()
+        self._start_inference()
         self._compute_if_complete()
 
-    def _begin_inference(self) -> None:
+    def _start_inference(self) -> None:
         """Begin the first context, unless it is the parent who gives it."""
         if self.enumerated:
             self._contexts = itertools.product(*map(range, self.enumerated.values()))
@@ -317,17 +317,17 @@ class MBDPOP(DPOP):
             raise ValueError(f"{self.problem.agent} is not to be given a context now")
         if len(values) != len(self.cut) or not all(map(is_place, values, self.cut.values())):
             raise ValueError(f"{values} are no values of {', '.join(self.cut)}")
-        self._begin_context(dict(zip(self.cut, values, strict=True)))
+        self._start_context(dict(zip(self.cut, values, strict=True)))
         self._compute_if_complete()
 
     def _next_context(self) -> bool:
         """As a cluster root, begin the next context; return whether there was one."""
         values = next(self._contexts, None)
         if values is not None:
-            self._begin_context(dict(zip(self.enumerated, values, strict=True)))
+            self._start_context(dict(zip(self.enumerated, values, strict=True)))
         return values is not None
 
-    def _begin_context(self, context: dict[str, int]) -> None:
+    def _start_context(self, context: dict[str, int]) -> None:
         """Ask the children in the cluster for their tables."""
         self.context, self.choices = context, None
         for child in self.children:
@@ -414,7 +414,7 @@ class MBDPOP(DPOP):
         if best == self.context:
             self._choose_in_context(assignment)
         else:
-            self._begin_context(best)
+            self._start_context(best)
 
     def _choose_in_context(self, assignment: Sequence[int]) -> None:
         """Take the cheapest value in the context that all of the cluster have."""

@@ -157,7 +157,7 @@ class ODPOP(DPOP):
 
     # Goods, from the leaves up
 
-    def _begin_utils(self) -> None:
+    def _start_utils(self) -> None:
         """Add up the own constraints; a root asks itself."""
         shape = [self._sizes[name] for name in self.separator or ()]
         self._local = np.zeros((len(self.problem.values), *shape))

@@ -15,7 +15,7 @@ given only the values that it needs.
 
 Its messages and mechanisms are these methods:
 
-    LABEL, SEP_DEGREE    `_announce`        CONTEXT, distributed enumeration    `_begin_context`, `_ask`
+    LABEL, SEP_DEGREE    `_announce`        CONTEXT, distributed enumeration    `_start_context`, `_ask`
     ALLOCATION           `_allocate`        cache of a child's table            `_ask`
     UTIL                 `_compute_utils`   CC_VALUE                            `_settle`
 
@@ -450,14 +450,14 @@ class RMBDPOP(MBDPOP):
 
     # Contexts: each enumerates its part
 
-    def _begin_inference(self) -> None:
+    def _start_inference(self) -> None:
         """Begin to enumerate, unless it is the parent who gives a context."""
         shared = {name: sum(name in cut for cut in self.cuts.values()) for name in self.enumerated}
         self.enumerated = {name: self.enumerated[name] for name in sorted(shared, key=lambda name: -shared[name])}
         if not self.cut:
-            self._begin_context({})
+            self._start_context({})
 
-    def _begin_context(self, context: dict[str, int]) -> None:
+    def _start_context(self, context: dict[str, int]) -> None:
         """Begin the own enumeration in the parent's context."""
         self._above, self.choices, self.best = context, None, None
         self._contexts = itertools.product(*map(range, self.enumerated.values()))

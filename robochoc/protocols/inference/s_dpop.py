@@ -129,9 +129,9 @@ class SDPOP(DPOP, DynamicProtocol):
         """Neighbours whose first wave has not come; what they sent before it belongs to a tree that is gone."""
         self._last_parent: str | None = None
         self._last_optimum: int | None = None
-        self._begin_epoch()
+        self._start_epoch()
 
-    def _begin_epoch(self) -> None:
+    def _start_epoch(self) -> None:
         """Forget what an epoch, or a tree, knows by itself."""
         self._expected: set[str] | None = None
         """Robots above that send their domains; None: not known yet."""
@@ -172,7 +172,7 @@ class SDPOP(DPOP, DynamicProtocol):
         """Continue on the tree, if it stands; otherwise begin a new one."""
         if self.verdict is not None:
             return
-        self._begin_epoch()
+        self._start_epoch()
         if not lossless:
             self._forget_all()
         if not lossless or self._needs_tree or not self.placed or not self.problem.values:
@@ -211,10 +211,10 @@ class SDPOP(DPOP, DynamicProtocol):
         if self._fresh:
             self.basis = self.sent = None
         self._stands = self._needs_tree = False
-        self._begin_epoch()
+        self._start_epoch()
         self.start()
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Keep the tables of those who are still children, and send the own domain to the neighbours below."""
         if self.parent != self._last_parent:
             self.basis = self.sent = None

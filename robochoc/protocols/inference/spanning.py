@@ -101,7 +101,7 @@ class SpanningProtocol(Protocol):
     """One agent that first builds a maximum spanning forest with the others.
 
     `weights` are those of the functions with neighbours, known on both sides, when `grow` is called. `parent` (None: a
-    root) and `children` are known when `begin` is called.
+    root) and `children` are known when `start_in_tree` is called.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -118,7 +118,7 @@ class SpanningProtocol(Protocol):
         self._own_choice: str | None = None
 
     @abstractmethod
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Continue, now that the tree is done."""
 
     @property
@@ -192,7 +192,7 @@ class SpanningProtocol(Protocol):
             self.send(child, Choice(ends))
         if ends is None:
             self.stage = None
-            self.begin()
+            self.start_in_tree()
             return
         self._own_choice = None
         for name in self._outer:

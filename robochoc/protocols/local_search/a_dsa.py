@@ -99,9 +99,9 @@ class ADSA(DSA):
         """Those that have not made their last tick, in priority order."""
         self._news = False
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value, and tell it."""
-        self.take(self.any_value())
+        self.choose(self.any_value())
         self._tell_all()
 
     def receive(self, sender: str, message: wire.Message) -> None:
@@ -121,26 +121,26 @@ class ADSA(DSA):
             return
         self._news = False
         self._tick()
-        while not self.active and not self.over:
+        while not self.active and not self.finished:
             self._tick()
 
     def go_on(self) -> bool:
         """Make a tick with what is known: messages were lost, and nothing else would come."""
-        if self.over or self.verdict is not None or self.value is None:
+        if self.finished or self.verdict is not None or self.value is None:
             return False
         self._tick()
         return True
 
     def _tick(self) -> None:
         """Move or stay, against the last known values; tell the value to all that go on."""
-        if self.over:
+        if self.finished:
             return
         places, probability = self.proposal(self.problem.lexicographic_costs(self.view))
         index = self.present
         if places and probability and self.chance() < probability:
             index = self.any_of(places)
-        self.take(index)
+        self.choose(index)
         self._tell_all()
 
     def _tell_all(self) -> None:
-        self.tell(self.active, Tick(self.problem.values[self.present], self.over))
+        self.multicast(self.active, Tick(self.problem.values[self.present], self.finished))

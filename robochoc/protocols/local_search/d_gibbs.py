@@ -178,7 +178,7 @@ class DGibbs(TreeProtocol):
         self._changes: dict[str, LexicographicCost] = {}
         """Of each child, what this cycle has changed in its subtree."""
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Take a random value, and tell it to the neighbours above; a robot alone takes its cheapest value."""
         size = len(self.problem.values)
         if not self.problem.neighbours:
@@ -290,7 +290,7 @@ class DGibbs(TreeProtocol):
 
     @property
     def _present(self) -> int:
-        assert self.value is not None  # noqa: S101 - for mypy: `begin` takes one
+        assert self.value is not None  # noqa: S101 - for mypy: `start_in_tree` takes one
         return self.value
 
     @property

@@ -18,8 +18,8 @@ nothing at all. D and E are B and C in which a robot that gains always moves.
 
 Its Algorithm 1, line by line:
 
-    randomly choose a value                                        `begin`
-    while no termination condition is met: send the value, if      `tell_value`
+    randomly choose a value                                        `start_cycles`
+    while no termination condition is met: send the value, if      `exchange_values`
       it is new, collect neighbours' new values
     select and assign the next value (Table 1)                     `choice`
 
@@ -68,10 +68,10 @@ class DSASettings(CycleSettings, frozen=True):
 class OnePhase(CycleProtocol):
     """The common base of searches with one phase: all robots send their values, and each chooses its next one."""
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._choose)
+        self.choose(self.any_value())
+        self.exchange_values(self._choose)
 
     @abstractmethod
     def choice(self, burdens: Sequence[LexicographicCost]) -> int:
@@ -79,9 +79,9 @@ class OnePhase(CycleProtocol):
 
     def _choose(self, messages: Mapping[str, Message]) -> None:
         """Move or stay, with all neighbours' values known."""
-        self.take(self.choice(self.problem.lexicographic_costs(self.checked_values(messages))))
-        if not self.over:
-            self.tell_value(self._choose)
+        self.choose(self.choice(self.problem.lexicographic_costs(self.checked_values(messages))))
+        if not self.finished:
+            self.exchange_values(self._choose)
 
 
 class StochasticSearch(OnePhase):

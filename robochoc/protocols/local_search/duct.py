@@ -313,7 +313,7 @@ class DUCT(TreeProtocol):
         """The costs of the present sample that children have told."""
         self._sampling = False
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Tell the parent the separator, if no child has one to tell."""
         own = [charge for _, charge in self.problem.scopes(self.ancestors)]
         own.append(max((charge for charge in self.problem.charges if charge != float("inf")), default=0))

@@ -20,7 +20,7 @@ The paper's three choices, 24 variants together:
     effective cost: additive (A), multiplicative (M)                `modifier`, `_effective`
     violated: non-zero, non-minimum, maximum cost (NZ, NM, MX)      `violation`, `_violated`
     what is raised: entry, row, column, table (E, R, C, T)          `scope`, `_key`
-    send value, send improvement, raise or move                     `tell_value`, `_weigh`, `_move`
+    send value, send improvement, raise or move                     `exchange_values`, `_weigh`, `_move`
 
 With A and R, or A and T, all own values are raised alike, so no decision changes: these variants are exactly MGM.
 E and C leave minima fastest, and rest nowhere; their last cycle may be far from the best one.
@@ -117,10 +117,10 @@ class GDBA(Gainers):
         self._charged: list[Charged] = []
         self._ranges: dict[int, tuple[Cost, Cost]] = {}
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._weigh)
+        self.choose(self.any_value())
+        self.exchange_values(self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the reduction of the best own move, with all neighbours' values known."""
@@ -128,7 +128,7 @@ class GDBA(Gainers):
         self.best_of(self._burdens())
         broken, cost = self.gain
         self.gain = broken, max(-MOST, min(MOST, cost))
-        self.tell(self.problem.neighbours, Improve(*self.gain))
+        self.multicast(self.problem.neighbours, Improve(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
@@ -137,9 +137,9 @@ class GDBA(Gainers):
         told = [(said.broken, said.cost) for said in messages.values() if isinstance(said, Improve)]
         if complete and max(self.gain, *told) <= NO_GAIN:
             self._raise_modifiers()
-        self.take(self.target if complete and self.wins(messages) else self.present)
-        if not self.over:
-            self.tell_value(self._weigh)
+        self.choose(self.target if complete and self.wins(messages) else self.present)
+        if not self.finished:
+            self.exchange_values(self._weigh)
 
     def _burdens(self) -> list[LexicographicCost]:
         """Return the effective cost of each own value."""

@@ -381,10 +381,10 @@ class KOpt(CycleProtocol):
         """The most links between a group's centre and a robot of the group."""
         return self.settings.k // 2
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value, and send the domain."""
-        self.take(self.any_value())
-        self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
+        self.choose(self.any_value())
+        self.multicast(self.problem.neighbours, Domain(list(self.problem.values)))
         self.listen(self.problem.neighbours, self._tell_part)
 
     def _spread(
@@ -397,25 +397,25 @@ class KOpt(CycleProtocol):
         """Tell `items` to all robots at most `links` away, then call `then` with those of all these robots."""
         known = dict(items)
 
-        def tell(new: Mapping[str, T], left: int) -> None:
+        def send_new(new: Mapping[str, T], left: int) -> None:
             if left == 0:
                 then(known)
                 return
-            self.tell(self.problem.neighbours, what(dict(new)))
-            self.listen(self.problem.neighbours, lambda messages: hear(messages, left - 1))
+            self.multicast(self.problem.neighbours, what(dict(new)))
+            self.listen(self.problem.neighbours, lambda messages: receive_new(messages, left - 1))
 
-        def hear(messages: Mapping[str, wire.Message], left: int) -> None:
+        def receive_new(messages: Mapping[str, wire.Message], left: int) -> None:
             new: dict[str, T] = {}
             for name, message in messages.items():
                 if type(message) is not what:
-                    raise ValueError(f"{name} tells something else than it should in this phase")
+                    raise ValueError(f"{name} sent an unexpected message in this phase")
                 told: Mapping[str, T]
                 (told,) = msgspec.structs.astuple(message)
                 new |= {key: item for key, item in told.items() if key not in known}
             known.update(new)
-            tell(new, left)
+            send_new(new, left)
 
-        tell(items, links)
+        send_new(items, links)
 
     # Once, before the search
 
@@ -482,8 +482,8 @@ class KOpt(CycleProtocol):
         if place >= len(self.problem.values):
             raise ValueError(f"{self.problem.agent} has no value number {place + 1}")
         moved = {self.problem.agent: place} if place != self.value else {}
-        self.take(place)
-        if not self.over:
+        self.choose(place)
+        if not self.finished:
             self._tell_values(moved)
 
     @property

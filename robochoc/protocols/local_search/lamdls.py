@@ -104,9 +104,9 @@ class LAMDLS(CycleProtocol):
         self.view: dict[str, wire.Value] = {}
         self._colours: dict[str, int] = {}
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value, and wait for the colours of all neighbours of higher priority."""
-        self.take(self.any_value())
+        self.choose(self.any_value())
         self.listen(self.earlier, self._colour)
 
     def _colour(self, messages: Mapping[str, wire.Message]) -> None:
@@ -114,7 +114,7 @@ class LAMDLS(CycleProtocol):
         self._note(messages)
         taken = {*self._colours.values()}
         self.colour = next(colour for colour in range(len(taken) + 1) if colour not in taken)
-        self.tell(self.problem.neighbours, Colour(self.problem.values[self.present], self.colour))
+        self.multicast(self.problem.neighbours, Colour(self.problem.values[self.present], self.colour))
         self.listen(self.later, self._meet)
 
     def _meet(self, messages: Mapping[str, wire.Message]) -> None:
@@ -132,9 +132,9 @@ class LAMDLS(CycleProtocol):
         colour, own = self._colours.get(name), self.colour
         return higher if colour is None or own is None or colour == own else colour < own
 
-    def hear_late(self, sender: str, message: wire.Message) -> None:
+    def receive_late(self, sender: str, message: wire.Message) -> None:
         """Note the value in a message whose phase is over."""
-        super().hear_late(sender, message)
+        super().receive_late(sender, message)
         if isinstance(message, Colour):
             self.check_value(sender, message.value)
         if isinstance(message, Colour | Value):
@@ -160,9 +160,9 @@ class LAMDLS(CycleProtocol):
         index = self.present
         if burdens[index] > least:
             index = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
-        self.take(index)
-        self.tell(self.problem.neighbours, Value(self.problem.values[index]))
-        if not self.over:
+        self.choose(index)
+        self.multicast(self.problem.neighbours, Value(self.problem.values[index]))
+        if not self.finished:
             self.listen(self.later, self._wait_for_later)
 
     def _wait_for_later(self, messages: Mapping[str, wire.Message]) -> None:

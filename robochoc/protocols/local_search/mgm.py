@@ -13,7 +13,7 @@ saves the robot.
 
 The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
 
-    SendValueMessage, GetValueMessages   `tell_value`, `_weigh`
+    SendValueMessage, GetValueMessages   `exchange_values`, `_weigh`
     BestUnilateralGain                   `_weigh`
     SendGainMessage, GetGainMessages     `_weigh`, `_move`
     if gain > max(neighbours' gains)     `_move`
@@ -120,20 +120,20 @@ class MGM(Gainers):
         use_when="as DSA, and the cost never rises; ends in a local optimum",
     )
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._weigh)
+        self.choose(self.any_value())
+        self.exchange_values(self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the gain of the best own move, with all neighbours' values known."""
         self.best_unilateral(self.checked_values(messages))
-        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.multicast(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """Move if the own gain is the largest, with all neighbours' gains known; stay where one is lost."""
         moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
-        self.take(self.target if moves else self.present)
-        if not self.over:
-            self.tell_value(self._weigh)
+        self.choose(self.target if moves else self.present)
+        if not self.finished:
+            self.exchange_values(self._weigh)

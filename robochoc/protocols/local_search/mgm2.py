@@ -16,7 +16,7 @@ without the partner.
 
 The phases of a cycle:
 
-    value messages                              `tell_value`, `_offer`
+    value messages                              `exchange_values`, `_offer`
     offers (offerers), to one neighbour each    `_offer`, `_answer`
     accept, reject                              `_answer`, `_hear_answer`
     gain messages                               `_tell_gain`, `_decide`
@@ -220,10 +220,10 @@ class MGM2(Gainers):
         self._wins = False
         self._phase = _DOMAINS
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value and send the domain."""
-        self.take(self.any_value())
-        self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
+        self.choose(self.any_value())
+        self.multicast(self.problem.neighbours, Domain(list(self.problem.values)))
         self.listen_for(_DOMAINS, self.problem.neighbours, self._meet)
 
     def _meet(self, messages: Mapping[str, wire.Message]) -> None:
@@ -232,7 +232,7 @@ class MGM2(Gainers):
         self._tell_own_value()
 
     def _tell_own_value(self) -> None:
-        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.multicast(self.problem.neighbours, Value(self.problem.values[self.present]))
         self.listen_for(_VALUES, self.problem.neighbours, self._offer)
 
     def _offer(self, messages: Mapping[str, wire.Message]) -> None:
@@ -258,11 +258,11 @@ class MGM2(Gainers):
         """Answer all offers: an offerer rejects them; other robots accept the best if it gains anything."""
         offers = {name: told.gains for name, told in messages.items() if isinstance(told, Offer) and told.gains}
         if self.partner is not None:
-            self.tell(offers, Reject())
+            self.multicast(offers, Reject())
             self.listen_for(_ANSWERS, (self.partner,), self._hear_answer)
         else:
             self.partner = self._commit(offers)
-            self.tell([name for name in offers if name != self.partner], Reject())
+            self.multicast([name for name in offers if name != self.partner], Reject())
             self._tell_gain()
 
     def _commit(self, offers: Mapping[str, Gains]) -> str | None:
@@ -302,7 +302,7 @@ class MGM2(Gainers):
     def _tell_gain(self) -> None:
         if self.partner is None:
             self.best_unilateral(self.view)
-        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.multicast(self.problem.neighbours, Gain(*self.gain))
         self.listen_for(_GAINS, self.problem.neighbours, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
@@ -322,8 +322,8 @@ class MGM2(Gainers):
         self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
 
     def _end_cycle(self, *, move: bool) -> None:
-        self.take(self.target if move else self.present)
-        if not self.over:
+        self.choose(self.target if move else self.present)
+        if not self.finished:
             self._tell_own_value()
 
     # Phases, where messages are lost
@@ -345,7 +345,7 @@ class MGM2(Gainers):
         waiting = [self._waiting[name] for name in self._names]
         for name, queue in zip(self._names, waiting, strict=True):
             while queue and (first := queue[0]) is not None and self.may_be_late(first):
-                self.hear_late(name, first)
+                self.receive_late(name, first)
                 del queue[0]
         self._missing = waiting.count([])
         if self._missing:
@@ -355,8 +355,8 @@ class MGM2(Gainers):
             for name, queue in zip(self._names, waiting, strict=True)
         ]
 
-    def hear_late(self, sender: str, message: wire.Message) -> None:
+    def receive_late(self, sender: str, message: wire.Message) -> None:
         """Note what is new in a message whose phase is over."""
-        super().hear_late(sender, message)
+        super().receive_late(sender, message)
         if isinstance(message, Domain):
             self.domains.update(self.checked_domains({sender: message}))

@@ -14,7 +14,7 @@ ends when the root has LB = UB.
 
 The methods have the names of its procedures:
 
-    initialize     `begin`                 maintainThresholdInvariant        `_maintain_threshold_invariant`
+    initialize     `start_in_tree`                 maintainThresholdInvariant        `_maintain_threshold_invariant`
     when received  `handle`                maintainChildThresholdInvariant   `_maintain_child_threshold_invariant`
     backTrack      `decide`, `act`         maintainAllocationInvariant       `_maintain_allocation_invariant`
 

@@ -16,7 +16,7 @@ repeatedly.
 
 The methods have the names of the procedures, some of them in `depth_first`:
 
-    Start          `begin`                 InitSelf        `_merge`, `_choose`
+    Start          `start_in_tree`                 InitSelf        `_merge`, `_choose`
     When Received  `handle`                InitChild       `forget` (in `bounding`, as the next ones)
     Backtrack      `decide`, `act`         PriorityMerge   `merge`
                                            Compatible      `agrees`
@@ -94,9 +94,9 @@ class BnBADOPT(DepthFirstProtocol):
         self.floors: dict[str, list[Number]] = {}
         self._parent_values: list[message.Value] | None = None
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Initialise the bounds, and ask the children for their floors."""
-        super().begin()
+        super().start_in_tree()
         if self.settings.heuristic == "dp":
             for child in self.children:
                 self.send(child, Domain(list(self.problem.values)))

@@ -280,9 +280,9 @@ class BnBADOPTFDAC(DepthFirstProtocol):
 
     # Before the search
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Send the values to the robots below that may move costs to them."""
-        super().begin()
+        super().start_in_tree()
         paired = {robots[0] for robots, _ in self.problem.scopes(self.problem.neighbours) if len(robots) == 1}
         self._above = {name for name in self.ancestors if name == self.parent or name in paired}
         self._below = {name for name in self.descendants if name in self.bounds or name in paired}

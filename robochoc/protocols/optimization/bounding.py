@@ -63,7 +63,7 @@ class BoundingProtocol(TreeProtocol):
         self._places = {value: index for index, value in enumerate(problem.values)}
         self._last: dict[tuple[str, type[Message]], Message] = {}
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Initialise the bounds with this robot's charges."""
         for child in self.children:
             self.bounds[child] = Bounds(len(self.problem.values))
@@ -185,7 +185,7 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def index(self) -> int:
-        """The place of the value in the domain; it exists after `begin`."""
+        """The place of the value in the domain; it exists after `start_in_tree`."""
         assert self.value is not None  # noqa: S101
         return self.value
 

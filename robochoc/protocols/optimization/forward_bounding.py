@@ -80,7 +80,7 @@ class ForwardBoundingProtocol(BranchingProtocol):
         """Return the costs of this robot with robots above; subclasses that know more costs override it."""
         return CostsAbove(self.problem)
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Send the parent the links of the subtree, once all children have done the same."""
         self._linked = {name: [self.problem.agent] for name in self.ancestors}
         self._send_members()

@@ -304,7 +304,7 @@ class HSCAI(BranchingProtocol):
         self._asked: list[Places] = []
         self._made: dict[str, Table] = {}
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Send the domain to the robots below, as the root."""
         if self.parent is None:
             self._send_domain()

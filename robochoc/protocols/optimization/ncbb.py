@@ -113,9 +113,9 @@ class NCBB(ForwardBoundingProtocol):
         self.greedy_values: Assignment = {}
         self._first_phase = True
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Send the parent the links of the subtree."""
-        super().begin()
+        super().start_in_tree()
         self._choose_greedily()
 
     def begin_search(self) -> None:

@@ -87,7 +87,7 @@ class AnonymousTreeProtocol(TreeProtocol):
         self._to_visit: list[str] = []
 
     @abstractmethod
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Begin the search; the place in the tree is known."""
 
     def leave_tree(self) -> None:
@@ -112,7 +112,7 @@ class AnonymousTreeProtocol(TreeProtocol):
                 self.send(name, Wave(self._score))
 
     def receive(self, sender: str, message: Message) -> None:
-        """Process the messages that build the tree; store messages of the search until `begin`."""
+        """Process the messages that build the tree; store messages of the search until `start_in_tree`."""
         if self.verdict is not None:
             return
         match message:
@@ -186,7 +186,7 @@ class AnonymousTreeProtocol(TreeProtocol):
         if self.parent is not None:
             self.send(self.parent, Back())
         self.placed = True
-        self.begin()
+        self.start_in_tree()
         early: Sequence[tuple[str, Message]]
         early, self._early = self._early, []
         for sender, message in early:

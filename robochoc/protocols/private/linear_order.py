@@ -287,13 +287,13 @@ class LinearOrderProtocol(RerootingProtocol):
 
     # The circle, and how far costs may go
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Take the place in the circle; the first robot begins. A robot alone takes its best value."""
         if not self.problem.neighbours:
             self.decide_alone()
             return
         ring = Ring(self.parent, self.children)
-        self.take_place(ring)
+        self.join_ring(ring)
         if ring.is_first:
             self._mask = CostSum(self.secret(62), self.secret(62))
             self.send(ring.onward, self._with_own_costs(self._mask))
@@ -339,7 +339,7 @@ class LinearOrderProtocol(RerootingProtocol):
 
     # Turns
 
-    def begin_turn(self) -> None:
+    def start_turn(self) -> None:
         """Be the root, if it is the own turn and known to be: send the plan, or the table, of the own axis."""
         if self.is_root or self.own_turns is None or self.turn not in self.own_turns:
             return
@@ -357,7 +357,7 @@ class LinearOrderProtocol(RerootingProtocol):
         if self.step + 1 < 2 * self.turns:
             self._next_turn(None)
 
-    def take_next(self, sender: str) -> None:
+    def start_next_turn(self, sender: str) -> None:
         """Begin the next turn, and pass on that it does."""
         ring, _ = self.in_ring()
         if sender not in ring.neighbours or self.is_root or self.step + 1 >= 2 * self.turns:
@@ -370,7 +370,7 @@ class LinearOrderProtocol(RerootingProtocol):
             if name != sender:
                 self.send(name, Next())
         self.step += 1
-        self.begin_turn()
+        self.start_turn()
 
     # Plans: the axes and sizes of all tables
 
@@ -428,7 +428,7 @@ class LinearOrderProtocol(RerootingProtocol):
         values = self.problem.declared(self.problem.agent)
         self.send(sender, Axis(turn, own.codename, [values[place] for place in own.order]))
 
-    def take_answer(self, sender: str, answer: Axis | Gone) -> None:
+    def receive_answer(self, sender: str, answer: Axis | Gone) -> None:
         """Once all have answered: plan the own table, and tell the next robot."""
         if self._pending is None or sender not in self.problem.neighbours or sender in self._answers:
             raise ValueError(f"{sender} was not asked for an axis")

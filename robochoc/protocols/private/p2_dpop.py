@@ -209,9 +209,9 @@ class P2DPOP(LinearOrderProtocol):
             case AskAxis(turn):
                 self.answer(sender, turn)
             case Axis() | Gone() as answer:
-                self.take_answer(sender, answer)
+                self.receive_answer(sender, answer)
             case Next():
-                self.take_next(sender)
+                self.start_next_turn(sender)
             case CostSum() | Plan() | EncryptedTable() | Opening() as round_trip:
                 self._go_round(sender, round_trip)
             case never:
@@ -273,7 +273,7 @@ class P2DPOP(LinearOrderProtocol):
             raise ValueError("a table of another size than planned")
         cells = self.cipher.cells(table.ciphers)
         if self.is_root:
-            self._begin_reading([cells[code] for code in sorted(range(len(cells)), key=own.order.__getitem__)])
+            self._start_reading([cells[code] for code in sorted(range(len(cells)), key=own.order.__getitem__)])
             return
         place = self.places[self.turn]
         codes = own.codes(self._kept)
@@ -284,7 +284,7 @@ class P2DPOP(LinearOrderProtocol):
 
     # The root reads the optimum, and its value
 
-    def _begin_reading(self, cells: list[list[Pair]]) -> None:
+    def _start_reading(self, cells: list[list[Pair]]) -> None:
         """Seek the least cost that any value has; `cells` are in the order of the declared values."""
         if self._bisection is not None:
             raise ValueError("a second table of the same turn")

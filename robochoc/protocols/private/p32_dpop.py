@@ -29,7 +29,7 @@ Encryption: ElGamal with one share of the key for each robot, in the group Edwar
 The methods:
 
     circle                  `ring.Ring`              encrypt, open      `elgamal.TeamKey`
-    numbers, key, vectors   `rerooting`              the next root      `begin_turn`
+    numbers, key, vectors   `rerooting`              the next root      `start_turn`
     the table               `joined`                 the next turn      `_end_turn`
 
 Choices that the paper leaves open, and differences:
@@ -151,25 +151,25 @@ class P32DPOP(RerootingProtocol, PDPOP):
             case _:
                 super().receive(sender, message)
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """In the first tree: remember the circle. Later: run P-DPOP in the tree of this turn."""
         if self.ring is not None or not self.problem.neighbours:
-            super().begin()
+            super().start_in_tree()
             return
         ring = Ring(self.parent, self.children)
-        self.take_place(ring)
+        self.join_ring(ring)
         self.leave_tree()
         if ring.is_first:
             self.open_ring()
 
     # Turns
 
-    def begin_turn(self) -> None:
+    def start_turn(self) -> None:
         """Be the root, if it is the own turn and known to be."""
         if not self.placed and self.own_turns is not None and self.turn in self.own_turns:
             self.enter(None)
 
-    def tell(self, parent: str, cells: bytes) -> None:
+    def send_table(self, parent: str, cells: bytes) -> None:
         """Send the own table to the parent. No value will come back."""
         self.send(parent, Table(self.axes, cells, self.turn))
         self._done = True
@@ -193,7 +193,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
             self.send(child, Next())
         self.leave_tree()
         self.turn += 1
-        self.begin_turn()
+        self.start_turn()
         waiting, self._waiting = self._waiting, []
         for sender, message in waiting:
             self.receive(sender, message)

@@ -30,7 +30,7 @@ simulator and in processes it follows from the seed, so that runs can be repeate
 
 The methods:
 
-    choose codes     `begin`              join, subtract keys, minimise   `_compute_util`
+    choose codes     `start_in_tree`              join, subtract keys, minimise   `_compute_util`
     root, tree       `anonymous_dfs`      choose the value                `_choose`
 
 Choices that the paper leaves open, and differences:
@@ -256,7 +256,7 @@ class PDPOP(AnonymousTreeProtocol):
         self.optimum: int | None = None
         self._asked: dict[str, list[str]] = {}
 
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Choose the own codename, the codes and the keys, and tell them the neighbours below."""
         self.codename = f"{self.secret(4 * CODENAME):0{CODENAME}x}"
         self.coded = shuffled(range(len(self.problem.values)), self.secret)
@@ -320,14 +320,14 @@ class PDPOP(AnonymousTreeProtocol):
         self._asked = {child: list(util.axes) for child, util in self.utils.items()}
         self.utils.clear()
         if self.parent is not None:
-            self.tell(self.parent, packed(cells.reshape(-1)))
+            self.send_table(self.parent, packed(cells.reshape(-1)))
         elif cells.item() >= BROKEN:
             self.conclude(Verdict.NO_SOLUTION)
         else:
             self.optimum = cells.item()
             self.decide_as_root()
 
-    def tell(self, parent: str, cells: bytes) -> None:
+    def send_table(self, parent: str, cells: bytes) -> None:
         """Send the own table to the parent."""
         self.send(parent, UTIL(self.axes, cells))
 

@@ -132,10 +132,10 @@ class RerootingProtocol(AnonymousTreeProtocol):
         """Return the largest number of turns that are played for show."""
 
     @abstractmethod
-    def begin_turn(self) -> None:
+    def start_turn(self) -> None:
         """Be the root, if it is the own turn and known to be. Called once the own turns are known."""
 
-    def take_place(self, ring: Ring) -> TeamKey:
+    def join_ring(self, ring: Ring) -> TeamKey:
         """Take a place in the circle; draw the own share of the team's key, and return it."""
         self.ring = ring
         self._key = TeamKey(self._elements, self.secret)
@@ -254,4 +254,4 @@ class RerootingProtocol(AnonymousTreeProtocol):
         self.own_turns = frozenset(turn for turn, one in enumerate(opened) if key.is_zero(one))
         if not self.own_turns:
             raise ValueError("a vector without a turn")
-        self.begin_turn()
+        self.start_turn()

@@ -16,7 +16,7 @@ grow by one, until a move reduces them. Robots detect by a termination counter t
 
 The papers' procedures:
 
-    wait_ok? mode, send_improve      `tell_value`, `_weigh`
+    wait_ok? mode, send_improve      `exchange_values`, `_weigh`
     wait_improve? mode, send_ok      `_weigh`, `_move`
     my_termination_counter           `counter`, `_distance`
     weights of constraints           `weights`
@@ -136,10 +136,10 @@ class DBA(CycleProtocol):
         self._target = 0
         self._missed = False
 
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._weigh)
+        self.choose(self.any_value())
+        self.exchange_values(self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the reduction by this robot's best move, with all neighbours' values known."""
@@ -154,7 +154,7 @@ class DBA(CycleProtocol):
         if now or not complete:
             self.counter = 0
         self._sent = Improve(now - least, now if complete else max(now, 1), self.counter)
-        self.tell(self.problem.neighbours, self._sent)
+        self.multicast(self.problem.neighbours, self._sent)
         self.listen(self.problem.neighbours, self._move)
 
     def _weight(self, charged: list[Charged], place: int) -> int:
@@ -173,9 +173,9 @@ class DBA(CycleProtocol):
         if complete and not max(improve.reduction for improve in (self._sent, *theirs.values())):
             for number in self._violated:
                 self.weights[number] = self.weights.get(number, 1) + 1
-        self.take(self._target if complete and self._wins(theirs) else self.present)
-        if not self.over:
-            self.tell_value(self._weigh)
+        self.choose(self._target if complete and self._wins(theirs) else self.present)
+        if not self.finished:
+            self.exchange_values(self._weigh)
         elif not self._missed:
             self.conclude(Verdict.UNKNOWN)
 

@@ -91,8 +91,8 @@ Then = Callable[[Mapping[str, wire.Message]], None]
 class CycleProtocol(Protocol):
     """One agent of a synchronous local search. State: `cycle`, and the own value in it.
 
-    Subclasses take a first value and send it in `begin`; then they `take` one value per cycle until the search is
-    `over`. They call `listen` with the robots whose messages they need, and a function that processes these. `messages`
+    Subclasses take a first value and send it in `start_cycles`; then they `choose` one value per cycle until the search is
+    `finished`. They call `listen` with the robots whose messages they need, and a function that processes these. `messages`
     has `AnytimeMessage` in it, or `settings` no `anytime`.
     """
 
@@ -117,7 +117,7 @@ class CycleProtocol(Protocol):
         """Of each neighbour, the values that it has said, and can have: most say them again."""
 
     @abstractmethod
-    def begin(self) -> None:
+    def start_cycles(self) -> None:
         """Begin the search, for a robot that has values and neighbours."""
 
     def start(self) -> None:
@@ -126,13 +126,13 @@ class CycleProtocol(Protocol):
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
             burdens = self.problem.lexicographic_costs({})
-            self.take(burdens.index(min(burdens)))
+            self.choose(burdens.index(min(burdens)))
             self.cycle = self.settings.cycles
         elif isinstance(self.settings, CycleSettings) and self.settings.anytime == "yes":
             self._anytime = Anytime(self.problem, self.order, self.settings.cycles)
             self._say(self._anytime.tree.start())
         else:
-            self.begin()
+            self.start_cycles()
             self.settle()
 
     def receive(self, sender: str, message: wire.Message) -> None:
@@ -140,7 +140,7 @@ class CycleProtocol(Protocol):
         if isinstance(message, Place | Step | Paid | Best):
             self._receive_report(sender, message)
         elif self._given_up and self._was_given_up(sender, message):
-            self.hear_late(sender, message)
+            self.receive_late(sender, message)
         else:
             self._store(sender, message)
 
@@ -160,7 +160,7 @@ class CycleProtocol(Protocol):
         self.settle()
         return True
 
-    def hear_late(self, sender: str, message: wire.Message) -> None:
+    def receive_late(self, sender: str, message: wire.Message) -> None:
         """Note what is new in a message whose phase is over."""
         if isinstance(message, Value):
             self.check_value(sender, message.value)
@@ -206,18 +206,18 @@ class CycleProtocol(Protocol):
         self._then = then
         self._missing = [self._waiting[name] for name in names].count([])
 
-    def tell(self, names: Iterable[str], message: wire.Message) -> None:
+    def multicast(self, names: Iterable[str], message: wire.Message) -> None:
         """Send the same message to several robots."""
         said = [(name, message) for name in names]
         self.outbox += said
         self.checks_at_send += [self.problem.checks] * len(said)
 
-    def tell_value(self, then: Then) -> None:
+    def exchange_values(self, then: Then) -> None:
         """Send the own value to all neighbours, wait for theirs, then call `then`."""
-        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.multicast(self.problem.neighbours, Value(self.problem.values[self.present]))
         self.listen(self.problem.neighbours, then)
 
-    def take(self, index: int) -> None:
+    def choose(self, index: int) -> None:
         """Set the own value of the next cycle; it may be the current one."""
         self.cycle += 1
         if index != self.value:
@@ -286,11 +286,11 @@ class CycleProtocol(Protocol):
     @property
     def present(self) -> int:
         """The own value, once there is one."""
-        assert self.value is not None  # noqa: S101 - for mypy: `begin` takes one
+        assert self.value is not None  # noqa: S101 - for mypy: `start_cycles` takes one
         return self.value
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether this was the last cycle."""
         return self.cycle >= self.settings.cycles
 
@@ -302,7 +302,7 @@ class CycleProtocol(Protocol):
             return
         self._say(self._anytime.receive(sender, message))
         if self.cycle < 0 and self._then is None and self._anytime.tree.height is not None:
-            self.begin()
+            self.start_cycles()
         self._take_best()
 
     def _take_best(self) -> None:

@@ -35,8 +35,8 @@ class TreeProtocol(Protocol):
     """One agent that first takes its place in a pseudo-tree, and then runs a protocol on it.
 
     `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, from
-    `begin` on. Then `handle` is called for each message and `decide` for each packet. Messages that arrive before
-    `begin` are stored until then. Children may begin before their parents, never after.
+    `start_in_tree` on. Then `handle` is called for each message and `decide` for each packet. Messages that arrive before
+    `start_in_tree` are stored until then. Children may begin before their parents, never after.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -62,7 +62,7 @@ class TreeProtocol(Protocol):
         self._early = []
 
     @abstractmethod
-    def begin(self) -> None:
+    def start_in_tree(self) -> None:
         """Begin the search; the place in the tree is known."""
 
     @abstractmethod
@@ -83,7 +83,7 @@ class TreeProtocol(Protocol):
             self._propagate(self._election.stand())
 
     def receive(self, sender: str, message: Message) -> None:
-        """Process the messages that build the tree; store messages of the search until `begin`."""
+        """Process the messages that build the tree; store messages of the search until `start_in_tree`."""
         if self.verdict is not None:
             return
         match message:
@@ -160,7 +160,7 @@ class TreeProtocol(Protocol):
         if self.parent is not None:
             self.send(self.parent, Back(dict(visited)))
         self.placed = True
-        self.begin()
+        self.start_in_tree()
         early, self._early = self._early, []
         for sender, message in early:
             self.receive(sender, message)
