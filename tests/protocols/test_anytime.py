@@ -234,10 +234,10 @@ def test_what_a_step_costs_goes_up_and_the_best_comes_down() -> None:
 
 def test_what_cannot_be_is_refused() -> None:
     wrong = [("RX00", Best(0)), ("RX02", Best(0)), ("RX02", Step((1,))), ("RX02", Paid(-1)), ("RX02", Paid(math.nan))]
-    assert_refused(ready, wrong, r"RX0[02] has told (Best|Step|Paid) where it cannot")
-    assert_refused(priced_step, [("RX00", Best(7))], "neither the last one nor the one before")
+    assert_refused(ready, wrong, r"RX0[02] sent an unexpected or invalid (Best|Step|Paid)")
+    assert_refused(priced_step, [("RX00", Best(7))], "neither the latest one nor the one before")
     places = [Place("nobody", 0, None, None, None), Place("RX00", 3, None, None, None)]
-    assert_refused(robot, [("RX00", place) for place in places], "RX00 has told a place that no tree of this team has")
+    assert_refused(robot, [("RX00", place) for place in places], "RX00 sent a place that is in no tree")
     it = robot(anytime="no")
     with pytest.raises(ValueError, match="--set anytime=yes"):
         it.receive("RX00", Step((1,)))

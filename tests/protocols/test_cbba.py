@@ -88,7 +88,7 @@ def test_each_row_of_table_1() -> None:
         for number, (said, known, mine, theirs, expected, rule) in enumerate(TABLE):
             with each(f"{number}: K says {said.winner or 'nobody'}, I {known.winner or 'nobody'}, {rule}"):
                 robot = robot_of(CBBA, team_of_four(), "I")
-                robot.know(0, known)
+                robot.set_standing(0, known)
                 robot.s.update(mine)
                 robot.receive("K", Bundles([(TASK, *said)], stamps_of("IKMN", {"K": 5, **theirs})))
                 assert robot.standings[0] == expected
@@ -100,13 +100,13 @@ def test_information_is_as_new_as_the_newest_that_was_heard_of_each_robot() -> N
     robot.receive("K", Bundles([(TASK, *NOBODY)], [9, 1, 3, 2]))
     assert robot.s == {"I": 0, "K": 1, "M": 4, "N": 2}
     wrong = [("K", Bundles([(TASK, *K3)], stamps)) for stamps in ([], [0, 1, 0], [0, 1, 0, 0, 0])]
-    assert_refused(lambda: robot, wrong, "K does not say how new its information of each robot is")
+    assert_refused(lambda: robot, wrong, "K sent .* stamps, not one for each rival")
 
 
 def test_what_is_not_said_again_is_as_the_sender_said_it_before() -> None:
     """K has said that M has the task. It does so still when it has newer information of M."""
     robot = robot_of(CBBA, team_of_four(), "I")
-    robot.know(0, M9)
+    robot.set_standing(0, M9)
     robot.s.update(NEW)
     robot.receive("K", Bundles([(TASK, *M5)], [0, 1, 2, 2]))
     assert robot.standings[0] == M9

@@ -1,12 +1,12 @@
 """Consensus-Based Auction Algorithm (CBAA).
 
-Each robot takes one task at most. It bids for the task that is worth most to it, of those where its bid is above the
-highest that it knows. Robots tell each other the highest bids that they know; who is outbid bids for another task.
+Each robot does one task at most. It bids for the task that is worth most to it, of those where its bid is above the
+highest known bid. Robots send each other the highest bids that they know; a robot that is outbid bids for another task.
 
-- **When to use**: for task allocation with one task for each robot. Where robots can do several, CBBA.
+- **When to use**: for task allocation with one task for each robot. Where robots can do several tasks, use CBBA.
 - **Guarantees**: incomplete: no proof of optimality. It ends with the outcome of the sequential greedy algorithm,
-  which gains at least half of the optimum of one task for each robot. If messages arrive in rounds, it takes `N_t D`
-  rounds at most, of `N_t` tasks and a network of diameter `D`. Two robots may take the same task for a while.
+  which gains at least half of the optimum of one task for each robot. If messages arrive in rounds, it needs at most
+    `N_t D` rounds, for `N_t` tasks and a network of diameter `D`. Two robots may have the same task for a while.
 - **Reference**: Choi, Brunet, How: "Consensus-based decentralized auctions for robust task allocation", IEEE
   Transactions on Robotics 25(4), 2009, Section III.
 
@@ -19,10 +19,10 @@ The paper's procedure:
 Choices that the paper leaves open, and differences:
 
 - A robot does both phases when messages come, not at fixed times, and sends only bids that the receiver may not know.
-- The winner is told with each bid, as otherwise two equal bids could not be told apart. Of equal bids that of the robot
-  of higher priority counts.
-- Robots tell of a task those only that can do it: they all write to each other.
-- A robot that shares no task with others takes its cheapest value.
+- A message names the winner of each bid, to distinguish equal bids. Of equal bids that of the robot of higher priority
+  counts.
+- Robots send their bids for a task only to robots that can do the task: all of these write to each other.
+- A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -40,7 +40,7 @@ from typing import cast
 
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.auctions.market import NO_LIMIT, Auction, Lot, bid_proves, lot_in_words
+from robochoc.protocols.auctions.market import NO_LIMIT, Auction, Lot, lot_in_words, proofs_of_bid
 from robochoc.protocols.disclosure import Hearing, Proof
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -50,11 +50,11 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.system.plain_text import listed
 
 WinningBid = tuple[Lot, str, int]
-"""A task as the sender names it, who has it as far as the sender knows, and for how much."""
+"""A task by the sender's name for it, its winner as far as the sender knows, and the winner's bid."""
 
 
 class WinningBids(wire.Message, frozen=True):
-    """The highest bids that the sender knows, and the receiver may not (`y`, with the winners)."""
+    """The highest bids that the sender knows, and the receiver may not know (`y`, with the winners)."""
 
     bids: list[WinningBid]
 
@@ -64,12 +64,11 @@ class WinningBids(wire.Message, frozen=True):
         return listed([winning_bid_in_words(words, *bid) for bid in self.bids])
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what the sender has bid itself."""
         return winning_bids_prove(self.bids, hearing)
 
 
 def winning_bid_in_words(words: Wording, lot: Lot, winner: str, amount: int) -> str:
-    """Return who has a task: `task V1 = 3 is mine for 7`, `task V1 = 3 is Robot2's for 7`."""
+    """Return a sentence about a task and its winner: `task V1 = 3 is mine for 7`, `task V1 = 3 is Robot2's for 7`."""
     task = lot_in_words(words, words.sender, lot)
     if not winner:
         return f"{task} is nobody's"
@@ -78,16 +77,16 @@ def winning_bid_in_words(words: Wording, lot: Lot, winner: str, amount: int) -> 
 
 
 def winning_bids_prove(standings: Sequence[WinningBid], hearing: Hearing) -> list[Proof]:
-    """Return what the bids of the sender in `standings` prove.
+    """Return what the sender's own bids in `standings` prove.
 
-    Who else has won is told by the sender's name for the task, which is not the winner's.
+    Those of other winners prove nothing, as the sender's name for a task is not the winner's.
     """
     own = [(lot, amount) for lot, winner, amount in standings if winner == hearing.sender]
-    return [proof for lot, amount in own for proof in bid_proves(hearing.sender, lot, amount, hearing)]
+    return [proof for lot, amount in own for proof in proofs_of_bid(hearing.sender, lot, amount, hearing)]
 
 
 class CBAA(Auction):
-    """One agent of CBAA. State: the highest bid that it knows for each task (`y`), and whose that is (`z`)."""
+    """One agent of CBAA. State: the highest known bid for each task (`y`), and the bidder (`z`)."""
 
     messages = WinningBids
     traits = Traits(
@@ -106,37 +105,37 @@ class CBAA(Auction):
         super().__init__(problem, order)
         self.y: dict[int, int] = {}
         self.z: dict[int, str] = {}
-        self._known = {rival: dict[int, tuple[str, int]]() for rival in self.market.shared}
-        """For each rival the best bids that it has told, or was told."""
+        self._sent_bids = {rival: dict[int, tuple[str, int]]() for rival in self.market.shared}
+        """For each rival the best bids that were sent to it, or received from it."""
 
     def start_auction(self) -> None:
         """Bid for the best task."""
         self._select()
-        self._tell()
+        self._send_bids()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Keep the higher of the bids for each task."""
+        """Store the higher of the bids for each task."""
         for lot, winner, amount in cast("WinningBids", message).bids:
             task = self.market.task(sender, lot)
             self.refuse_winner(task, winner, amount)
-            known = self._known[sender]
+            known = self._sent_bids[sender]
             if self.outbids(winner, amount, *known.get(task, (None, 0))):
                 known[task] = winner, amount
             if self.outbids(winner, amount, self.z.get(task), self.y.get(task, 0)):
                 self.y[task], self.z[task] = amount, winner
 
     def settle(self) -> None:
-        """Give up a task that another robot has won, bid for another one, and tell."""
+        """Give up a task that another robot has won, bid for another one, and send the bids."""
         if self.verdict is None and self.market.shared:
             self._release()
             self._select()
-            self._tell()
+            self._send_bids()
 
     def _release(self) -> None:
         self.bundle = [task for task in self.bundle if self.z[task] == self.problem.agent]
 
     def _select(self) -> None:
-        """Take the best task for which no bid as good is known, if the robot has none."""
+        """Choose the best task without a known bid as good as this robot's, if the robot has none."""
         if not self.bundle:
             own = self.problem.agent
             offer = self.market.best(
@@ -147,10 +146,10 @@ class CBAA(Auction):
                 self.y[offer.task], self.z[offer.task] = offer.amount, own
         self.choose_bundle()
 
-    def _tell(self) -> None:
-        """Tell each rival the bids that are above those that it has told, or was told."""
+    def _send_bids(self) -> None:
+        """Send each rival the bids that are above those sent to it, or received from it."""
         for rival, tasks in self.market.shared.items():
-            known = self._known[rival]
+            known = self._sent_bids[rival]
             news = [task for task in tasks if task in self.z and known.get(task) != (self.z[task], self.y[task])]
             if news:
                 self.send(rival, WinningBids([(self.market.lot(task), self.z[task], self.y[task]) for task in news]))

@@ -1,14 +1,14 @@
 """Consensus-Based Bundle Algorithm (CBBA).
 
-Each robot builds a bundle of tasks: again and again it adds the one that is worth most, given the bundle, of those
-where its bid is above the highest that it knows. Robots tell each other who has which task at what bid. Who is outbid
-gives up the task, and all that it added later, as these bids counted on it.
+Each robot builds a bundle of tasks: it repeatedly adds the task that is worth most, given the bundle, of those where
+its bid is above the highest known bid. Robots send each other the winner and the bid of each task. A robot that is
+outbid gives up the task, and all tasks that it added later, as those bids depended on it.
 
-- **When to use**: for task allocation, where robots do several tasks. Robots may be told others' bids by anybody.
+- **When to use**: for task allocation, where robots do several tasks, and any robot may learn the others' bids.
 - **Guarantees**: incomplete: no proof of optimality. It ends with the outcome of the sequential greedy algorithm. Where
   scores have diminishing marginal gain (`market.py`), the gain is at least half of the optimum. With loads and
-  capacities there is no bound. If messages arrive in rounds, it takes `N_t D` rounds at most, of `N_t` tasks and a
-  network of diameter `D`. Two robots may take the same task for a while.
+  capacities there is no bound. If messages arrive in rounds, it needs at most `N_t D` rounds, for `N_t` tasks and a
+    network of diameter `D`. Two robots may have the same task for a while.
 - **Reference**: Choi, Brunet, How: "Consensus-based decentralized auctions for robust task allocation", IEEE
   Transactions on Robotics 25(4), 2009, Section IV and Table I.
 
@@ -21,19 +21,19 @@ The paper's procedure:
 
 Choices that the paper leaves open, and differences:
 
-- A robot does both phases when messages come, not at fixed times. So it tells something only if it is new; and to a
-  robot that is wrong about what this one has, as that has reset it (Table I).
-- The paper's messages hold all of `y` and `z`. Here they hold what the receiver has not been told yet, and the receiver
-  keeps what was said of the rest: Table I is applied to all tasks at each message. Where both ends say the same of a
-  task, none of its rows changes anything; so only those are looked at where they do not.
-- There is no clock: `s` counts each robot's messages. What a later message says of its sender is newer.
-- A robot builds its bundle anew from the first task on. The paper's robots keep what stands before a task that is lost,
-  and append to it. Where a task comes free that they would have added earlier, their outcome depends on delays.
+- A robot does both phases when messages come, not at fixed times. So it sends only news; and corrections to a robot
+  that is wrong about this robot's tasks, as that has reset it (Table I).
+- The paper's messages contain all of `y` and `z`. Here they contain what was not sent to the receiver before, and the
+  receiver stores it: Table I is applied to all tasks at each message. Where sender and receiver agree on a task, no row
+  of the table changes anything; so only the other tasks are examined.
+- There is no clock: `s` counts each robot's messages. Information from a later message of its sender is newer.
+- A robot rebuilds its bundle from the first task on. The paper's robots keep the tasks before a lost one, and append
+  to them. Where a task is freed that they would have added earlier, their outcome depends on delays.
 - Of equal bids that of the robot of higher priority counts.
-- Robots tell of a task those only that can do it: they all write to each other.
+- Robots send their bids for a task only to robots that can do the task: all of these write to each other.
 - Tasks have no order within a bundle: a task's score does not depend on when it is done, and there is no path (`p`).
-- Where scores lack diminishing marginal gain, bids are warped (`market.py`), so that it ends then, too.
-- A robot that shares no task with others takes its cheapest value.
+- Where scores lack diminishing marginal gain, bids are warped (`market.py`), so that the search also ends then.
+- A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -65,29 +65,28 @@ from robochoc.system.plain_text import listed
 
 
 class Bundles(wire.Message, frozen=True):
-    """The winning bids and agents (`y`, `z`) that are new to the receiver, and how new all that was said is (`s`).
+    """The winning bids and agents (`y`, `z`) that are new to the receiver, and the age of all information so far (`s`).
 
-    The winner of a task that nobody has is empty. `stamps` has the number of the last message that the sender has taken
-    in of each robot that can do a task which both ends can do, in priority order; that of the sender is the number of
-    this message.
+    The winner of a task that no robot has is empty. `stamps` are for the robots that can do a task which both ends can
+    do, in priority order: the number of the last message of each that the sender has processed; for the sender, the
+    number of this message.
     """
 
     standings: list[WinningBid]
     stamps: list[int]
 
-    act = Act(Performative.INFORM, "the receiver comes to know who has which task as far as the sender knows")
+    act = Act(Performative.INFORM, "the receiver comes to set_standing who has which task as far as the sender knows")
     shareable = True
 
     def in_words(self, words: Wording) -> str:
         return listed([winning_bid_in_words(words, *one) for one in self.standings])
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what the sender has bid itself."""
         return winning_bids_prove(self.standings, hearing)
 
 
 class Action(Enum):
-    """An action of Table I: how a receiver changes its standing of a task."""
+    """An action of Table I: a change of the receiver's standing of a task."""
 
     UPDATE = "update"
     LEAVE = "leave"
@@ -95,7 +94,7 @@ class Action(Enum):
 
 
 class Standing(NamedTuple):
-    """The winner of a task and its bid; an empty name: nobody has it."""
+    """The winner of a task and its bid; an empty name: no robot has it."""
 
     winner: str = ""
     amount: int = 0
@@ -106,19 +105,19 @@ NOBODY = Standing()
 
 @dataclass(frozen=True)
 class Rivalry:
-    """The rivals that share the same tasks with this robot. They are told the same.
+    """The rivals that share the same tasks with this robot. All of them get the same information.
 
     Attributes:
         tasks: These tasks.
-        near: All robots that can do one of them, in priority order, this one among them: their numbers `s` are told.
+        near: All robots that can do one of them, in priority order, with this robot. Messages contain their `s`.
         place: The place of each of these robots in `near`.
-        told: What these rivals know that this robot says of each task. What is not here is nobody's.
+        sent: The standing of each task that was last sent to these rivals; a task without an entry is nobody's.
     """
 
     tasks: frozenset[int]
     near: tuple[str, ...]
     place: Mapping[str, int]
-    told: dict[int, Standing]
+    sent: dict[int, Standing]
 
 
 @dataclass(frozen=True)
@@ -129,7 +128,7 @@ class Stamps:
     numbers: Sequence[int]
 
     def __getitem__(self, robot: str) -> int:
-        """Return the number of `robot`'s last message that the sender has taken in, directly or through others."""
+        """Return the number of `robot`'s last message whose contents the sender knows, directly or through others."""
         return self.numbers[self.place[robot]]
 
 
@@ -137,7 +136,7 @@ class CBBA(Auction):
     """One agent of CBBA.
 
     State: the `standings`, by task the winning bid and its robot (`y` and `z`), and by robot the number of its last
-    message whose contents have come to this one (`s`).
+    message whose contents have reached this robot (`s`).
     """
 
     messages = Bundles
@@ -161,22 +160,22 @@ class CBBA(Auction):
         self.s = dict.fromkeys([name for one in self.rivalries.values() for name in one.near], 0)
         seats = {names: {name: seat for seat, name in enumerate(names)} for names in rivals}
         self._seats = [seats[names] for names in rivals]
-        """By task the place of each rival among those of the task."""
-        self._said = [[NOBODY] * len(names) for names in rivals]
-        """By task what each rival has said last of it."""
+        """By task the place of each rival among the task's rivals."""
+        self._last_standings = [[NOBODY] * len(names) for names in rivals]
+        """By task the last standing that each rival sent."""
         self._differing: dict[str, set[int]] = {rival: set() for rival in self.rivalries}
-        """By rival the tasks of which it has said something else than this robot would say now."""
+        """By rival the tasks where its last standing differs from this robot's."""
         self._credited: dict[str, set[int]] = {rival: set() for rival in self.rivalries}
-        """By rival the tasks that this robot has, as the rival has said last."""
-        self._heard: dict[str, int] = {}
-        """By rival whose message came in this step, the number of the last message of this robot that it knew of."""
+        """By rival the tasks that this robot has, according to the rival's last message."""
+        self._acknowledged: dict[str, int] = {}
+        """By rival with a message in this step, this robot's last message that the rival had processed."""
         self._numbers = dict.fromkeys(self.rivalries, 0)
         """By rival the number of the last message to it."""
         self._news: set[int] = set()
-        """The tasks of which something may have changed since the last step."""
+        """The tasks that may have changed since the last step."""
 
     def _rivalries(self) -> dict[str, Rivalry]:
-        """Return by rival what it shares with this robot."""
+        """Return by rival the tasks that it shares with this robot."""
         found: dict[frozenset[int], Rivalry] = {}
         for tasks in map(frozenset, self.market.shared.values()):
             if tasks not in found:
@@ -188,129 +187,129 @@ class CBBA(Auction):
     def start_auction(self) -> None:
         """Build a first bundle."""
         self._build()
-        self._tell()
+        self._send_news()
 
     def receive(self, sender: str, message: Message) -> None:
         """Resolve conflicts with the sender, task by task (phase 2)."""
         bundles = cast("Bundles", message)
         rivalry = self.rivalries.get(sender)
         if rivalry is None or len(bundles.stamps) != len(rivalry.near):
-            raise ValueError(f"{sender} does not say how new its information of each robot is")
+            raise ValueError(f"{sender} sent {len(bundles.stamps)} stamps, not one for each rival")
         for lot, winner, amount in bundles.standings:
-            self._listen(sender, self.market.task(sender, lot), winner, amount)
+            self._record(sender, self.market.task(sender, lot), winner, amount)
         stamps = Stamps(rivalry.place, bundles.stamps)
         for task in [*self._differing[sender]]:
-            told = self._said[task][self._seats[task][sender]]
-            self._apply(self._action(sender, task, told, stamps), task, told)
+            received = self._last_standings[task][self._seats[task][sender]]
+            self._apply(self._action(sender, task, received, stamps), task, received)
         own, s = self.problem.agent, self.s
         before = s[own]
         for name, number in zip(rivalry.near, bundles.stamps, strict=True):
             if number > s[name]:  # noqa: PLR1730 - faster
                 s[name] = number
         s[own] = before
-        self._heard[sender] = stamps[own]
+        self._acknowledged[sender] = stamps[own]
 
-    def _listen(self, sender: str, task: int, winner: str, amount: int) -> None:
-        """Keep what a rival says of a task."""
-        told = self.standings[task]
-        if told == (winner, amount):
+    def _record(self, sender: str, task: int, winner: str, amount: int) -> None:
+        """Store a rival's standing of a task."""
+        received = self.standings[task]
+        if received == (winner, amount):
             self._differing[sender].discard(task)
         else:
-            told = Standing(winner, amount)
-            if told != NOBODY:
+            received = Standing(winner, amount)
+            if received != NOBODY:
                 self.refuse_winner(task, winner, amount)
             self._differing[sender].add(task)
-        self._said[task][self._seats[task][sender]] = told
+        self._last_standings[task][self._seats[task][sender]] = received
         if winner == self.problem.agent:
             self._credited[sender].add(task)
         else:
             self._credited[sender].discard(task)
 
-    def know(self, task: int, standing: Standing) -> None:
-        """Change what this robot knows of a task."""
+    def set_standing(self, task: int, standing: Standing) -> None:
+        """Change this robot's standing of a task."""
         if standing != self.standings[task]:
             self.standings[task] = standing
             self._news.add(task)
-            for rival, said in zip(self.market.rivals[task], self._said[task], strict=True):
+            for rival, said in zip(self.market.rivals[task], self._last_standings[task], strict=True):
                 if said == standing:
                     self._differing[rival].discard(task)
                 else:
                     self._differing[rival].add(task)
 
-    def _action(self, sender: str, task: int, told: Standing, stamps: Stamps) -> Action:
-        """Return what Table I says, where `sender` is the paper's agent k, and this robot is agent i."""
-        match told.winner:
+    def _action(self, sender: str, task: int, received: Standing, stamps: Stamps) -> Action:
+        """Return the action of Table I, where `sender` is the paper's agent k, and this robot is agent i."""
+        match received.winner:
             case self.problem.agent:
-                return self._sender_says_receiver(sender, task, stamps)
+                return self._sender_names_receiver(sender, task, stamps)
             case "":
-                return self._sender_says_nobody(sender, task, stamps)
+                return self._sender_names_nobody(sender, task, stamps)
             case winner if winner == sender:
-                return self._sender_says_sender(sender, task, told, stamps)
+                return self._sender_names_sender(sender, task, received, stamps)
             case _:
-                return self._sender_says_another(sender, task, told, stamps)
+                return self._sender_names_another(sender, task, received, stamps)
 
     def _is_newer(self, robot: str, stamps: Stamps) -> bool:
-        """Return whether the sender has newer information of `robot` than this one (s_k > s_i)."""
+        """Return whether the sender has newer information about `robot` than this robot (s_k > s_i)."""
         return stamps[robot] > self.s[robot]
 
-    def _is_higher(self, told: Standing, task: int) -> bool:
-        """Return whether a bid that was told is above the one that is known (y_k > y_i)."""
+    def _is_higher(self, received: Standing, task: int) -> bool:
+        """Return whether a received bid is above the known bid (y_k > y_i)."""
         known = self.standings[task]
-        return self.outbids(told.winner, told.amount, known.winner or None, known.amount)
+        return self.outbids(received.winner, received.amount, known.winner or None, known.amount)
 
-    def _sender_says_sender(self, sender: str, task: int, told: Standing, stamps: Stamps) -> Action:
+    def _sender_names_sender(self, sender: str, task: int, received: Standing, stamps: Stamps) -> Action:
         known = self.standings[task].winner
         if known == self.problem.agent:
-            return Action.UPDATE if self._is_higher(told, task) else Action.LEAVE
+            return Action.UPDATE if self._is_higher(received, task) else Action.LEAVE
         if known in {sender, ""}:
             return Action.UPDATE
-        return Action.UPDATE if self._is_newer(known, stamps) or self._is_higher(told, task) else Action.LEAVE
+        return Action.UPDATE if self._is_newer(known, stamps) or self._is_higher(received, task) else Action.LEAVE
 
-    def _sender_says_receiver(self, sender: str, task: int, stamps: Stamps) -> Action:
+    def _sender_names_receiver(self, sender: str, task: int, stamps: Stamps) -> Action:
         known = self.standings[task].winner
         if known in {self.problem.agent, ""}:
             return Action.LEAVE
         return Action.RESET if known == sender or self._is_newer(known, stamps) else Action.LEAVE
 
-    def _sender_says_another(self, sender: str, task: int, told: Standing, stamps: Stamps) -> Action:
-        known, winner = self.standings[task].winner, told.winner
+    def _sender_names_another(self, sender: str, task: int, received: Standing, stamps: Stamps) -> Action:
+        known, winner = self.standings[task].winner, received.winner
         is_newer = self._is_newer(winner, stamps)
         if known == self.problem.agent:
-            return Action.UPDATE if is_newer and self._is_higher(told, task) else Action.LEAVE
+            return Action.UPDATE if is_newer and self._is_higher(received, task) else Action.LEAVE
         if known == sender:
             return Action.UPDATE if is_newer else Action.RESET
         if known in {winner, ""}:
             return Action.UPDATE if is_newer else Action.LEAVE
         known_is_older = self._is_newer(known, stamps)
-        if is_newer and (known_is_older or self._is_higher(told, task)):
+        if is_newer and (known_is_older or self._is_higher(received, task)):
             return Action.UPDATE
         return Action.RESET if known_is_older and stamps[winner] < self.s[winner] else Action.LEAVE
 
-    def _sender_says_nobody(self, sender: str, task: int, stamps: Stamps) -> Action:
+    def _sender_names_nobody(self, sender: str, task: int, stamps: Stamps) -> Action:
         known = self.standings[task].winner
         if known in {self.problem.agent, ""}:
             return Action.LEAVE
         return Action.UPDATE if known == sender or self._is_newer(known, stamps) else Action.LEAVE
 
-    def _apply(self, action: Action, task: int, told: Standing) -> None:
+    def _apply(self, action: Action, task: int, received: Standing) -> None:
         match action:
             case Action.UPDATE:
-                self.know(task, told)
+                self.set_standing(task, received)
             case Action.RESET:
-                self.know(task, NOBODY)
+                self.set_standing(task, NOBODY)
             case Action.LEAVE:
                 pass
             case never:
                 assert_never(never)
 
     def settle(self) -> None:
-        """Build the bundle again, and tell (phase 1)."""
+        """Rebuild the bundle, and send the news (phase 1)."""
         if self.verdict is None and self.market.shared:
             self._build()
-            self._tell()
+            self._send_news()
 
     def _build(self) -> None:
-        """Add tasks to the bundle, the best first, as long as there is one where the own bid is the highest."""
+        """Add tasks to the bundle, the best first, as long as this robot's bid for one is the highest."""
         own = self.problem.agent
         released = self._released()
         limit, bids = NO_LIMIT, dict[int, Standing]()
@@ -325,20 +324,20 @@ class CBBA(Auction):
             self.bundle.append(offer.task)
             bids[offer.task] = Standing(own, limit)
         for task in released - bids.keys():
-            self.know(task, NOBODY)
+            self.set_standing(task, NOBODY)
         for task, bid in bids.items():
-            self.know(task, bid)
+            self.set_standing(task, bid)
         self.choose_bundle()
 
     def _released(self) -> set[int]:
-        """Return the tasks that are given up: all of the bundle that nobody else has won.
+        """Return the tasks to release: those of the bundle that no other robot has won.
 
-        They come into it again, unless bids counted on what is lost.
+        They are added again, unless their bids depended on lost tasks.
         """
         return {task for task in self.bundle if self.standings[task].winner == self.problem.agent}
 
-    def _tell(self) -> None:
-        """Tell each rival what is new; and what is so still, if the rival is wrong about what this robot has."""
+    def _send_news(self) -> None:
+        """Send each rival the news, and a correction where the rival is wrong about this robot's tasks."""
         own = self.problem.agent
         number = self.s[own] + 1
         said: dict[int, Bundles | None] = {}
@@ -347,33 +346,33 @@ class CBBA(Auction):
             if key not in said:
                 said[key] = self._message(rivalry, self._unknown(rivalry), number)
             message = said[key]
-            if message is None and rival in self._heard:
+            if message is None and rival in self._acknowledged:
                 message = self._message(rivalry, self._mistaken(rival), number)
             if message is not None:
                 self.s[own] = self._numbers[rival] = number
                 self.send(rival, message)
         self._news.clear()
-        self._heard.clear()
+        self._acknowledged.clear()
 
     def _unknown(self, rivalry: Rivalry) -> list[int]:
-        """Return the tasks of which these rivals have not been told what this robot knows; they will be."""
-        told = rivalry.told
-        tasks = [task for task in self._news & rivalry.tasks if self.standings[task] != told.get(task, NOBODY)]
-        told.update({task: self.standings[task] for task in tasks})
+        """Return the tasks whose standings these rivals do not set_standing; mark them as sent."""
+        sent = rivalry.sent
+        tasks = [task for task in self._news & rivalry.tasks if self.standings[task] != sent.get(task, NOBODY)]
+        sent.update({task: self.standings[task] for task in tasks})
         return tasks
 
     def _mistaken(self, rival: str) -> list[int]:
-        """Return the tasks of which the rival, in a message of this step, says something wrong of what this robot has.
+        """Return the tasks where the rival, in a message of this step, is wrong about this robot's tasks.
 
-        None if a message is under way to it that says so already.
+        None where a message on its way to the rival corrects that already.
         """
-        if self._heard[rival] < self._numbers[rival]:
+        if self._acknowledged[rival] < self._numbers[rival]:
             return []
         claimed = self.rivalries[rival].tasks.intersection(self.bundle)
         return [*(self._credited[rival] | claimed) & self._differing[rival]]
 
     def _message(self, rivalry: Rivalry, tasks: list[int], number: int) -> Bundles | None:
-        """Return what is said of `tasks`, with the number of this message; None if there are none."""
+        """Return a message about `tasks`, with its `number`; None if there are no tasks."""
         if not tasks:
             return None
         standings = [(self.market.lot(task), *self.standings[task]) for task in sorted(tasks)]

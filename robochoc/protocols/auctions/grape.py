@@ -1,10 +1,10 @@
 """GRoup Agent Partitioning and placing Event (GRAPE).
 
-Each robot joins the coalition for one task, or none. What a task gains a robot falls as its coalition grows. All robots
-keep a partition into coalitions; who would gain more elsewhere moves there, and tells the new partition. Of several
-partitions that with the most moves counts, and of equally many one that is drawn at random.
+Each robot joins the coalition for one task, or none. What a robot gains by a task falls as its coalition grows. All
+robots store a partition into coalitions; a robot that would gain more elsewhere moves there, and sends the new
+partition. Of several partitions the one with the most moves counts; a random number breaks ties.
 
-- **When to use**: for task allocation where several robots may do a task, the more the less it gains each. The only
+- **When to use**: for task allocation where several robots may do a task, and each gains less the more they are. The
   such protocol here; where a task is for one robot, `ssi` and `cbaa` gain more.
 - **Guarantees**: incomplete: no proof of optimality. It ends in a Nash stable partition: no robot gains by moving
   alone. Where the gain of a coalition never falls as robots join it, all gain at least half of the optimum together
@@ -21,12 +21,12 @@ The paper's procedure:
 
 Choices that the paper leaves open, and differences:
 
-- A robot's utility in a task is what the task saves it alone, less half of what its pairs with the others there cost.
-  So the utilities of all robots add up to what the team saves. It is kept twice as large, and so an integer.
-- All start with no task. A robot that gains as much elsewhere stays.
-- Robots tell a partition to those they share tasks with, when they have moved, or have taken it over.
+- A robot's utility in a task is what the task saves it alone, less half of the cost of its pairs with the others there.
+  So the utilities of all robots add up to what the team saves. Utilities are doubled, to be integers.
+- All start without a task. A robot that gains as much elsewhere stays.
+- Robots send a partition to those with whom they share tasks, when they have moved or adopted it.
 - Stamps have 32 bits. Of equal ones the robot of higher priority counts.
-- A robot that shares no task with others takes its cheapest value.
+- A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -45,7 +45,7 @@ from typing import cast
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.auctions.market import Auction, Lot, does_proves, lot_in_words
+from robochoc.protocols.auctions.market import Auction, Lot, lot_in_words, proofs_of_task
 from robochoc.protocols.disclosure import Hearing, Proof
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -56,9 +56,9 @@ from robochoc.system.plain_text import listed
 
 
 class Partition(wire.Message, frozen=True):
-    """A partition of the robots into coalitions, and how new it is (`Pi`, `r`, `s`).
+    """A partition of the robots into coalitions, with its age (`Pi`, `r`, `s`).
 
-    `evolution` counts the moves that have led to it, `stamp` is the random number of the last one, which `mover` has
+    `evolution` counts the moves that have led to it, `stamp` is the random number of the last move, which `mover` has
     made. `coalitions` has each robot that does a task, with that robot's name for it.
     """
 
@@ -74,15 +74,14 @@ class Partition(wire.Message, frozen=True):
         return f"after move {self.evolution:,}, which was {self.mover}'s, {listed(who) or 'nobody does anything'}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what each robot can do that does something."""
-        return [proof for robot, lot in self.coalitions.items() for proof in does_proves(robot, lot, hearing)]
+        return [proof for robot, lot in self.coalitions.items() for proof in proofs_of_task(robot, lot, hearing)]
 
 
 STAMPS = 1 << 32
 
 
 class GRAPE(Auction):
-    """One agent of GRAPE. State: the `partition` that counts, as far as it knows, and whether it is `satisfied`."""
+    """One agent of GRAPE. State: the valid `partition`, as far as it knows, and whether it is `satisfied`."""
 
     messages = Partition
     traits = Traits(
@@ -103,46 +102,46 @@ class GRAPE(Auction):
         self.partition = Partition(0, 0, "", {})
         self.satisfied = False
         self._own = {self.market.lot(task): task for task in range(len(self.market.rivals))}
-        self._heard: dict[str, Partition] = {}
-        """The partitions that rivals have told in this step."""
+        self._received: dict[str, Partition] = {}
+        """The partitions that rivals have sent in this step."""
 
     def start_auction(self) -> None:
         """Join the best coalition."""
         if self._decide():
-            self._tell()
+            self._send_partition()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Keep a partition until all waiting messages are there.
+        """Store a partition until all waiting messages are there.
 
         Raises:
-            ValueError: where it is none of these robots.
+            ValueError: for a partition that these robots cannot have made.
         """
         partition = cast("Partition", message)
         own = partition.coalitions.get(self.problem.agent)
         if sender not in self.market.shared or not {partition.mover, *partition.coalitions} <= self.order.rank.keys():
-            raise ValueError(f"{sender} speaks of robots that are not there, or shares no task")
+            raise ValueError(f"{sender} sent a partition of unknown robots, or shares no task with this robot")
         if partition.evolution < 1 or not 0 <= partition.stamp < STAMPS:
-            raise ValueError(f"{sender} tells a partition that nobody has made")
+            raise ValueError(f"{sender} sent a partition without a move or with an invalid stamp: {partition.stamp}")
         if own is not None and own not in self._own:
-            raise ValueError(f"{sender} says that {self.problem.agent} does a task that it cannot do")
-        if sender not in self._heard or self._age(partition) > self._age(self._heard[sender]):
-            self._heard[sender] = partition
+            raise ValueError(f"{sender} assigns a task to {self.problem.agent} that it cannot do")
+        if sender not in self._received or self._age(partition) > self._age(self._received[sender]):
+            self._received[sender] = partition
 
     def settle(self) -> None:
-        """Take over the partition that counts, and move if that gains (D-Mutex)."""
-        if self.verdict is not None or not self._heard:
+        """Adopt the valid partition, and move if that gains (D-Mutex)."""
+        if self.verdict is not None or not self._received:
             return
-        newest = max(self._heard.values(), key=self._age)
+        newest = max(self._received.values(), key=self._age)
         if self._age(newest) > self._age(self.partition):
             self.partition, self.satisfied = newest, False
         if not self.satisfied:
             moved = self._decide()
-            told = {rival for rival, heard in self._heard.items() if heard == self.partition and not moved}
-            self._tell(told)
-        self._heard.clear()
+            told = {rival for rival, heard in self._received.items() if heard == self.partition and not moved}
+            self._send_partition(told)
+        self._received.clear()
 
     def _age(self, partition: Partition) -> tuple[int, int, int]:
-        """Return what makes a partition count: the more of it, the newer."""
+        """Return the key that orders partitions: the greatest is valid."""
         return partition.evolution, partition.stamp, -self.order.rank.get(partition.mover, -1)
 
     def _decide(self) -> bool:
@@ -167,7 +166,7 @@ class GRAPE(Auction):
         return True
 
     def _utility(self, task: int | None) -> float:
-        """Return twice what the robot gains by `task`, in the present partition; None: by none."""
+        """Return twice the robot's gain by `task` in the present partition; None: without a task."""
         score = 0 if task is None else self.market.score(task)
         if score is None:
             return -INFINITE
@@ -180,8 +179,8 @@ class GRAPE(Auction):
         lot = self.partition.coalitions.get(robot)
         return lot is not None and self.market.names(robot, lot) == task
 
-    def _tell(self, but: set[str] | None = None) -> None:
-        """Tell the partition to all rivals `but` those that know it."""
+    def _send_partition(self, but: set[str] | None = None) -> None:
+        """Send the partition to all rivals `but` those that know it."""
         for rival in self.market.shared:
             if rival not in (but or ()):
                 self.send(rival, self.partition)

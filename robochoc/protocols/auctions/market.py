@@ -1,11 +1,9 @@
-"""The common part of task allocation: what is for sale, what it is worth to a robot, and the base of their protocols.
+"""Task allocation: the tasks, their value to a robot, and the base of the auction protocols.
 
-A *task* is something that is done by one robot at most (`solver/exclusions.py`). A robot's *bundle* is the set of tasks
-that it takes; of the robot's values with the same tasks only the cheapest counts. A task is worth to a robot what its
-cost is less with the task than without, given the bundle: in maximised problems, what is gained. That is its *marginal
-score*.
+A *task* is done by one robot at most (`solver/exclusions.py`). A robot's *bundle* is the set of tasks that it does; of
+the robot's values with the same tasks only the cheapest counts. A task's *marginal score*, given the bundle, is the
+robot's cost without the task less its cost with the task: in maximised problems, the gain.
 
-Where the marginal score of a task never rises as the bundle grows, scores have *diminishing marginal gain* (DMG). Where
 they may rise, as with synergies, a bid is never higher than the robot's last one in the bundle (*bid warping*: Johnson,
 Choi, Ponda, How, "Allowing non-submodular score functions in distributed task allocation", CDC 2012). With DMG this
 changes nothing.
@@ -28,14 +26,14 @@ from robochoc.solver.encoding import Cost, UnsupportedError
 from robochoc.system.plain_text import listed
 
 Lot = tuple[int, int]
-"""A task as a robot names it, by its own choice: the place of an interface variable, and its value.
+"""A robot's name for a task: the place of an interface variable, and its value.
 
 The receiver knows which of its own tasks that excludes.
 """
 
 
 def lot_in_words(words: Wording, robot: str, lot: Lot) -> str:
-    """Return what `robot` calls a task: `task V1 = 3`."""
+    """Return the name of a task of `robot`: `task V1 = 3`."""
     place, value = lot
     size = len(words.interfaces.get(robot, ()))
     if not 0 <= place < size:
@@ -43,10 +41,10 @@ def lot_in_words(words: Wording, robot: str, lot: Lot) -> str:
     return f"task {listed(words.facts(robot, [value if at == place else None for at in range(size)]))}"
 
 
-def does_proves(robot: str, lot: Lot, hearing: Hearing) -> list[Proof]:
-    """Return what it proves that `robot` does a task which it calls `lot`: it can take that value.
+def proofs_of_task(robot: str, lot: Lot, hearing: Hearing) -> list[Proof]:
+    """Return the proofs given by the fact that `robot` does a task which it calls `lot`: it can take that value.
 
-    A robot of several variables does not say what the others of them have: that proves nothing of a whole value.
+    The other values of a robot of several variables are not known: that proves nothing about a whole value.
     """
     place, value = lot
     if robot == hearing.receiver or place != 0 or hearing.width(robot) != 1:
@@ -54,22 +52,22 @@ def does_proves(robot: str, lot: Lot, hearing: Hearing) -> list[Proof]:
     return [can_take(robot, (value,))]
 
 
-def bid_proves(robot: str, lot: Lot, amount: int, hearing: Hearing) -> list[Proof]:
-    """Return what a bid of `robot` for the task that it calls `lot` proves.
+def proofs_of_bid(robot: str, lot: Lot, amount: int, hearing: Hearing) -> list[Proof]:
+    """Return the proofs given by a bid of `robot` for the task that it calls `lot`.
 
-    The bid is what its value for the task costs less than the cheapest one without a task, and that is not above the
+    The bid is the cost of its value for the task less that of the cheapest value without a task, which is not above the
     largest cost. A robot of one variable has one task at most, so no other bid has been subtracted.
     """
-    does = does_proves(robot, lot, hearing)
+    does = proofs_of_task(robot, lot, hearing)
     if not does:
-        return next_proves(robot, amount, hearing)
+        return proofs_of_next_bid(robot, amount, hearing)
     return [Pays(robot, (lot[1],), {}, 0, hearing.max_cost - amount)]
 
 
-def next_proves(robot: str, amount: int, hearing: Hearing) -> list[Proof]:
-    """Return what a bid of `robot` for a task that is not told proves: some value is by so much cheaper than another.
+def proofs_of_next_bid(robot: str, amount: int, hearing: Hearing) -> list[Proof]:
+    """Return the proofs given by a bid of `robot` for an unnamed task: one value is cheaper than another by the amount.
 
-    So it is also where the robot has other tasks: the bid is never above what the next one is worth.
+    This also holds where the robot has other tasks: the bid is never above the value of the next task.
     """
     return [SomeValuePays(robot, {}, hearing.max_cost - amount)] if amount > 0 else []
 
@@ -79,7 +77,7 @@ _NONE: Mapping[Lot, int] = {}
 
 
 class Offer(NamedTuple):
-    """A bid: `amount` for `task`. `score` is the marginal score, before the bid is warped."""
+    """A bid of `amount` for `task`. `score` is the marginal score, before the bid is warped."""
 
     task: int
     amount: int
@@ -92,11 +90,11 @@ class Market:
     Attributes:
         rivals: For each task the other robots that can do it, in priority order.
         shared: For each rival, the tasks that both can do.
-        congestion: For each task what each pair of robots that does it costs; infinite: one does it at most.
-        idle: The place of the cheapest own value without a task. None: there is no value at all.
+        congestion: For each task the cost of each pair of robots that does it; infinite: one robot does it at most.
+        idle: The place of this robot's cheapest value without a task. None: it has no value at all.
 
     Raises:
-        UnsupportedError: when the robot's constraints allocate no tasks, or it cannot do without.
+        UnsupportedError: if the robot's constraints allocate no tasks, or it has no value without a task.
     """
 
     def __init__(self, problem: LocalProblem, *, congestion: bool = False) -> None:
@@ -120,7 +118,7 @@ class Market:
         self._lots = [self._lot(problem, number) for number in range(len(self._own))]
         self.idle = self._places.get(frozenset())
         if self.idle is None and self._places:
-            raise UnsupportedError(f"{problem.agent} has no value without a task, and it may get none")
+            raise UnsupportedError(f"{problem.agent} has no value without a task, but may win none: add such a value")
 
     def _cheapest(self, problem: LocalProblem) -> dict[frozenset[int], int]:
         """Return the place of the cheapest value for each set of tasks that the robot can do together."""
@@ -142,22 +140,22 @@ class Market:
         return next((choice for choice in own if choice[0] < len(value) and value[choice[0]] == choice[1]), own[0])
 
     def lot(self, task: int) -> Lot:
-        """Return how this robot names `task`."""
+        """Return this robot's name for `task`."""
         return self._lots[task]
 
     def task(self, robot: str, lot: Lot) -> int:
         """Return the task that `robot` names `lot`.
 
         Raises:
-            ValueError: when both can do no such task.
+            ValueError: if this robot and `robot` share no such task.
         """
         number = self.names(robot, lot)
         if number is None:
-            raise ValueError(f"{robot} names a task that it does not share")
+            raise ValueError(f"{robot} names a task that it does not share: {lot}")
         return number
 
     def score(self, task: int) -> int | None:
-        """Return what `task` is worth to a robot that does nothing else; None if it cannot do it."""
+        """Return the score of `task` for a robot that does nothing else; None if it cannot do it."""
         bundle = frozenset((task,))
         return int(self._charge(frozenset()) - self._charge(bundle)) if bundle in self._places else None
 
@@ -166,16 +164,16 @@ class Market:
         return self._named.get(robot, _NONE).get(lot)
 
     def place(self, bundle: Collection[int]) -> int:
-        """Return the place of the cheapest own value with the tasks of `bundle`, which there is."""
+        """Return the place of this robot's cheapest value with the tasks of `bundle`; there must be one."""
         return self._places[frozenset(bundle)]
 
     def best(self, bundle: Collection[int], limit: int, admits: Callable[[int, int], bool]) -> Offer | None:
-        """Return the best offer for a task besides `bundle`; None if no task is worth more than nothing.
+        """Return the best offer for a task besides `bundle`; None if no task has a positive score.
 
         Args:
             bundle: The tasks that the robot has.
-            limit: No bid is higher.
-            admits: Whether a bid of so much for a task will do.
+            limit: The highest bid allowed.
+            admits: Returns whether a bid of an amount for a task is acceptable.
         """
         for task, score in self._scores(frozenset(bundle)):
             amount = min(score, limit)
@@ -184,7 +182,7 @@ class Market:
         return None
 
     def _scores(self, bundle: frozenset[int]) -> list[tuple[int, int]]:
-        """Return the tasks that can be added to `bundle` and what they are worth then, the best first."""
+        """Return the tasks that can be added to `bundle` with their scores then, the best first."""
         if bundle not in self._scored:
             before = self._charge(bundle)
             more = [(task, bundle | {task}) for task in range(len(self._own)) if task not in bundle]
@@ -197,7 +195,7 @@ class Market:
 
 
 class Auction(Protocol):
-    """One agent of an auction. State: its `market`, and the `bundle`, its tasks in the order in which it took them."""
+    """One agent of an auction. State: its `market`, and the `bundle`, its tasks in the order of their addition."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -206,10 +204,10 @@ class Auction(Protocol):
 
     @abstractmethod
     def start_auction(self) -> None:
-        """Begin to bid, for a robot that has values, and neighbours."""
+        """Start to bid, for a robot that has values, and neighbours."""
 
     def start(self) -> None:
-        """Start; a robot without values ends the search, one without rivals takes its cheapest value."""
+        """Start; a robot without values ends the search, one without rivals chooses its cheapest value."""
         if self.market.idle is None:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.market.shared:
@@ -219,7 +217,7 @@ class Auction(Protocol):
             self.start_auction()
 
     def choose_bundle(self) -> None:
-        """Take the value with the tasks of the bundle."""
+        """Choose the value with the tasks of the bundle."""
         self.value = self.market.place(self.bundle)
 
     def refuse_winner(self, task: int, winner: str, amount: int) -> None:
@@ -230,7 +228,7 @@ class Auction(Protocol):
             raise ValueError(f"{winner} cannot have won a task for {amount}")
 
     def outbids(self, robot: str, amount: int, other: str | None, most: int) -> bool:
-        """Return whether `robot` with a bid of `amount` comes before `other` with `most`; None: nobody has bid.
+        """Return whether a bid of `amount` of `robot` beats the bid `most` of `other`; None: there is no other bid.
 
         Of equal bids that of the robot of higher priority counts.
         """

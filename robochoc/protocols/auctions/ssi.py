@@ -1,9 +1,9 @@
 """Sequential Single-Item auctions (SSI).
 
 Tasks are sold one after the other. Each robot bids for the task that is worth most to it, given the tasks that it has
-won before; the highest bid wins. Then all bid anew.
+won before; the highest bid wins. Then all robots bid again.
 
-- **When to use**: for task allocation, where a good answer by few messages will do. Never are two robots assigned the
+- **When to use**: for task allocation, if a good answer with few messages is enough. Two robots are never assigned the
   same task, so the answer can be used at any moment.
 - **Guarantees**: incomplete: no proof of optimality. The outcome is that of the sequential greedy algorithm. Where
   scores have diminishing marginal gain (`market.py`), the gain is at least half of the optimum, as of greedy
@@ -16,18 +16,18 @@ The papers' procedure:
 
     each robot bids on the target that costs it least more     `_bid`
     the robot with the best of all bids wins that target       `_has_the_best_bid`, `_buy`
-    the winner is told to all, and the next round begins       `_tell`, `_sell`
+    the winner is told to all, and the next round begins       `_send_sales`, `_sell`
 
 Choices that the papers leave open, and differences:
 
-- There are no rounds. A robot's bids never rise, so the last bid of each that can do the same task bounds what it will
-  bid. As soon as a robot's bid is above all of these, it buys. So sales that have nothing to do with each other happen
-  at the same time, and the outcome is as if there were rounds.
-- A bid does not name its task: until it is sold, nobody needs to know.
+- There are no rounds. A robot's bids never rise, so the last bids of the robots that can do the same task bound their
+  future bids. As soon as a robot's bid is above all of these, it buys. So independent sales happen at the same time,
+  and the outcome is as if there were rounds.
+- A bid does not name its task: no robot needs to know it before the sale.
 - Bids of 0 or less are not made. Of equal bids that of the robot of higher priority wins.
 - Bids may rise where scores lack diminishing marginal gain: they are warped (`market.py`).
-- The papers' robots plan tours, and minimise costs. Here a task's score is what constraints say of it.
-- A robot that shares no task with others takes its cheapest value.
+- The papers' robots plan tours, and minimise costs. Here a task's score is computed from the constraints.
+- A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -45,7 +45,15 @@ from typing import assert_never, cast
 
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.auctions.market import NO_LIMIT, Auction, Lot, Offer, does_proves, lot_in_words, next_proves
+from robochoc.protocols.auctions.market import (
+    NO_LIMIT,
+    Auction,
+    Lot,
+    Offer,
+    lot_in_words,
+    proofs_of_next_bid,
+    proofs_of_task,
+)
 from robochoc.protocols.disclosure import Hearing, Proof
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -55,26 +63,26 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.system.plain_text import listed
 
 
-def _next_in_words(amount: int) -> str:
+def _next_bid_in_words(amount: int) -> str:
     return f"I bid {amount:,} for the next task that I want" if amount else "I bid for nothing more"
 
 
 class Bid(wire.Message, frozen=True):
-    """The sender's highest bid, for a task that is not told; 0: it bids for nothing more."""
+    """The sender's highest bid, for a task that is not named; 0: it bids for no other task."""
 
     amount: int
 
     act = Act(Performative.PROPOSE, "the highest bid is to win")
 
     def in_words(self, _: Wording) -> str:
-        return _next_in_words(self.amount)
+        return _next_bid_in_words(self.amount)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return next_proves(hearing.sender, self.amount, hearing)
+        return proofs_of_next_bid(hearing.sender, self.amount, hearing)
 
 
 class Won(wire.Message, frozen=True):
-    """The sender has won the tasks that it calls `lots`; its highest bid for what is left is `amount`."""
+    """The sender has won the tasks that it calls `lots`; `amount` is its highest bid for the others."""
 
     lots: list[Lot]
     amount: int
@@ -83,18 +91,18 @@ class Won(wire.Message, frozen=True):
 
     def in_words(self, words: Wording) -> str:
         lots = listed([lot_in_words(words, words.sender, lot) for lot in self.lots])
-        return f"{lots} {'is' if len(self.lots) == 1 else 'are'} mine, and {_next_in_words(self.amount)}"
+        return f"{lots} {'is' if len(self.lots) == 1 else 'are'} mine, and {_next_bid_in_words(self.amount)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the sender can do the tasks. What it bid may not be told."""
-        won = [proof for lot in self.lots for proof in does_proves(hearing.sender, lot, hearing)]
-        return [*won, *next_proves(hearing.sender, self.amount, hearing)]
+        # The sender can do the tasks. Its former bids for them may be unknown.
+        won = [proof for lot in self.lots for proof in proofs_of_task(hearing.sender, lot, hearing)]
+        return [*won, *proofs_of_next_bid(hearing.sender, self.amount, hearing)]
 
 
 class SSI(Auction):
     """One agent of SSI.
 
-    State: the own `offer`, the `sold` tasks (its own among them), and the last `bids` of the other robots.
+    State: this robot's `offer`, the `sold` tasks (its own included), and the last `bids` of the other robots.
     """
 
     messages = Bid | Won
@@ -116,15 +124,15 @@ class SSI(Auction):
         self.sold: set[int] = set()
         self.bids: dict[str, int] = {}
         self._limit = NO_LIMIT
-        self._told = -1
+        self._last_sent = -1
 
     def start_auction(self) -> None:
         """Make the first bid."""
         self._bid()
-        self._tell([])
+        self._send_sales([])
 
     def receive(self, sender: str, message: Message) -> None:
-        """Note another robot's bid, and what it has won."""
+        """Store another robot's bid, and the tasks that it has won."""
         if self.verdict is not None:
             return
         match cast("Bid | Won", message):
@@ -135,11 +143,11 @@ class SSI(Auction):
             case never:
                 assert_never(never)
         if sender not in self.market.shared or amount < 0:
-            raise ValueError(f"{sender} bids {amount}, and shares {len(self.market.shared.get(sender, ()))} tasks")
+            raise ValueError(f"{sender} bids {amount}, but shares {len(self.market.shared.get(sender, ()))} tasks")
         self.bids[sender] = amount
 
     def settle(self) -> None:
-        """Bid anew if the task is sold, buy as long as the own bid is the best, and tell."""
+        """Bid again if the task is sold, buy as long as this robot's bid is the best, and send the sales."""
         if self.verdict is not None or not self.market.shared:
             return
         if self.offer and self.offer.task in self.sold:
@@ -148,21 +156,21 @@ class SSI(Auction):
         while self.offer and self._has_the_best_bid(self.offer):
             bought.append(self.offer.task)
             self._buy(self.offer)
-        self._tell(bought)
+        self._send_sales(bought)
 
     def _sell(self, sender: str, lots: list[tuple[int, int]]) -> None:
         for lot in lots:
             task = self.market.task(sender, lot)
             if task in self.sold:
-                raise ValueError(f"{sender} has won a task that is sold")
+                raise ValueError(f"{sender} has won a task that is already sold")
             self.sold.add(task)
 
     def _bid(self) -> None:
-        """Find the task that is worth most, of those that are for sale."""
+        """Find the task that is worth most, of those for sale."""
         self.offer = self.market.best(self.bundle, self._limit, lambda task, _: task not in self.sold)
 
     def _has_the_best_bid(self, offer: Offer) -> bool:
-        """Return whether nobody who can do the task has a bid as good, or can have one later."""
+        """Return whether no robot that can do the task has a bid as good, or can have one later."""
         own = self.problem.agent
         rivals = self.market.rivals[offer.task]
         return all(rival in self.bids and self.outbids(own, offer.amount, rival, self.bids[rival]) for rival in rivals)
@@ -174,15 +182,15 @@ class SSI(Auction):
         self.choose_bundle()
         self._bid()
 
-    def _tell(self, bought: list[int]) -> None:
-        """Tell those who can do them which tasks are bought, and all rivals the own bid if it is another."""
+    def _send_sales(self, bought: list[int]) -> None:
+        """Send the tasks bought to the robots that can do them, and a changed bid to all rivals."""
         amount = self.offer.amount if self.offer else 0
-        if not bought and amount == self._told:
+        if not bought and amount == self._last_sent:
             return
         for rival, shared in self.market.shared.items():
             lots = [self.market.lot(task) for task in bought if task in shared]
             if lots:
                 self.send(rival, Won(lots, amount))
-            elif amount != self._told:
+            elif amount != self._last_sent:
                 self.send(rival, Bid(amount))
-        self._told = amount
+        self._last_sent = amount

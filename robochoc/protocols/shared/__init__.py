@@ -1,1 +1,1 @@
-"""What protocols of several families are built on: the pseudo-tree (`dfs.py`), and synchronous cycles (`cycles.py`)."""
+"""Bases of protocols of several families: the pseudo-tree (`dfs.py`) and synchronous cycles (`cycles.py`)."""

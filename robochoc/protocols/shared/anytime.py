@@ -1,24 +1,25 @@
 """The best cycle, found by the robots themselves (anytime local search).
 
-Without it, somebody outside collects the robots' trails and finds the cheapest cycle. With it (`--set anytime=yes`) the
-robots do: first they build a breadth-first tree. Then the costs of each step go up the tree, and the news which one was
-the best so far comes down. At the end each robot holds its value of the best step (Zivan, Okamoto, Peled: "Explorative
-anytime local search for distributed constraint optimization", AIJ 212, 2014, Section 3). It changes nothing in the
-search itself: cycles, values and random numbers are the same.
+Without it, an outside observer collects the robots' trails and finds the cheapest cycle. With it (`--set anytime=yes`),
+the robots first build a breadth-first tree. Then the costs of each step go up the tree, and the number of the best step
+so far comes down. At the end each robot holds its value of the best step (Zivan, Okamoto, Peled: "Explorative anytime
+local search for distributed constraint optimization", AIJ 212, 2014, Section 3). The search itself does not change:
+cycles, values and random numbers are the same.
 
-- A step is a cycle with all its values. After each, a robot tells its value to its neighbours of lower priority
-  (`Step`), as the lowest robot of a constraint charges it.
-- A robot adds what it charges to what its children have reported of the step, and reports the sum (`Paid`).
-- The root compares, and tells which step was the best so far (`Best`), once for each step.
-- A robot remembers its values of the steps of which it has had no news, and of the best one. It waits where these would
-  be more than twice the tree's height and a few, so that is all the memory that it needs.
+- A step is a cycle with all its values. After each step, a robot sends its value to its neighbours of lower priority
+  (`Step`), as the lowest robot of a constraint computes the constraint's cost.
+- A robot adds the cost that it computes to the costs that its children have reported for the step, and reports the sum
+  (`Paid`).
+- The root compares, and sends the best step so far (`Best`), once for each step.
+- A robot remembers its values of the best step, and of the steps without a `Best` so far. It waits when these would be
+  more than twice the tree's height plus 2, so its memory is bounded.
 
-The paper sends these along with the search's own messages. Here they are messages of their own, so that any protocol
-may be below: one for each edge and two for each edge of the tree, in each cycle.
+The paper adds this information to the search's own messages. Here it travels in separate messages, so that it can be
+combined with any protocol: one message for each edge and two for each edge of the tree, in each cycle.
 
-The tree: all robots go through rounds, and tell their neighbours the best root that they know of, and how far it is. A
-robot whose neighbours have the same root, and whose children are complete, is complete. Once a root is, it knows the
-height, and word of that spreads. So the tree is the same whatever the delays, and its paths are shortest ones.
+The tree: all robots go through rounds, in which they send their neighbours the best root that they know, and their
+distance to it. A robot is complete when its neighbours have the same root and its children are complete. Once a root is
+complete, it knows the height, which then spreads. So the tree does not depend on delays, and its paths are shortest.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ Natural = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class Place(wire.Message, frozen=True):
-    """The sender's place in the breadth-first tree, as far as it knows.
+    """The sender's place in the breadth-first tree, as far as the sender knows it.
 
     `parent` is None for a root, `below` the height of its subtree once that is complete, `height` that of the tree.
     """
@@ -65,7 +66,7 @@ class Place(wire.Message, frozen=True):
 
 
 class Step(wire.Message, frozen=True):
-    """The sender's value in its next step (a cycle): the receiver may have to charge for it."""
+    """The sender's value in its next step (a cycle): the receiver may have to compute a constraint's cost with it."""
 
     value: wire.Value
 
@@ -91,7 +92,7 @@ class Paid(wire.Message, frozen=True):
 
 
 class Best(wire.Message, frozen=True):
-    """News of the next step: the best one so far is `step` (None: all broke a hard constraint)."""
+    """The best step so far, `step`, after one more step (None: every step so far broke a hard constraint)."""
 
     step: Natural | None
 
@@ -129,16 +130,16 @@ class BreadthFirstTree:
 
     def start(self) -> Sent:
         """Return the messages of the first round."""
-        return self._tell(None)
+        return self._place_messages(None)
 
     def receive(self, sender: str, place: Place) -> Sent:
         """Process a neighbour's place; return the messages of the next rounds, if there are any.
 
         Raises:
-            ValueError: for a root that is no robot, or too far away.
+            ValueError: for a root that is not a robot of the team, or a distance that is too large.
         """
         if place.root not in self._rank or place.distance >= len(self._rank):
-            raise ValueError(f"{sender} has told a place that no tree of this team has")
+            raise ValueError(f"{sender} sent a place that is in no tree: root {place.root}, distance {place.distance}")
         self._waiting[sender].append(place)
         sent: Sent = []
         while self.height is None and all(self._waiting.values()):
@@ -146,7 +147,7 @@ class BreadthFirstTree:
         return sent
 
     def _round(self, told: dict[str, Place]) -> Sent:
-        """Go through one round, with the places of all neighbours."""
+        """Process one round, with the places of all neighbours."""
         heights = [place.height for place in told.values() if place.height is not None]
         if heights:
             self.height = heights[0]
@@ -156,10 +157,10 @@ class BreadthFirstTree:
         below = self._depth_below(told)
         if self._root == self._agent and self.height is None:
             self.height = below
-        return self._tell(below)
+        return self._place_messages(below)
 
     def _adopt(self, told: dict[str, Place]) -> None:
-        """Take the best root of all, and the nearest neighbour to it as the parent."""
+        """Adopt the best root of all, and the neighbour nearest to it as the parent."""
         name, place = min(told.items(), key=lambda one: (self._rank[one[1].root], one[1].distance, self._rank[one[0]]))
         if self._rank[place.root] < self._rank[self._root]:
             self._root, self._distance, self.parent = place.root, place.distance + 1, name
@@ -168,21 +169,21 @@ class BreadthFirstTree:
         return place.root == self._root and place.parent == self._agent
 
     def _depth_below(self, told: dict[str, Place]) -> int | None:
-        """Return the height of the own subtree; None while it may still grow."""
+        """Return the height of this robot's subtree; None while it may still grow."""
         if any(place.root != self._root for place in told.values()):
             return None
         depths = [told[name].below for name in self.children]
         return 1 + max((depth for depth in depths if depth is not None), default=-1) if None not in depths else None
 
-    def _tell(self, below: int | None) -> Sent:
+    def _place_messages(self, below: int | None) -> Sent:
         place = Place(self._root, self._distance, self.parent, below, self.height)
         return [(name, place) for name in self._waiting]
 
 
 class Anytime:
-    """One robot's part in finding the best step. `best` is the own value in the best step that it has heard of.
+    """One robot's part in finding the best step. `best` is its value in the best step that it knows.
 
-    `news` is the last step that is accounted for, `last` the last one that there will be.
+    `news` is the last step for which a `Best` has come, `last` the last step of the search.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder, last: int) -> None:
@@ -193,7 +194,7 @@ class Anytime:
         self.last = last
         self._problem = problem
         self._below = [name for name in problem.neighbours if order.rank[name] > own]
-        self._told: dict[str, deque[wire.Value]] = {
+        self._values_above: dict[str, deque[wire.Value]] = {
             name: deque() for name in problem.neighbours if order.rank[name] < own
         }
         self._paid: dict[str, deque[Cost]] = {name: deque() for name in problem.neighbours}
@@ -203,7 +204,7 @@ class Anytime:
         self._best_step: int | None = None
 
     def record(self, step: int, index: int) -> Sent:
-        """Note the own value of a step; return the messages that tell it."""
+        """Record this robot's value of a step; return the messages with it."""
         self._values[step] = index
         told = Step(self._problem.values[index])
         return [*((name, told) for name in self._below), *self._report()]
@@ -216,15 +217,15 @@ class Anytime:
         """
         if isinstance(message, Place):
             return self.tree.receive(sender, message)
-        if isinstance(message, Step) and sender in self._told:
-            self._told[sender].append(message.value)
+        if isinstance(message, Step) and sender in self._values_above:
+            self._values_above[sender].append(message.value)
             return self._report()
         if isinstance(message, Paid) and message.cost >= 0:
             self._paid[sender].append(message.cost)
             return self._report()
         if isinstance(message, Best) and sender == self.tree.parent and self.news < self._priced:
-            return self._hear(message.step)
-        raise ValueError(f"{sender} has told {type(message).__name__} where it cannot")
+            return self._record_best(message.step)
+        raise ValueError(f"{sender} sent an unexpected or invalid {type(message).__name__}")
 
     @property
     def remembered(self) -> int:
@@ -232,20 +233,20 @@ class Anytime:
         return len(self._values)
 
     def is_ahead(self, cycle: int) -> bool:
-        """Return whether a robot in `cycle` has to wait for news, lest it have to remember more."""
+        """Return whether a robot in `cycle` has to wait for news, so that it need not remember more values."""
         return self.tree.height is None or cycle - self.news > 2 * self.tree.height + 2
 
     def _report(self) -> Sent:
-        """Price all steps that can be: with the values of neighbours above, and the reports of children."""
+        """Compute the costs of all steps for which the values from above and the children's reports have come."""
         sent: Sent = []
         while (
             self.tree.height is not None
             and self._priced + 1 in self._values
-            and all(self._told.values())
+            and all(self._values_above.values())
             and all(self._paid[name] for name in self.tree.children)
         ):
             self._priced += 1
-            view = {name: values.popleft() for name, values in self._told.items()}
+            view = {name: values.popleft() for name, values in self._values_above.items()}
             cost = self._problem.cost(self._values[self._priced], view)
             for name in self.tree.children:
                 cost += self._paid[name].popleft()
@@ -253,17 +254,17 @@ class Anytime:
         return sent
 
     def _compare(self, cost: Cost) -> Sent:
-        """As the root: return the news of the step that is priced, which costs `cost`."""
+        """As the root: compare the `cost` of the latest step with the best; return the resulting messages."""
         if cost < self._least:
             self._least, self._best_step = cost, self._priced
-        return self._hear(self._best_step)
+        return self._record_best(self._best_step)
 
-    def _hear(self, step: int | None) -> Sent:
-        """Take the news of the next step: the best one so far was `step`. Return it for the children."""
+    def _record_best(self, step: int | None) -> Sent:
+        """Record that the best step after one more step is `step`; return the messages that pass it to the children."""
         self.news += 1
         if step is not None and step != self._best_step:
             if step != self.news:
-                raise ValueError("the best step so far is neither the last one nor the one before")
+                raise ValueError(f"the best step so far is {step}, neither the latest one nor the one before")
             self._best_step = step
         if step == self.news:
             self.best = self._values[step]

@@ -2,12 +2,13 @@
 
 All robots go through cycles, and each cycle has phases. In each phase a robot sends one message to each robot that
 waits for one, then waits for one from each robot that it listens to, and continues when it has all of them. Messages
-need no number, as they arrive in the order of their phases from each robot. A message from a neighbour that is ahead is
+need no number, as those of a robot arrive in the order of their phases. A message from a neighbour that is ahead is
 stored until its phase.
 
-Where messages are lost, the next one of the same robot shows that one is missing before it; where none follows, a robot
-goes on once nothing arrives any more. Either way it does the phase with the messages that it has. A message that comes
-when its phase is over only says what is new. So phases stay in step, and each silence takes the search one further.
+Where a message is lost, the next one of the same robot shows the gap; where none follows, a robot continues once no
+more messages arrive. In both cases it executes the phase with the messages that it has. From a message that arrives
+after its phase, a robot only stores the new information. So phases stay in step, and the search continues after each
+silence.
 
 The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
 (`Trail`); the collected trails give the cheapest cycle. With the setting `anytime` the robots find it themselves
@@ -64,7 +65,7 @@ class Value(wire.Message, frozen=True):
         return f"{words.own_value(self.value)} in this cycle"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        # It may move after the last cycle without a word.
+        # The sender may change its value after the last cycle without another message.
         return [can_take(hearing.sender, self.value)]
 
 
@@ -85,15 +86,15 @@ class Domain(wire.Message, frozen=True):
 T = TypeVar("T")
 
 Then = Callable[[Mapping[str, wire.Message]], None]
-"""A function of one message of each robot passed to `listen`, in the order of these robots; lost ones are missing."""
+"""Called with one message of each robot passed to `listen`, in the order of these robots, without lost ones."""
 
 
 class CycleProtocol(Protocol):
-    """One agent of a synchronous local search. State: `cycle`, and the own value in it.
+    """One agent of a synchronous local search. State: `cycle`, and this robot's value in it.
 
-    Subclasses take a first value and send it in `start_cycles`; then they `choose` one value per cycle until the search is
-    `finished`. They call `listen` with the robots whose messages they need, and a function that processes these. `messages`
-    has `AnytimeMessage` in it, or `settings` no `anytime`.
+    Subclasses choose a first value and send it in `start_cycles`; then they `choose` one value per cycle until the
+    search is `finished`. They call `listen` with the robots whose messages they need, and a function that processes
+    these messages. `messages` includes `AnytimeMessage`, unless `settings` has no `anytime`.
     """
 
     settings: ClassVar[CycleCount] = CycleSettings()
@@ -103,10 +104,10 @@ class CycleProtocol(Protocol):
         self.cycle = -1
         self._trail: list[tuple[int, int]] = []
         self._waiting: dict[str, list[wire.Message | None]] = {name: [] for name in problem.neighbours}
-        """A few at most from each: a robot that is ahead soon waits for this one. None: one that is lost."""
+        """Only a few from each: a robot that is ahead soon waits for this one. None: a lost message."""
         self._given_up: dict[str, int] = {}
-        """For each neighbour, how many of its messages belong to phases that this robot has done without them."""
-        self._known: dict[str, wire.Value] = {}
+        """For each neighbour, the number of its messages that belong to phases executed without them."""
+        self._last_values: dict[str, wire.Value] = {}
         """Neighbours' last values."""
         self._names: tuple[str, ...] = ()
         self._awaited: frozenset[str] = frozenset()
@@ -114,14 +115,14 @@ class CycleProtocol(Protocol):
         self._then: Then | None = None
         self._anytime: Anytime | None = None
         self._checked: dict[str, set[wire.Value]] = {name: set() for name in problem.neighbours}
-        """Of each neighbour, the values that it has said, and can have: most say them again."""
+        """The checked values of each neighbour: most are sent again."""
 
     @abstractmethod
     def start_cycles(self) -> None:
-        """Begin the search, for a robot that has values and neighbours."""
+        """Choose and send a first value. Called for robots that have values and neighbours."""
 
     def start(self) -> None:
-        """Start; an empty domain ends the search, a robot without neighbours takes its cheapest value."""
+        """Start; an empty domain ends the search, a robot without neighbours chooses its cheapest value."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -130,13 +131,13 @@ class CycleProtocol(Protocol):
             self.cycle = self.settings.cycles
         elif isinstance(self.settings, CycleSettings) and self.settings.anytime == "yes":
             self._anytime = Anytime(self.problem, self.order, self.settings.cycles)
-            self._say(self._anytime.tree.start())
+            self._send_each(self._anytime.tree.start())
         else:
             self.start_cycles()
             self.settle()
 
     def receive(self, sender: str, message: wire.Message) -> None:
-        """Store the message for its phase; process one about the best cycle at once."""
+        """Store the message for its phase; process a message about the best cycle at once."""
         if isinstance(message, Place | Step | Paid | Best):
             self._receive_report(sender, message)
         elif self._given_up and self._was_given_up(sender, message):
@@ -145,12 +146,12 @@ class CycleProtocol(Protocol):
             self._store(sender, message)
 
     def miss(self, sender: str) -> None:
-        """Note that the message of a phase is lost."""
+        """Store that the message of a phase is lost."""
         if not self._was_given_up(sender):
             self._store(sender, None)
 
     def go_on(self) -> bool:
-        """Do the present phase without the messages that have not come."""
+        """Execute the current phase without the missing messages."""
         if self._then is None or not self._missing or self.verdict is not None:
             return False
         for name in self._names:
@@ -161,22 +162,22 @@ class CycleProtocol(Protocol):
         return True
 
     def receive_late(self, sender: str, message: wire.Message) -> None:
-        """Note what is new in a message whose phase is over."""
+        """Store the new information in a message that arrived after its phase."""
         if isinstance(message, Value):
             self.check_value(sender, message.value)
-            self._known[sender] = message.value
+            self._last_values[sender] = message.value
 
     def _was_given_up(self, sender: str, message: wire.Message | None = None) -> bool:
-        """Return whether the next message of `sender` belongs to a phase that was done without it; count it off."""
+        """Return whether the sender's next message belongs to a phase that was executed without it; count it off."""
         many = self._given_up.pop(sender, 0)
         if many and message is not None and not self.may_be_late(message):
-            return False  # those that were given up have never been sent
+            return False  # the awaited messages have never been sent
         if many > 1:
             self._given_up[sender] = many - 1
         return many > 0
 
-    def may_be_late(self, message: wire.Message) -> bool:  # noqa: ARG002 - for protocols whose messages tell their phase
-        """Return whether a message may belong to a phase that is over, as one from its sender was given up."""
+    def may_be_late(self, message: wire.Message) -> bool:  # noqa: ARG002 - for messages that contain their phase
+        """Return whether a message may belong to an earlier phase, after a message of its sender was given up."""
         return True
 
     def _store(self, sender: str, message: wire.Message | None) -> None:
@@ -186,7 +187,7 @@ class CycleProtocol(Protocol):
         waiting.append(message)
 
     def settle(self) -> None:
-        """Run all phases whose messages have arrived."""
+        """Execute all phases whose messages have arrived."""
         while self._then and not self._missing and self.verdict is None and not self._is_ahead:
             heard = self.next_messages()
             if heard is None:
@@ -196,11 +197,11 @@ class CycleProtocol(Protocol):
             then(messages)
 
     def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
-        """Take the next message of each robot that this one listens to. None: one has to be waited for after all."""
+        """Remove and return the next message of each robot that this one listens to; None to continue waiting."""
         return [(name, self._waiting[name].pop(0)) for name in self._names]
 
     def listen(self, names: Sequence[str], then: Then) -> None:
-        """Wait for a message of each robot in `names`, then call `then` with them: without those that are lost."""
+        """Wait for a message of each robot in `names`, then call `then` with the messages that are not lost."""
         if names is not self._names:  # in most phases they are the same
             self._names, self._awaited = tuple(names), frozenset(names)
         self._then = then
@@ -213,80 +214,80 @@ class CycleProtocol(Protocol):
         self.checks_at_send += [self.problem.checks] * len(said)
 
     def exchange_values(self, then: Then) -> None:
-        """Send the own value to all neighbours, wait for theirs, then call `then`."""
+        """Send this robot's value to all neighbours, wait for theirs, then call `then`."""
         self.multicast(self.problem.neighbours, Value(self.problem.values[self.present]))
         self.listen(self.problem.neighbours, then)
 
     def choose(self, index: int) -> None:
-        """Set the own value of the next cycle; it may be the current one."""
+        """Set this robot's value of the next cycle; it may be the current value."""
         self.cycle += 1
         if index != self.value:
             self.value = index
             self._trail.append((self.cycle, index))
         if self._anytime:
-            self._say(self._anytime.record(self.cycle, index))
-            self._take_best()
+            self._send_each(self._anytime.record(self.cycle, index))
+            self._choose_best()
 
     def finish(self) -> None:
         """End the search before its last cycle; all connected robots do so in the same one."""
         if self._anytime:
             self._anytime.last = self.cycle
-            self._take_best()
+            self._choose_best()
         self.cycle = self.settings.cycles
 
     def checked_values(self, messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
         """Return the values in the messages of a phase in which every robot sends a `Value`.
 
-        Where a message is lost, the last value that is known stands for it, if there is one.
+        For a lost message, the sender's last known value is used, if there is one.
 
         Raises:
-            ValueError: where a robot says something else, or no value that it can have.
+            ValueError: for a message of another type, or a value that is not in the sender's domain.
         """
         values: dict[str, wire.Value] = {}
         known = self._checked
         for name, message in messages.items():
             if not isinstance(message, Value):
-                raise ValueError(f"{name} tells something else than its value in this phase")  # noqa: TRY004 - as any
+                raise ValueError(f"{name} did not send its value in this phase")  # noqa: TRY004 - as any
             value = values[name] = message.value
             if value not in known[name]:
                 self.check_value(name, value)
         if len(values) < len(self._names):
-            values = {name: values.get(name, self._known.get(name, ())) for name in self._names}
+            values = {name: values.get(name, self._last_values.get(name, ())) for name in self._names}
             values = {name: value for name, value in values.items() if value}
-        self._known = values
+        self._last_values = values
         return values
 
     def checked_domains(self, messages: Mapping[str, wire.Message]) -> dict[str, list[wire.Value]]:
         """Return the domains in the messages of a phase in which every robot sends a `Domain`.
 
         Raises:
-            ValueError: where a robot says something else, or a value that it cannot have.
+            ValueError: for a message of another type, or a value that is not in the sender's domain.
         """
         domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
         for name in messages:
             if name not in domains:
-                raise ValueError(f"{name} tells something else than its domain in this phase")
+                raise ValueError(f"{name} did not send its domain in this phase")
             for value in domains[name]:
                 self.problem.refuse_value(name, value)
         return domains
 
     def check_value(self, name: str, value: wire.Value) -> None:
-        """Raise `ValueError` for a `value` that the robot called `name` cannot have."""
+        """Raise `ValueError` for a `value` that is not in the domain of the robot called `name`."""
         self.problem.refuse_value(name, value)
         self._checked[name].add(value)
 
     def any_value(self) -> int:
-        """Return a random value of the whole domain, with which the search begins."""
+        """Return a random value of the whole domain, to start the search with."""
         return self.any_of(range(len(self.problem.values)))
 
     def any_of(self, choices: Sequence[T]) -> T:
-        """Return a random one of `choices`; with a single choice, no random number is drawn."""
+        """Return a random one of `choices`; for a single choice, draw no random number."""
         return one_of(self.chance, choices)
 
     @property
     def present(self) -> int:
-        """The own value, once there is one."""
-        assert self.value is not None  # noqa: S101 - for mypy: `start_cycles` takes one
+        """This robot's value, after `start_cycles`."""
+        assert self.value is not None  # noqa: S101 - for mypy: `start_cycles` chooses one
         return self.value
 
     @property
@@ -295,23 +296,23 @@ class CycleProtocol(Protocol):
         return self.cycle >= self.settings.cycles
 
     def _receive_report(self, sender: str, message: Place | Step | Paid | Best) -> None:
-        """Process a message about the best cycle; begin the search once the tree is complete."""
+        """Process a message about the best cycle; start the search once the tree is complete."""
         if self._anytime is None:
-            raise ValueError(f"{sender} wants to find the best cycle, and this robot does not (--set anytime=yes)")
+            raise ValueError(f"{sender} looks for the best cycle, this robot does not: use --set anytime=yes for all")
         if self.verdict is not None:
             return
-        self._say(self._anytime.receive(sender, message))
+        self._send_each(self._anytime.receive(sender, message))
         if self.cycle < 0 and self._then is None and self._anytime.tree.height is not None:
             self.start_cycles()
-        self._take_best()
+        self._choose_best()
 
-    def _take_best(self) -> None:
-        """Take the own value of the best cycle, once all cycles are accounted for."""
+    def _choose_best(self) -> None:
+        """Choose this robot's value of the best cycle, once the costs of all cycles are known."""
         anytime = self._anytime
         if anytime and anytime.news == anytime.last and anytime.best is not None:
             self.value = anytime.best
 
-    def _say(self, sent: Iterable[tuple[str, wire.Message]]) -> None:
+    def _send_each(self, sent: Iterable[tuple[str, wire.Message]]) -> None:
         for name, message in sent:
             self.send(name, message)
 
@@ -321,7 +322,7 @@ class CycleProtocol(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """The own value in every cycle."""
+        """This robot's value in every cycle."""
         return Findings(trail=Trail(list(self._trail), self.cycle))
 
 

@@ -3,19 +3,18 @@
 Each connected component elects the robot with the most neighbours: waves of all candidates spread, and only the
 strongest candidate's wave survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms",
 2nd edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques
-and the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983). There it bounces off robots that it has
-visited, two more messages for each edge outside the tree. Here it names visited robots, and is never sent to one of
-them: two messages for each robot but the root (as in Makki, Havas: "Distributed
-algorithms for depth-first search", IPL 60, 1996). It names each only until its last neighbour has heard of it: with the
-name goes the number of neighbours that have not. On a path that is one name at a time, on a tree those of one branch.
-A robot sends the token to its unvisited neighbour with the most neighbours. Ties go to the robot of higher priority.
+and the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983). In that paper the token bounces off
+visited robots, which takes two more messages for each edge outside the tree. Here the token lists visited robots, and
+is never sent to one of them: two messages for each robot but the root (as in Makki, Havas: "Distributed algorithms for
+depth-first search", IPL 60, 1996). It lists a robot only until all neighbours of that robot know of the visit: beside
+the name is the number of neighbours that do not. So it lists one robot at a time on a path, and those of one branch on
+a tree. A robot sends the token to its unvisited neighbour with the most neighbours. Ties go to the robot of higher
+priority.
 
 Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots of an n-ary
 constraint, as they are all neighbours. The cost: 2 messages for each robot for the token, and at least 2 for each edge
 for the election.
 """
-
-from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,11 +31,11 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class TreeProtocol(Protocol):
-    """One agent that first takes its place in a pseudo-tree, and then runs a protocol on it.
+    """One agent that first finds its place in a pseudo-tree, and then runs a protocol on the tree.
 
-    `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, from
-    `start_in_tree` on. Then `handle` is called for each message and `decide` for each packet. Messages that arrive before
-    `start_in_tree` are stored until then. Children may begin before their parents, never after.
+    `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, when
+    `start_in_tree` is called. Then `handle` is called for each message and `decide` for each packet. Earlier messages
+    are stored until then. Children may start before their parents, never after.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -46,14 +45,14 @@ class TreeProtocol(Protocol):
         self.children: tuple[str, ...] = ()
         self.pseudo_children: tuple[str, ...] = ()
         self.placed = False
-        """Whether this robot, and all below it, have their places in the tree."""
+        """Whether this robot, and all robots below it, have their places in the tree."""
         self._election = _Election(problem.agent, problem.neighbours, order)
         self._met: set[str] = set()
         """The neighbours that this robot knows to be in the tree."""
         self._early: list[tuple[str, Message]] = []
 
     def leave_tree(self) -> None:
-        """Forget the place in the tree; `start` begins a new one, with the present neighbours and order."""
+        """Forget the place in the tree; `start` builds a new tree, with the present neighbours and order."""
         self.parent = None
         self.pseudo_parents = self.children = self.pseudo_children = ()
         self.placed = False
@@ -63,24 +62,24 @@ class TreeProtocol(Protocol):
 
     @abstractmethod
     def start_in_tree(self) -> None:
-        """Begin the search; the place in the tree is known."""
+        """Start the search; the place in the tree is known."""
 
     @abstractmethod
     def handle(self, sender: str, message: Message) -> None:
         """Process one message of the search."""
 
     def decide(self) -> None:
-        """Decide, after all waiting messages were processed."""
+        """Decide; called after all waiting messages were processed."""
 
     def start(self) -> None:
-        """Start the own election wave; a robot with an empty domain ends the search."""
+        """Start this robot's election wave; a robot with an empty domain ends the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
             self._visit(None, {})
             self.settle()
         else:
-            self._propagate(self._election.stand())
+            self._propagate(self._election.start())
 
     def receive(self, sender: str, message: Message) -> None:
         """Process the messages that build the tree; store messages of the search until `start_in_tree`."""
@@ -94,7 +93,7 @@ class TreeProtocol(Protocol):
             case Token(visited):
                 self._visit(sender, visited)
             case Back(visited):
-                self._go_on(self._heard(visited))
+                self._pass_token(self._note_visited(visited))
             case _ if self.placed:
                 self.handle(sender, message)
             case _:
@@ -127,18 +126,18 @@ class TreeProtocol(Protocol):
     def _visit(self, parent: str | None, visited: Mapping[str, int]) -> None:
         """Process the first visit of the token: neighbours that it has visited are above.
 
-        A robot whose only neighbour is its parent needs no list, so it is none of those that have to hear.
+        A robot whose only neighbour is its parent needs no list, and no other robot needs to know that it was visited.
         """
         self.parent = parent
         neighbours = self.problem.neighbours
-        left = visited if len(neighbours) == 1 else self._heard(visited)
+        left = visited if len(neighbours) == 1 else self._note_visited(visited)
         self._met.update([] if parent is None else [parent])
         self.pseudo_parents = self._sorted(self._met - {parent})
         unaware = sum(name != parent and self._election.degree(name) > 1 for name in neighbours)
-        self._go_on({**left, self.problem.agent: unaware} if unaware else left)
+        self._pass_token({**left, self.problem.agent: unaware} if unaware else left)
 
-    def _heard(self, visited: Mapping[str, int]) -> Mapping[str, int]:
-        """Note which neighbours are `visited`; return these robots without those that nobody else has to hear of."""
+    def _note_visited(self, visited: Mapping[str, int]) -> Mapping[str, int]:
+        """Store which neighbours were `visited`; return those visited robots that some neighbour does not know yet."""
         new = [name for name in self.problem.neighbours if name in visited and name not in self._met]
         if not new:
             return visited
@@ -146,7 +145,7 @@ class TreeProtocol(Protocol):
         counts = {**visited, **{name: visited[name] - 1 for name in new}}
         return {name: unaware for name, unaware in counts.items() if unaware}
 
-    def _go_on(self, visited: Mapping[str, int]) -> None:
+    def _pass_token(self, visited: Mapping[str, int]) -> None:
         """Send the token to an unvisited neighbour, or back if all are in the tree."""
         left = [name for name in self.problem.neighbours if name not in self._met]
         if left:
@@ -172,7 +171,7 @@ class TreeProtocol(Protocol):
 class _Election:
     """One agent's part in the election: the strongest known `candidate`, and the neighbour its wave came from.
 
-    `_heard` are the neighbours from which that candidate's wave has arrived; after the last one, the wave is returned.
+    `_arrived` are the neighbours from which that candidate's wave has arrived; after the last one it is returned.
     """
 
     def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
@@ -181,7 +180,7 @@ class _Election:
         self._degrees = {agent: len(neighbours)}
         self._agent = self._candidate = agent
         self._from: str | None = None
-        self._heard: set[str] = set()
+        self._arrived: set[str] = set()
         self.won = False
 
     def strength(self, name: str) -> tuple[int, int]:
@@ -192,8 +191,8 @@ class _Election:
         """Return the number of neighbours of a neighbour."""
         return self._degrees[name]
 
-    def stand(self) -> list[tuple[str, Wave]]:
-        """Return the own wave for all neighbours."""
+    def start(self) -> list[tuple[str, Wave]]:
+        """Return this robot's wave for all neighbours."""
         return [(name, self._wave) for name in self._neighbours]
 
     def receive(self, sender: str, wave: Wave) -> list[tuple[str, Wave]]:
@@ -201,12 +200,12 @@ class _Election:
         self._degrees[wave.candidate] = wave.neighbours
         answers: list[tuple[str, Wave]] = []
         if self.strength(wave.candidate) > self.strength(self._candidate):
-            self._candidate, self._from, self._heard = wave.candidate, sender, set()
+            self._candidate, self._from, self._arrived = wave.candidate, sender, set()
             answers = [(name, self._wave) for name in self._neighbours if name != sender]
         if wave.candidate != self._candidate:
             return answers
-        self._heard.add(sender)
-        if len(self._heard) == len(self._neighbours):
+        self._arrived.add(sender)
+        if len(self._arrived) == len(self._neighbours):
             if self._from is None:
                 self.won = True
             else:

@@ -13,7 +13,7 @@ from robochoc.system.plain_text import counted, listed
 
 
 class Wave(Message, frozen=True):
-    """An election wave of `candidate`, with its number of neighbours.
+    """An election wave of `candidate`, with the number of its neighbours.
 
     The candidate becomes the root if its wave returns from all neighbours.
     """
@@ -29,7 +29,7 @@ class Wave(Message, frozen=True):
 
 
 Visited = dict[str, Annotated[int, msgspec.Meta(ge=1)]]
-"""Robots in the tree, each with the number of its neighbours that have not heard so; without those that all know of."""
+"""Robots in the tree, each with the number (1 or more) of its neighbours that do not know so yet."""
 
 
 class Token(Message, frozen=True):
@@ -41,7 +41,7 @@ class Token(Message, frozen=True):
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        return f"you are my child in the tree{_news(self.visited)}"
+        return f"you are my child in the tree{_unaware_in_words(self.visited)}"
 
 
 class Back(Message, frozen=True):
@@ -53,10 +53,10 @@ class Back(Message, frozen=True):
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        return f"all below me are in the tree{_news(self.visited)}"
+        return f"all below me are in the tree{_unaware_in_words(self.visited)}"
 
 
-def _news(visited: Visited) -> str:
+def _unaware_in_words(visited: Visited) -> str:
     return f", where not all know of {listed(visited)} yet" if visited else ""
 
 
