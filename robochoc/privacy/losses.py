@@ -36,8 +36,8 @@ class Loss:
     """The loss of one kind of secrets of `subject` to `observer`.
 
     Attributes:
-        observer: The robot that has heard.
-        subject: The robot that is heard of.
+        observer: The robot that received the messages.
+        subject: The robot whose secrets the messages concern.
         kind: The kind of secrets.
         secrets: How many secrets of that kind there are.
         linear: The loss by LinearTS. None: not known, as is the loss by the others.
@@ -75,7 +75,7 @@ class PrivacyReport:
         runs: How many there are.
         robots: All robots, the highest priority first.
         losses: For each observer and each subject that has secrets for it. Pairs without any are left out.
-        without_rule: The types of messages that were heard, and have no rule.
+        without_rule: The types of received messages without a rule.
         undecided: Why decisions are not among the losses. Empty: they are.
     """
 
@@ -113,8 +113,8 @@ def loss_between(
     """Return the loss; None if there is nothing to hide.
 
     Args:
-        observer: The robot that has heard.
-        subject: The robot that is heard of.
+        observer: The robot that received the messages.
+        subject: The robot whose secrets the messages concern.
         kind: The kind of secrets.
         numbers: For each secret, how many states it has, and how many are still possible.
         known: Whether the loss is known.

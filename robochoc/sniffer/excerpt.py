@@ -29,14 +29,14 @@ def _meant(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iter
     for message, (run, sender) in enumerate(zip(of.run, of.sender, strict=True)):
         spoken[run, trace.robots[sender]].append(message)
     said: dict[tuple[int, str], int] = defaultdict(int)
-    under_way: dict[tuple[str, str], list[bool]] = defaultdict(list)
+    in_transit: dict[tuple[str, str], list[bool]] = defaultdict(list)
     taken: dict[tuple[str, str], int] = defaultdict(int)
     run = -1
     for event in events:
         match event:
             case Began():
                 run += 1
-                under_way.clear()
+                in_transit.clear()
                 taken.clear()
                 yield event
             case Sent():
@@ -44,14 +44,14 @@ def _meant(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iter
                 place = said[key]
                 said[key] += 1
                 meant = place < len(spoken[key]) and spoken[key][place] in messages
-                under_way[event.sender, event.receiver].append(meant)
+                in_transit[event.sender, event.receiver].append(meant)
                 if meant:
                     yield event
             case Received():
                 channel = event.sender, event.receiver
                 place = taken[channel]
                 taken[channel] += 1
-                if place < len(under_way[channel]) and under_way[channel][place]:
+                if place < len(in_transit[channel]) and in_transit[channel][place]:
                     yield event
             case _:
                 yield event

@@ -1,10 +1,9 @@
 """The trace: a run as columns of numbers, for pages that draw it, and for questions about causes.
 
-It is made of events, and grows by them. A robot's step is what it does with one packet: it takes messages in, changes
-its mind, and speaks. Steps are numbered in the order in which they end, and the messages of a step follow one
-another, so a message's number tells what was said before it. Causes come first whatever the events' order: a step
-that took in what nobody has been seen to send yet waits for it, as two robots' clocks, or the bundles in which robots
-report, need not agree.
+A trace is built from events. A robot's step is the processing of one packet: receiving messages, changing state, and
+sending messages. Steps are numbered in the order of their ends, and the messages of a step are consecutive, so the
+numbers of messages are in causal order. This holds whatever the order of the events is: a step with a received message
+whose sending is missing waits for that event, since the robots' clocks and the order of their reports may differ.
 """
 
 from __future__ import annotations
@@ -33,9 +32,7 @@ from robochoc.journal.given import told_by
 from robochoc.journal.journal import Header, Journal
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
-from robochoc.sniffer.columns import NOT_YET, floats, longs, shorts
-from robochoc.sniffer.contents import Contents
-from robochoc.sniffer.pending_steps import PendingChannel, PendingStep
+from robochoc.sniffer.columns import NOT_YET, Contents, floats, longs, shorts
 from robochoc.sniffer.trace_tables import Messages, Note, RunRecord, Steps, note_of
 
 MOST_NAMES = 0xFFFF
@@ -47,6 +44,42 @@ MOST_COUNTED = 1 << 53
 
 class TraceTooLargeError(ValueError):
     """A journal with more robots, types of messages, or runs than a trace can number."""
+
+
+class PendingChannel:
+    """The sent and not yet received messages from one robot to another, in one run.
+
+    `owed` counts received messages whose sending is not in the journal yet.
+    """
+
+    __slots__ = ("in_transit", "owed")
+
+    def __init__(self) -> None:
+        self.in_transit: deque[int] = deque()
+        self.owed = 0
+
+
+class PendingStep:
+    """A step that has not ended, or waits for the sending of messages that it received."""
+
+    __slots__ = ("checks", "clock", "decided", "notes", "packet", "received", "sent", "t")
+
+    def __init__(self) -> None:
+        self.received: deque[PendingChannel] = deque()
+        self.packet: list[int] = []
+        self.decided: dict[str, int] | None = None
+        self.notes: list[tuple[float, str, str]] = []
+        self.sent: list[Sent] = []
+        self.t = 0.0
+        self.clock = self.checks = 0
+
+    def taken_in(self) -> bool:
+        """Return whether all received messages are known; move the known ones to the step's packet."""
+        while self.received:
+            if not self.received[0].in_transit:
+                return False
+            self.packet.append(self.received.popleft().in_transit.popleft())
+        return True
 
 
 class Trace:
@@ -95,7 +128,7 @@ class Trace:
         for event in events:
             match event:
                 case Sent():
-                    self._open_step(event.sender, event).said.append(event)
+                    self._open_step(event.sender, event).sent.append(event)
                 case Received():
                     channel = self._channel(event.sender, event.receiver)
                     self._open_step(event.receiver, event).received.append(channel)
@@ -132,7 +165,7 @@ class Trace:
         first = self.steps.packet_end[step - 1] if step else 0
         return list(self.packets[first : self.steps.packet_end[step]])
 
-    def said(self, step: int) -> range:
+    def sent_in(self, step: int) -> range:
         """Return the messages that were sent in a step."""
         return range(self.steps.said_end[step - 1] if step else 0, self.steps.said_end[step])
 
@@ -143,7 +176,7 @@ class Trace:
     def consequences(self, message: int) -> range:
         """Return the messages that were sent in the step that received this one."""
         taken = self.messages.taken[message]
-        return range(0) if taken == NOT_YET else self.said(taken)
+        return range(0) if taken == NOT_YET else self.sent_in(taken)
 
     def number_of(self, robot: str) -> int:
         """Return the number of a robot; assign one if it is new. Raises `TraceTooLargeError`."""
@@ -251,8 +284,8 @@ class Trace:
             queue.append(step)
         elif step.taken_in():
             self._write(robot, step)
-            if self._waiting and step.said:
-                self._go_on(dict.fromkeys(sent.receiver for sent in step.said))
+            if self._waiting and step.sent:
+                self._go_on(dict.fromkeys(sent.receiver for sent in step.sent))
         else:
             self._waiting[robot] = deque([step])
 
@@ -265,7 +298,7 @@ class Trace:
             while queue and queue[0].taken_in():
                 step = queue.popleft()
                 self._write(robot, step)
-                ready.extend(dict.fromkeys(sent.receiver for sent in step.said if sent.receiver in self._waiting))
+                ready.extend(dict.fromkeys(sent.receiver for sent in step.sent if sent.receiver in self._waiting))
             if queue is not None and not queue:
                 del self._waiting[robot]
 
@@ -288,7 +321,7 @@ class Trace:
             self.decisions.append((number, step.decided))
             self.variables.setdefault(robot, {}).update(dict.fromkeys(step.decided))
         robot_number = self.number_of(robot)
-        for sent in step.said:
+        for sent in step.sent:
             self._write_message(sent, number, robot_number, run)
         steps.t.append(step.t)
         steps.clock.append(_counted(step.clock))
@@ -306,7 +339,7 @@ class Trace:
             self.unseen -= 1
             self.outdated = True
         else:
-            channel.under_way.append(number)
+            channel.in_transit.append(number)
         self._contents.append(sent.content)
         messages.t.append(sent.t)
         messages.clock.append(_counted(sent.clock))

@@ -27,23 +27,23 @@ from robochoc.system.signals import leave_ctrl_c_to_the_parent
 class _Parent(NamedTuple):
     """The descriptors of the pipes from and to the parent."""
 
-    heard: int
-    told: int
+    input: int
+    output: int
 
     def line(self) -> bytes:
         """Return the first line, and no further byte; empty if the parent has ended."""
         line = b""
         while not line.endswith(b"\n"):
-            sign = os.read(self.heard, 1)
+            sign = os.read(self.input, 1)
             if not sign:
                 return b""
             line += sign
         return line
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         """Report that a page has connected."""
         with suppress(OSError):
-            os.write(self.told, b".")
+            os.write(self.output, b".")
 
 
 def main() -> None:
@@ -60,8 +60,8 @@ def main() -> None:
         threading.Thread(target=partial(webbrowser.open, settings["shown"]), daemon=True).start()
     over = False
     listening = socket.socket(fileno=int(sys.argv[1]))
-    while listening.fileno() not in select.select([listening.fileno(), parent.heard], [], [])[0]:
-        if not os.read(parent.heard, 1):
+    while listening.fileno() not in select.select([listening.fileno(), parent.input], [], [])[0]:
+        if not os.read(parent.input, 1):
             return
         over = True
     asyncio.run(_serve(listening, int(sys.argv[2]), settings, parent, over=over))
@@ -76,15 +76,15 @@ async def _serve(
     session = SnifferSession(journal, live=True, chosen=settings["chosen"])
     if over:
         session.finish()
-    serving = asyncio.create_task(Server(session, listening, str(settings["token"]), parent.tell).serve())
+    serving = asyncio.create_task(Server(session, listening, str(settings["token"]), parent.notify).serve())
 
     def hear() -> None:
-        if os.read(parent.heard, 1):
+        if os.read(parent.input, 1):
             session.finish()
         else:
             serving.cancel()
 
-    asyncio.get_running_loop().add_reader(parent.heard, hear)
+    asyncio.get_running_loop().add_reader(parent.input, hear)
     with suppress(asyncio.CancelledError):
         await serving
     os._exit(0)  # what a thread still works out, nobody asks for any more

@@ -86,7 +86,7 @@ def _messages_and_turns(events: list[AnyEvent], run: RunSpec) -> tuple[tuple[Mes
             levels[robot] = decisions[step][f"{robot}.{LEVEL}"]
         reasons = why[robot][done[robot]] if step in decisions else ()
         done[robot] += 1
-        turns.append(Turn(robot, tuple(trace.packet(step)), tuple(trace.said(step)), levels.get(robot), reasons))
+        turns.append(Turn(robot, tuple(trace.packet(step)), tuple(trace.sent_in(step)), levels.get(robot), reasons))
     data = PageData(trace)
     count = max((*turns[-1].said, *(one for turn in turns for one in (*turn.said, *turn.heard))), default=-1) + 1
     return tuple(_message(data, one) for one in range(count)), tuple(turns)

@@ -19,11 +19,10 @@ from robochoc.formats.ground_map import ground_map_json, read_ground_map
 from robochoc.formats.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
 from robochoc.formats.occupancy.packed import unpacked
 from robochoc.generators.maps.cells import Cells
-from robochoc.generators.maps.clearance import passable
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
 from robochoc.generators.maps.room import room_on
-from robochoc.generators.maps.sizes import cells_of
+from robochoc.generators.maps.sizes import cells_of, passable
 from robochoc.generators.maps.travel import UNREACHED, lengths_from
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team

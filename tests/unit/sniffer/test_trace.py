@@ -85,7 +85,7 @@ def is_sound(trace: Trace) -> None:
             assert message in trace.packet(taken)
             assert steps.robot[taken] == of.receiver[message]
             assert steps.run[taken] == of.run[message] == steps.run[of.step[message]]
-        assert message in trace.said(of.step[message])
+        assert message in trace.sent_in(of.step[message])
         assert steps.robot[of.step[message]] == of.sender[message]
         for effect in trace.consequences(message):
             assert message in trace.causes(effect)
