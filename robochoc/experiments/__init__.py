@@ -1,10 +1,10 @@
-"""Studies: which protocols are run on which problems, where, and what came out.
+"""Studies: experiments that run protocols on problems, and their results.
 
     >>> import robochoc.experiments
     >>> rows = robochoc.experiments.read("study.sqlite")  # doctest: +SKIP
 
-`study.py` reads the file of a study, `plan.py` makes its runs, `runner.py` carries them out, `store.py` keeps what came
-of them, and `report.py` draws it.
+`study.py` reads the file of a study (its tables: `study_file.py`, `study_problems.py`, `study_runs.py`), `plan.py`
+lists its runs, `runner.py` runs them, `store.py` stores the results, and `report.py` writes a report.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ __all__ = ["read"]
 
 
 def __getattr__(name: str) -> object:
-    """Import what is asked for: who runs `robochoc experiment --help` waits for no database."""
+    """Import `read` on demand, as `robochoc experiment --help` must not wait for the database."""
     if name == "read":
-        from robochoc.experiments.results import read  # noqa: PLC0415 - as the docstring says
+        from robochoc.experiments.results import read  # noqa: PLC0415 - start-up
 
         return read
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Answers to one problem are compared, whoever gave them: two proofs that differ are a fault of the program."""
+"""The comparison of all answers to one problem: contradictory proofs are a fault of the program."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from robochoc.experiments.task import Row, Status, Task
 from robochoc.model.outcome import Verdict
 
 _OWN = "PROBLEM"
-"""The folder for what is generated."""
+"""The folder for generated problems."""
 _Question = tuple[str, str | None]
 
 
 class DisagreementError(Exception):
-    """Two runs contradict each other, or the checker refutes one. The text says how to repeat them."""
+    """Two runs contradict each other, or the checker refutes one. The text contains the commands to repeat them."""
 
 
 class Agreement:
-    """The answers so far, by problem and by the rule of withdrawal."""
+    """The answers so far, by problem and withdrawal rule."""
 
     def __init__(self) -> None:
         self._answers: dict[_Question, list[tuple[Task, Row]]] = {}
@@ -34,22 +34,22 @@ class Agreement:
         """
         if row.status == Status.REFUTED:
             raise DisagreementError(
-                f"the checker refutes the answer of {task.setup.label}: {row.reason}\n{repeat(task)}"
+                f"the checker refutes the answer of {task.setup.label}: {row.reason}\n{repeat_commands(task)}"
             )
         if row.status != Status.DONE or "after" in task.problem.scenario:
             return
         others = self._answers.setdefault((row.digest, task.setup.withdraw), [])
         for other_task, other in others:
             if why := contradiction(row, other):
-                told = f"{task.setup.label} and {other_task.setup.label} contradict each other on {row.team}: {why}"
-                raise DisagreementError(f"{told}\n{repeat(task)}\n{repeat(other_task)}")
+                text = f"{task.setup.label} and {other_task.setup.label} contradict each other on {row.team}: {why}"
+                raise DisagreementError(f"{text}\n{repeat_commands(task)}\n{repeat_commands(other_task)}")
         kinds = {(one.verdict, one.cost) for _, one in others}
         if (row.verdict, row.cost) not in kinds:
             others.append((task, row))
 
 
 def contradiction(one: Row, other: Row) -> str:
-    """Return why two answers to the same problem cannot both be right. Empty: they can."""
+    """Return why two answers to the same problem contradict each other; empty if they do not."""
     verdicts = {one.verdict, other.verdict}
     if Verdict.NO_SOLUTION in verdicts and len(verdicts) > 1:
         return f"{one.verdict} and {other.verdict}"
@@ -57,22 +57,22 @@ def contradiction(one: Row, other: Row) -> str:
         return ""
     optimum, found = (one, other) if one.verdict == Verdict.OPTIMAL else (other, one)
     if optimum.withdrawn != found.withdrawn and found.verdict == Verdict.OPTIMAL:
-        return f"{optimum.withdrawn} and {found.withdrawn} robots withdraw at least"
+        return f"at least {optimum.withdrawn} and at least {found.withdrawn} robots withdraw"
     if optimum.cost is None or found.cost is None or optimum.withdrawn != found.withdrawn:
         return ""
     best, cost = Decimal(optimum.cost), Decimal(found.cost)
     better = cost > best if optimum.maximises else cost < best
     if better or (found.verdict == Verdict.OPTIMAL and cost != best):
-        return f"{optimum.cost} is said to be optimal, and {found.cost} was found"
+        return f"{optimum.cost} was reported as optimal, but {found.cost} was found"
     return ""
 
 
-def repeat(task: Task) -> str:
-    """Return the commands that repeat a run by itself."""
+def repeat_commands(task: Task) -> str:
+    """Return the commands that repeat a single run."""
     problem, setup = task.problem, task.setup
     made = [_generated(problem.family, problem.parameters)] if problem.family else []
     folder = problem.path or _OWN
-    if problem.scenario:  # into a folder of its own: the team's files are the user's
+    if problem.scenario:  # into another folder, as the team's files are the user's
         scenario = _options(["robochoc", "generate", "scenario", folder], problem.scenario)
         made.append(f"{scenario} --force" if problem.family else scenario)
         folder = _OWN
@@ -97,11 +97,11 @@ def _channel(name: str) -> str:
 
 
 def _limits(task: Task) -> dict[str, float]:
-    """Return the limits of a run, and the cost that stands for infinity in a file of another tool."""
+    """Return the limits of a run, and the cost that means infinity in a foreign file."""
     limits, given = task.limits, task.problem.parameters if task.problem.path else {}
-    told = {name: getattr(limits, name) for name in ("timeout", "messages", "ncccs", "cycles")}
-    told["infinity"] = given.get("infinity")
-    return {name: value for name, value in told.items() if value is not None}
+    found = {name: getattr(limits, name) for name in ("timeout", "messages", "ncccs", "cycles")}
+    found["infinity"] = given.get("infinity")
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _generated(family: str, parameters: Mapping[str, Any]) -> str:

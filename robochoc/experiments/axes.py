@@ -1,7 +1,7 @@
 """Styles of lines, scales, ticks and legends of figures. This file, `plots.py` and `figures.py` need matplotlib.
 
-Lines differ in colour, in dashes and in markers: the colours are those of Okabe and Ito, "Color Universal Design",
-2008, which the colour-blind can tell apart, and the rest serves who prints in grey.
+Lines differ in colour, dashes and markers: the colours are those of Okabe and Ito, "Color Universal Design", 2008,
+which colour-blind readers can distinguish, and dashes and markers remain distinct in grey.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 _DASHES = ("-", "--", "-.", ":")
 MOST_WAYS = len(_MARKERS) * len(_DASHES)
-"""Figures show no more ways to run: so many differ in colour and marker, in colour and dashes, and in grey as well."""
+"""The most ways to run in a figure: they differ in colour and marker, in colour and dashes, and also in grey."""
 _WIDE_RANGE = 30
-"""Axes of values are logarithmic where the largest is so many times the smallest."""
+"""The ratio of the largest to the smallest value from which an axis is logarithmic."""
 _BLOT = 0.05
-"""Marks that are nearer to each other than this share of the axis are one blot."""
+"""The share of the axis below which two marks are too close."""
 _EVEN = 1.01
-"""Values are in even steps if the largest is less than so many times the smallest."""
+"""Steps are even if the largest is less than this multiple of the smallest."""
 _LETTER, _LINE, _HANDLE = 0.6 / 72, 1.5 / 72, 4.2 / 72
 """Inches for a point of the font's size: the width of a letter, the height of a line, and a legend's sample."""
 _LONGEST_TICK, _LONGEST_LABEL, _TURNED = 18, 40, 35
 _FEW_DECADES = 2
 """Logarithmic axes of fewer powers of ten have ticks at 1, 2 and 5."""
 _LOWEST_PLAIN, _HIGHEST_PLAIN, _HIGHEST_LINEAR = 1e-2, 1e6, 1e7
-"""Numbers between the first two are written out on a logarithmic axis, and below the third on a linear one."""
+"""Numbers between the first two are number_text out on a logarithmic axis, and below the third on a linear one."""
 
 
 class Style(NamedTuple):
@@ -46,7 +46,7 @@ class Style(NamedTuple):
 
 
 def styles_of(ways: Sequence[str]) -> dict[str, Style]:
-    """Return a style for each way to run, up to `MOST_WAYS`: any two differ in at least two of its three parts."""
+    """Return a style for each way to run, up to `MOST_WAYS`: any two differ in at least two of three parts."""
     styles = {}
     for place, way in enumerate(ways[:MOST_WAYS]):
         turn = place // len(_COLOURS)
@@ -56,7 +56,7 @@ def styles_of(ways: Sequence[str]) -> dict[str, Style]:
 
 
 def spread(axes: Axes, which: str, values: Sequence[float]) -> None:
-    """Make an axis, x or y, logarithmic where values differ much; with zeros among them linear near the smallest."""
+    """Make an axis, x or y, logarithmic if values differ much; with zeros, linear near the smallest value."""
     positive = [value for value in values if value > 0]
     if not positive or min(values) < 0 or max(positive) < _WIDE_RANGE * min(positive):
         return
@@ -65,22 +65,22 @@ def spread(axes: Axes, which: str, values: Sequence[float]) -> None:
 
 def _logarithmic(axes: Axes, which: str, smallest: float, *, zero: bool) -> None:
     setter: Callable[..., Any] = axes.set_xscale if which == "x" else axes.set_yscale
-    if zero:  # what is below the smallest value is as wide as a power of ten
+    if zero:  # the range below the smallest value is as wide as a power of ten
         setter("symlog", linthresh=smallest, linscale=0.9)
     else:
         setter("log")
 
 
 def numbers(values: Sequence[Any]) -> bool:
-    """Return whether all values of a parameter are numbers: else they are kinds, which have no distances."""
+    """Return whether all values of a parameter are numbers; otherwise they are categories without distances."""
     return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
 
 
 def tick_numbers(axes: Axes, values: Sequence[float]) -> None:
-    """Place ticks at values of the x-axis, in ascending order, as many as fit; logarithmic where they would be a blot.
+    """Place ticks at values of the x-axis, in ascending order, as many as fit.
 
-    Numbers that grow by factors are apart on a logarithmic axis, and those that grow by steps on a linear one: that
-    on which the nearest two are further apart is taken, if they are too near on the linear one.
+    The axis becomes logarithmic if the nearest two values are too close on a linear axis, and further apart on a
+    logarithmic one.
     """
     places = [float(value) for value in values]
     at = _shares(places)
@@ -90,13 +90,13 @@ def tick_numbers(axes: Axes, values: Sequence[float]) -> None:
         if _nearest(powers) > _nearest(at):
             at = powers
             _logarithmic(axes, "x", smallest, zero=places[0] == 0)
-    kept = _that_fit(at, [written(value) for value in places], _figure(axes).get_figwidth())
-    axes.set_xticks([places[one] for one in kept], [written(places[one]) for one in kept])
+    kept = _fitting_ticks(at, [number_text(value) for value in places], _figure(axes).get_figwidth())
+    axes.set_xticks([places[one] for one in kept], [number_text(places[one]) for one in kept])
     axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _shares(places: Sequence[float]) -> list[float]:
-    """Return where on the axis places are: 0 to 1."""
+    """Return the positions of places on the axis, from 0 to 1."""
     low, width = places[0], places[-1] - places[0] or 1.0
     return [(place - low) / width for place in places]
 
@@ -105,8 +105,8 @@ def _nearest(places: Sequence[float]) -> float:
     return min(b - a for a, b in itertools.pairwise(places))
 
 
-def _that_fit(at: Sequence[float], texts: Sequence[str], width: float) -> list[int]:
-    """Return which ticks are kept so that their texts do not lie upon each other: in steps, if values are in steps."""
+def _fitting_ticks(at: Sequence[float], texts: Sequence[str], width: float) -> list[int]:
+    """Return the ticks whose texts do not overlap: every n-th one, if values are in even steps."""
     letter: float = _LETTER * mpl.rcParams["font.size"] / (0.8 * width)
 
     def apart(one: int, other: int) -> bool:
@@ -124,7 +124,7 @@ def _that_fit(at: Sequence[float], texts: Sequence[str], width: float) -> list[i
 
 
 def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
-    """Write names below the x-axis, shortened, and turned where they would lie upon each other: the figure grows."""
+    """Write names below the x-axis, shortened, and rotated if they would overlap; then the figure grows."""
     start, texts = _short(names)
     axes.set_xlabel(literal(f"{what} ({start}…)" if start and what else what or start))
     marks = [literal(text) for text in texts]
@@ -140,37 +140,37 @@ def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
 
 
 def _short(names: Sequence[str]) -> tuple[str, list[str]]:
-    """Return what all names begin with, if it is left out, and short names."""
+    """Return the common start of all names, if it is left out, and the short names."""
     start = ""
     if len(names) > 1 and max(map(len, names)) > _LONGEST_TICK // 2:
         letters = itertools.takewhile(lambda column: len(set(column)) == 1, zip(*names, strict=False))
         start = "".join(column[0] for column in letters)
-        while start and start[-1].isalnum():  # up to the end of a word
+        while start and start[-1].isalnum():  # back to the end of a word
             start = start[:-1]
     texts = [_cut(name[len(start) :] or name, _LONGEST_TICK) for name in names]
     return (start, texts) if len(set(texts)) == len(set(names)) else ("", list(names))
 
 
 def _cut(name: str, longest: int) -> str:
-    """Return a name without its middle, if it is too long: names often differ at their ends."""
+    """Return a too long name without its middle, as names often differ at their ends."""
     half = longest // 2
     return name if len(name) <= longest else f"{name[:half]}…{name[1 - half :]}"
 
 
-def written(value: float, _place: object = None) -> str:
-    """Return a number as it stands on an axis."""
+def number_text(value: float, _place: object = None) -> str:
+    """Return a number as text for an axis."""
     return f"{value:,.10g}"
 
 
 def plain_ticks(axes: Axes) -> None:
-    """Write numbers as people do: 1, 2, 5, 10 and not 2 x 10^0, and 10,000 for 10000."""
+    """Write plain numbers: 1, 2, 5, 10 and not 2 x 10^0, and 10,000 for 10000."""
     for axis in (axes.xaxis, axes.yaxis):
         if isinstance(axis.get_major_locator(), FixedLocator):
             continue
         if axis.get_scale() == "log":
             _plain_powers(axis)
         elif axis.get_view_interval()[1] < _HIGHEST_LINEAR:
-            axis.set_major_formatter(FuncFormatter(written))
+            axis.set_major_formatter(FuncFormatter(number_text))
 
 
 def _plain_powers(axis: Axis) -> None:
@@ -180,18 +180,18 @@ def _plain_powers(axis: Axis) -> None:
         axis.set_minor_locator(NullLocator())
     axis.set_minor_formatter(NullFormatter())
     if low >= _LOWEST_PLAIN and high <= _HIGHEST_PLAIN:
-        axis.set_major_formatter(FuncFormatter(written))
+        axis.set_major_formatter(FuncFormatter(number_text))
 
 
 def _figure(axes: Axes) -> Figure:
     figure = axes.get_figure(root=True)
     if figure is None:
-        raise ValueError("the axes are in no figure")
+        raise ValueError("the axes are not part of a figure")
     return figure
 
 
 def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> None:
-    """Draw the legend above the axes, where it covers nothing; the figure grows by its height."""
+    """Draw the legend above the axes; the figure grows by its height."""
     figure = _figure(axes)
     handles = [
         mpl.lines.Line2D(
@@ -208,10 +208,10 @@ def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> No
 
 
 def literal(text: str) -> str:
-    """Return what makes matplotlib write `text` as it stands: between two dollars it would read a formula."""
+    """Escape `text` for matplotlib, which reads formulas between dollars."""
     return text.replace("$", r"\$")
 
 
 def shortened_label(way: str) -> str:
-    """Return the label of a way to run, as long as a legend has room for."""
+    """Return the label of a way to run, shortened for a legend."""
     return _cut(way, _LONGEST_LABEL)

@@ -1,8 +1,8 @@
 """The workers of a cluster, by Dask (https://distributed.dask.org): the extra `cluster`.
 
-Each run is one task of the cluster. Tasks and rows travel as JSON, and the files of teams with them: workers need
-robochoc, and no folder that all can see. A worker that is lost has its tasks tried again by others. Dask itself
-unpickles what it receives, so a scheduler is to be reachable for those only who may run programs there.
+Each run is one task of the cluster. Tasks and rows are sent as JSON, together with the files of teams: workers need
+robochoc, but no shared folder. Tasks of a lost worker are repeated by others. Dask itself unpickles received data, so
+only users who may run programs there should be able to reach the scheduler.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from distributed import CancelledError, Client, as_completed
 from distributed.comm import resolve_address
 from distributed.scheduler import KilledWorker
 
-from robochoc.experiments.elsewhere import files_of, run_one
+from robochoc.experiments.remote_task import files_of, run_one
 from robochoc.experiments.task import Row, Status, Task
 
 AT_ONCE = 1000
-"""Tasks that the scheduler has at a time: it need not know of a million."""
+"""The most tasks that the scheduler has at a time."""
 
 
 class SchedulerLostError(Exception):
-    """The scheduler cannot be reached, or no longer."""
+    """The scheduler cannot be reached, or its connection was lost."""
 
 
 class ClusterWorkers:
     """The workers of a Dask cluster.
 
     Args:
-        address: The scheduler's, such as `tcp://10.0.0.1:8786`. None: `file` has it.
+        address: The scheduler's address, such as `tcp://10.0.0.1:8786`. None: it is in `file`.
         file: The scheduler's JSON file, as `dask scheduler --scheduler-file` and dask-jobqueue write it.
-        memory_mb: A limit on memory, which Dask's workers have of their own: it is not used here.
-        notice: Is told, once, that there are no workers yet.
+        memory_mb: Not used: Dask's workers have their own limits on memory.
+        notice: Called once with a text if there are no workers yet.
     """
 
     def __init__(
@@ -54,11 +54,11 @@ class ClusterWorkers:
         """Connect with the scheduler. Raises `SchedulerLostError` if it cannot be reached."""
         try:
             address = _address_in(self._file) if self._file else self._address
-            resolve_address(address)  # Dask says late, and not in one line, that there can be no such address
+            resolve_address(address)  # Dask reports an invalid address late, and in several lines
             self._client = Client(address, set_as_default=False, name="robochoc experiment")
         except (OSError, ValueError) as error:
-            told = f"the scheduler at {self._file or self._address} cannot be reached: {error}"
-            raise SchedulerLostError(told) from None
+            text = f"the scheduler at {self._file or self._address} cannot be reached: {error}"
+            raise SchedulerLostError(text) from None
         if self._notice and not self._client.scheduler_info()["workers"]:
             self._notice(f"the cluster at {self._file or self._address} has no workers yet; runs wait for them")
         return self
@@ -66,12 +66,12 @@ class ClusterWorkers:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Disconnect. Tasks that are still waiting are dropped."""
+        """Disconnect, and drop waiting tasks."""
         if self._client is not None:
             self._client.close()
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
-        """Yield what comes of all tasks, as soon as it is there."""
+        """Yield the rows of all tasks, as soon as they are finished."""
         client = self._client
         assert client is not None  # noqa: S101 - it is used as a context
         tasks = itertools.chain.from_iterable(bundles)
@@ -90,26 +90,26 @@ class ClusterWorkers:
 
 
 class _SchedulerFile(msgspec.Struct):
-    """The JSON file of a Dask scheduler, as far as it is read: the scheduler's address."""
+    """The part of a Dask scheduler's JSON file that is read."""
 
     address: str
 
 
 def _address_in(file: Path) -> str:
-    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError`: it has none."""
+    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError` if it has none."""
     try:
         return msgspec.json.decode(file.read_bytes(), type=_SchedulerFile).address
     except msgspec.MsgspecError as wrong:
-        raise ValueError(f"it is no file of a scheduler: {wrong}") from None
+        raise ValueError(f"it is not a scheduler's file: {wrong}") from None
 
 
 def _row(future: object) -> Row:
-    """Return the row of a task that has ended, one way or the other."""
+    """Return the row of a finished or failed task."""
     try:
         return msgspec.json.decode(future.result(), type=Row)  # type: ignore[attr-defined]
     except CancelledError:
-        raise SchedulerLostError("the scheduler of the cluster was lost; say the same again to go on") from None
+        raise SchedulerLostError("the scheduler of the cluster was lost: repeat the command to continue") from None
     except KilledWorker as killed:
-        return Row(status=Status.CRASHED, reason=f"workers of the cluster died of it: {killed}")
-    except Exception as error:  # noqa: BLE001 - whatever a cluster may raise is one row
+        return Row(status=Status.CRASHED, reason=f"it killed workers of the cluster: {killed}")
+    except Exception as error:  # noqa: BLE001 - any error of a cluster is one row
         return Row(status=Status.ERROR, reason=f"{type(error).__name__}: {error}")

@@ -1,4 +1,4 @@
-"""The SQLite file of a study's results: its tables, and how it is opened."""
+"""The SQLite file of a study's results: its tables, and opening it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robochoc.experiments.task import CostPoint, RobotLoad, Status
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 
 APPLICATION_ID = 0x726F626F
-"""The number by which SQLite files of results are known (`PRAGMA application_id`); in ASCII it is `robo`."""
+"""The `PRAGMA application_id` of SQLite files with results; in ASCII it is `robo`."""
 VERSION = 4
 COLUMNS: Mapping[str, str] = {
     "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
@@ -47,21 +47,21 @@ CREATE VIEW IF NOT EXISTS results AS
 """  # noqa: S608 - our own names
 
 TRIED_AGAIN = (Status.CRASHED, Status.LOST, Status.INVALID, Status.ERROR)
-"""Runs that ended so are repeated when the study is run again: what was wrong may be mended."""
+"""The statuses of runs that are repeated when the study is run again, as their cause may be repaired."""
 STRANGE = (sqlite3.Error, msgspec.MsgspecError, TypeError, ValueError, KeyError, OverflowError, ArithmeticError)
-"""The errors that reading a file raises where something else than this program has written into it."""
+"""The errors of reading a file into which another program has written."""
 
 
-def opened(path: Path, *, writing: bool = True) -> sqlite3.Connection:
+def open_database(path: Path, *, writing: bool = True) -> sqlite3.Connection:
     """Return the database at `path`. Raises `InvalidInputError`."""
     if not writing and not path.is_file():
-        raise invalid(path, "is no file")
+        raise invalid(path, "is not a file")
     try:
-        # A reader that may write tidies up behind itself: SQLite keeps two files beside one that is being read.
+        # A reader with write access cleans up: SQLite keeps two more files while a file is read.
         mode = "rwc" if writing else "rw" if os.access(path, os.W_OK) else "ro"
         address = f"{path.absolute().as_uri()}?mode={mode}"
         database = sqlite3.connect(address, uri=True, timeout=60)
-        if mode == "ro" and not _is_readable(database):  # SQLite wants to write beside it, and nobody may
+        if mode == "ro" and not _is_readable(database):  # SQLite cannot create its files in the folder
             database.close()
             database = sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)
         try:
@@ -70,7 +70,7 @@ def opened(path: Path, *, writing: bool = True) -> sqlite3.Connection:
             database.close()
             raise
     except sqlite3.Error as error:
-        raise invalid(path, f"holds no results of a study: {error}") from None
+        raise invalid(path, f"contains no results of a study: {error}") from None
     return database
 
 
@@ -83,15 +83,15 @@ def _is_readable(database: sqlite3.Connection) -> bool:
 
 
 def _check(database: sqlite3.Connection, path: Path, *, writing: bool) -> None:
-    """Make the tables of a new file, and refuse one that is none of ours."""
+    """Create the tables of a new file, and refuse a foreign file."""
     (application,) = database.execute("PRAGMA application_id").fetchone()
     (tables,) = database.execute("SELECT count(*) FROM sqlite_master").fetchone()
     (version,) = database.execute("PRAGMA user_version").fetchone()
     if tables and (application != APPLICATION_ID or version != VERSION):
-        raise invalid(path, "is a database, but none of 'robochoc experiment run' of this version")
+        raise invalid(path, "is a database, but not written by 'robochoc experiment run' of this version")
     if not tables:
         if not writing:
-            raise invalid(path, "holds no results yet")
+            raise invalid(path, "contains no results yet")
         database.execute("PRAGMA journal_mode = WAL")
         make_tables(database)
     if writing:
@@ -101,7 +101,7 @@ def _check(database: sqlite3.Connection, path: Path, *, writing: bool) -> None:
 
 
 def make_tables(database: sqlite3.Connection) -> None:
-    """Make all tables, or none if the process is killed meanwhile."""
+    """Create all tables, or none if the process is killed meanwhile."""
     with database:
         database.execute("BEGIN IMMEDIATE")
         for statement in filter(str.strip, _TABLES.split(";\n")):
@@ -111,7 +111,7 @@ def make_tables(database: sqlite3.Connection) -> None:
 
 
 def invalid(
-    path: Path, message: str, hint: str = "name the file that 'robochoc experiment run' writes"
+    path: Path, message: str, hint: str = "give the file that 'robochoc experiment run' writes"
 ) -> InvalidInputError:
-    """Return the error that something is wrong with the file."""
+    """Return the error for an invalid file."""
     return invalid_input(path, message, hint)

@@ -1,4 +1,4 @@
-"""Digests of problems: what has the same content is the same problem, whatever it is called and wherever it is."""
+"""Digests of problems: problems with the same content are the same, whatever their names and places."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _BYTES = 16
 
 
 def digest_of_team(team: Team) -> str:
-    """Return the digest of what the robots' files would hold, however the team came about."""
+    """Return the digest of the content of the robots' files, whether the team was read or generated."""
     return _digest(team_files(team).items())
 
 

@@ -1,4 +1,4 @@
-"""One run of a study is carried out: a task goes in, a row comes out, whatever happens."""
+"""The execution of one run of a study: each task gives a row, even after an error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, Self
 from robochoc import __version__
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.experiments.digests import digest_of_files, digest_of_team
-from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_of, several, written
+from robochoc.experiments.observers import CostOverTime, RobotLoads, combined, journal_bytes, journal_of
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 from robochoc.formats.problems import read_problem
@@ -32,7 +32,7 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
 KEPT = 4
-"""Problems that are kept: the runs of one problem follow each other."""
+"""The most problems in the cache: the runs of one problem follow each other."""
 _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
     (InvalidInputError, Status.INVALID),
     (UnsupportedError, Status.REFUSED),
@@ -43,8 +43,8 @@ _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
 )
 
 
-class Bench(AbstractContextManager["Bench"]):
-    """Runs tasks, one after the other. It keeps the last problems, and one process of the constraint solver."""
+class TaskRunner(AbstractContextManager["TaskRunner"]):
+    """Runs tasks, one after the other, with a cache of problems and one process of the constraint solver."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()
@@ -62,19 +62,19 @@ class Bench(AbstractContextManager["Bench"]):
         return self
 
     def run(self, task: Task) -> Row:
-        """Return what comes of `task`. Each error is a row that says so."""
+        """Run `task` and return its row; an error becomes a row with its reason."""
         began = time.perf_counter()
         row = Row(status=Status.ERROR, machine=machine(), version=__version__)
         try:
             team, digest = self._team(task.problem)
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with one problem, the study goes on
-            row.status, row.reason = _status(error, Status.INVALID), _told(error)
+        except Exception as error:  # noqa: BLE001 - the study continues after any error
+            row.status, row.reason = _status(error, Status.INVALID), _error_text(error)
             return row
         _describe(row, team, digest)
         try:
             self._solve(task, team, row)
-        except Exception as error:  # noqa: BLE001 - also that of a user's protocol
-            row.status, row.reason = _status(error, Status.ERROR), _told(error)
+        except Exception as error:  # noqa: BLE001 - also errors of a user's protocol
+            row.status, row.reason = _status(error, Status.ERROR), _error_text(error)
         row.total_s = time.perf_counter() - began
         return row
 
@@ -84,23 +84,23 @@ class Bench(AbstractContextManager["Bench"]):
         cpu = time.process_time()
         options = options_of(task.setup, task.limits, task.seed)
         journal = journal_of(team, options) if Recording.JOURNAL in task.record else None
-        sent = curve.sent if curve and options.runtime == Runtime.ARRAYS else None
-        outcome = solve(team, options, observer=several(curve, loads, journal), progress=sent, solver=self._solver)
+        sent = curve.note_sent if curve and options.runtime == Runtime.ARRAYS else None
+        outcome = solve(team, options, observer=combined(curve, loads, journal), progress=sent, solver=self._solver)
         row.cpu_s = None if task.is_timed else time.process_time() - cpu
         _fill(row, outcome, team)
         row.cost_over_time = curve.points() if curve else []
-        row.loads = loads.found() if loads else []
-        row.journal = written(journal, outcome) if journal else b""
+        row.loads = loads.loads() if loads else []
+        row.journal = journal_bytes(journal, outcome) if journal else b""
 
     def _team(self, problem: ProblemSpec) -> tuple[Team, str]:
-        """Return the team of a problem, and the digest of its robots' files. Raises what is wrong with it."""
+        """Return the team of a problem, and the digest of its robots' files. Raises as `team_of`."""
         identity = problem.identity
         if identity not in self._teams:
             while len(self._teams) >= KEPT:
                 del self._teams[next(iter(self._teams))]
             team = team_of(problem)
             if problem.digest and digest_of_files(Path(problem.path)) != problem.digest:
-                raise invalid_input(problem.path, "has changed since the study began", "run the study again")
+                raise invalid_input(problem.path, "has changed since the start of the study", "run the study again")
             self._teams[identity] = team, digest_of_team(team)
         return self._teams[identity]
 
@@ -127,7 +127,7 @@ def team_of(problem: ProblemSpec) -> Team:
 
 @cache
 def machine() -> str:
-    """Return what ran: the name of the machine, its processors, its Python."""
+    """Return a description of this machine: its name, its processors, its Python."""
     return f"{platform.node()}, {os.cpu_count()} x {platform.machine()}, Python {platform.python_version()}"
 
 
@@ -137,7 +137,7 @@ def _status(error: Exception, otherwise: Status) -> Status:
     return next((status for kind, status in _STATUS_OF if isinstance(error, kind)), otherwise)
 
 
-def _told(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     text = str(error)
     foreseen = isinstance(error, (ValueError, *(kind for kind, _ in _STATUS_OF)))
     return text if text and foreseen else f"{type(error).__name__}: {text}".rstrip(": ")
@@ -151,7 +151,7 @@ def _describe(row: Row, team: Team, digest: str) -> None:
 
 
 def _fill(row: Row, outcome: Outcome, team: Team) -> None:
-    """Write what an outcome says into its row."""
+    """Copy an outcome into its row."""
     metrics = outcome.metrics
     row.status = Status.DONE
     if outcome.verdict == Verdict.UNKNOWN:
@@ -161,7 +161,7 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     row.cost, row.bound = _exact(outcome.cost if team.kind == ProblemKind.DISWCSP else None), _exact(outcome.bound)
     row.withdrawn, row.verified, row.confirmed = len(outcome.withdrawn), outcome.verified, outcome.confirmed
     row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
-    if outcome.protocol == CENTRAL:  # it sends none, and that is no count to compare
+    if outcome.protocol == CENTRAL:  # it sends no messages, so counts are not comparable
         return
     row.messages_by_type = dict(sorted(metrics.messages.items()))
     row.messages, row.bytes, row.largest = sum(metrics.messages.values()), metrics.bytes, metrics.largest

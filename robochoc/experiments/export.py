@@ -11,23 +11,23 @@ import msgspec
 
 from robochoc.experiments import summary
 from robochoc.experiments.results import Results
-from robochoc.experiments.study import study_wishes
+from robochoc.experiments.study import report_settings
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.system.plain_text import on_one_line
 
 _NESTED = ("settings", "messages_by_type", "cost_over_time", "loads")
-"""Columns that are JSON where a cell is text."""
+"""The columns that are written as JSON in formats with text cells."""
 _LATEX = str.maketrans(
     {sign: f"\\{sign}" for sign in "&%$#_{}"}
     | {"~": r"\textasciitilde{}", "\\": r"\textbackslash{}", "^": r"\textasciicircum{}"}
 )
 
 
-def exported(results: Results, form: str) -> bytes:
+def export_results(results: Results, form: str) -> bytes:
     """Return the results of a study in the form `csv`, `json`, `latex` or `parquet`.
 
     Raises:
-        UnsupportedError: if what writes the form is not installed.
+        UnsupportedError: if the package for the form is not installed.
     """
     rows = results.rows
     match form:
@@ -36,8 +36,8 @@ def exported(results: Results, form: str) -> bytes:
         case "json":
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
-            wishes = study_wishes(results.text)
-            over, shown = summary.prepared(rows, wishes.over, wishes.names)[:2] if rows else ("", rows)
+            wishes = report_settings(results.text)
+            over, shown = summary.prepare(rows, wishes.over, wishes.names)[:2] if rows else ("", rows)
             return latex_table(shown, results.title, over, wishes.metrics).encode()
         case _:
             return _parquet(rows)
@@ -87,8 +87,8 @@ def latex_table(rows: Sequence[Mapping[str, Any]], title: str, over: str, metric
     """Return a table of medians in LaTeX, with the rules of the package booktabs: a block for each metric.
 
     Args:
-        rows: The results, as `summary.prepared` returns them.
-        title: What they are called.
+        rows: The results, as `summary.prepare` returns them.
+        title: The title of the study.
         over: The parameter of the table's lines.
         metrics: The metrics. Empty: the usual ones.
     """

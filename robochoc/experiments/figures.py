@@ -1,4 +1,4 @@
-"""The figures of a report: which there are, of what, and what is to be read below them."""
+"""The figures of a report, with their titles and captions."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ _SETTINGS = {
     "pdf.fonttype": 42, "lines.linewidth": 1.4, "lines.markersize": 4.5, "figure.constrained_layout.use": True,
 }  # fmt: skip
 _HEIGHT = 0.64
-"""Of the width, without the legend."""
+"""The height as a share of the width, without the legend."""
 _NARROW, _SMALL = 4, {"font.size": 8, "legend.fontsize": 7, "lines.markersize": 4}
-"""Figures narrower than so many inches have smaller letters."""
+"""Figures narrower than this many inches have smaller letters."""
 MOST_KINDS = 12
-"""Over more kinds of problems, or instances, nothing is drawn: their names would be too small to be read."""
+"""The most kinds of problems, or instances, over which figures are drawn: more names would not be readable."""
 MOST_PROFILES, MOST_PAIRS = 2, 4
-"""Profiles of more metrics, and scatters of more pairs, nobody looks at."""
+"""The most metrics with profiles, and the most pairs with scatter plots."""
 MOST_BOXES = 40
-"""More do not fit side by side."""
+"""The most boxes that fit side by side."""
 _NEARLY = 1.01
-"""Values that differ by no more than this factor, 1 %, are taken for the same."""
+"""Values that differ by at most this factor, 1 %, count as equal."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure: the name of its file, what it shows, what draws it, and how wide it is, in inches."""
+    """A figure: the name of its file, its title and caption, its drawing function, and its width in inches."""
 
     name: str
     title: str
@@ -54,11 +54,11 @@ class Drawing:
     width: float = WIDTH
 
     def __post_init__(self) -> None:
-        """Make of the name one that a file can have: there are names of parameters in it, which come from a file."""
+        """Make the name valid for a file, as it contains names of parameters from a study's file."""
         object.__setattr__(self, "name", _file(self.name))
 
     def svg(self, *, text: bool = False) -> bytes:
-        """Return it as SVG; with `text`, words are text in the reader's own font, and not shapes."""
+        """Return it as SVG; with `text`, words are text in the reader's font, and not shapes."""
         return self._saved("svg", {"Date": None}, {"svg.fonttype": "none" if text else "path"})
 
     def pdf(self) -> bytes:
@@ -82,7 +82,7 @@ class Drawing:
 
 
 class Figures(NamedTuple):
-    """The figures that results have something to say in, and a sentence for each that is left out."""
+    """The informative figures of results, and a sentence for each figure that is left out."""
 
     drawings: list[Drawing]
     remarks: list[str]
@@ -90,7 +90,7 @@ class Figures(NamedTuple):
 
 @dataclass(frozen=True)
 class _Shown:
-    """The rows that figures are drawn from: of the ways to run that have a style, over one parameter."""
+    """The rows of figures: of the ways to run that have a style, over one parameter."""
 
     rows: Rows
     over: str
@@ -113,7 +113,7 @@ class _Shown:
 
 
 def figures_of(rows: Rows, over: str, metrics: Sequence[str], width: float = WIDTH) -> Figures:
-    """Return the figures that the results have something to say in, each `width` inches wide."""
+    """Return the informative figures of the results, each `width` inches wide."""
     styles = styles_of(summary.labels(rows))
     shown = _Shown([row for row in rows if str(row["label"]) in styles], over, styles)
     found = list(_all(shown, metrics))
@@ -124,7 +124,7 @@ def figures_of(rows: Rows, over: str, metrics: Sequence[str], width: float = WID
 
 
 def _all(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
-    """Yield figures, and sentences in the place of those that would say nothing; costs first where they differ."""
+    """Yield figures, and sentences in place of uninformative ones; costs first if they differ."""
     local = _costs_differ(shown.rows)
     if local:
         yield from _costs(shown, metrics)
@@ -146,7 +146,7 @@ def _over_parameter(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing |
         some = [value for value in values if any(spot.at == value for line in spots.values() for spot in line)]
         if some and metric != over:
             draw = partial(plots.over_parameter, spots, some, (over, name), shown.styles)
-            yield Drawing(f"{metric}-over-{over}", f"{name} over {over}", _told_of(spots, values, name), draw)
+            yield Drawing(f"{metric}-over-{over}", f"{name} over {over}", _caption(spots, values, name), draw)
     yield from _solved(shown)
 
 
@@ -162,25 +162,25 @@ def _spots(shown: _Shown, metric: str) -> dict[str, list[Spot]]:
     return spots
 
 
-def _told_of(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: str) -> str:
+def _caption(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: str) -> str:
     """Return the caption of medians over a parameter."""
     drawn = [spot for line in spots.values() for spot in line]
-    told = f"Median of {name}"
-    told += ", and the interval that holds it with 95 % (bootstrap)." if any(s.low < s.high for s in drawn) else "."
+    caption = f"Median of {name}"
+    caption += ", with its 95 % confidence interval (bootstrap)." if any(s.low < s.high for s in drawn) else "."
     if any(spot.open_ended for spot in drawn):
-        told += " A hollow mark: a lower bound, as limits have ended runs."
+        caption += " A hollow mark is a lower bound, as limits have ended runs."
     lines = {way: tuple((spot.at, spot.median) for spot in line) for way, line in spots.items() if line}
-    return told + (_same(lines) if numbers(values) else "") + _missing(spots)
+    return caption + (_same(lines) if numbers(values) else "") + _missing(spots)
 
 
 def _same(lines: Mapping[str, Any]) -> str:
-    """Return which lines lie upon each other."""
+    """Return a sentence on identical lines."""
     groups = [listed(group) for group in same_lines(lines)]
-    return f" Lines that lie upon each other: {'; '.join(groups)}." if groups else ""
+    return f" Identical lines: {'; '.join(groups)}." if groups else ""
 
 
 def _missing(lines: Mapping[str, Sequence[Any]]) -> str:
-    """Return which ways to run have no line."""
+    """Return a sentence on ways to run without a line."""
     missing = [way for way, line in lines.items() if not line]
     return f" Without a value: {', '.join(missing)}." if missing else ""
 
@@ -197,13 +197,13 @@ def _solved(shown: _Shown) -> Iterator[Drawing | str]:
         found = {}
     if found:
         same = _same(_lines(found)) if numbers(values) else ""
-        told = f"Share of runs with a verdict, and, shaded, that of problems with a solution.{same}"
+        caption = f"Share of runs with a verdict, and, shaded, that of problems with a solution.{same}"
         draw = partial(plots.shares, found, values, solutions, (over, "share of runs"), shown.styles)
-        yield Drawing(f"solved-over-{over}", f"Solved, over {over}", told, draw)
+        yield Drawing(f"solved-over-{over}", f"Solved, over {over}", caption, draw)
     elif len(set(solutions)) > 1 and len({row["digest"] for row in rows}) > len(values):
-        told = "Share of problems with a solution."
+        caption = "Share of problems with a solution."
         draw = partial(plots.shares, {}, values, solutions, (over, "share of problems"), shown.styles)
-        yield Drawing(f"solutions-over-{over}", f"Problems with a solution, over {over}", told, draw)
+        yield Drawing(f"solutions-over-{over}", f"Problems with a solution, over {over}", caption, draw)
 
 
 def _lines(found: Mapping[str, Sequence[Any]]) -> dict[str, tuple[Any, ...]]:
@@ -215,13 +215,13 @@ def _share(rows: Rows) -> float:
 
 
 def _solutions(rows: Rows) -> float:
-    """Return the share of problems with a solution, of those that some way to run has solved."""
+    """Return the share of problems with a solution among those that a way to run has solved."""
     solved = {row["digest"]: row["verdict"] != Verdict.NO_SOLUTION for row in rows if row["status"] == Status.DONE}
     return sum(solved.values()) / len(solved) if solved else math.nan
 
 
 def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
-    """Yield profiles and scatters of some metrics, and which ways need the same."""
+    """Yield profiles and scatter plots of some metrics, and sentences on ways with equal needs."""
     if len(shown.styles) == 1:
         return
     needs = {
@@ -244,7 +244,7 @@ def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
 
 
 def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
-    """Yield what shows how many runs are solved at which price: nothing, where all ways have the same line."""
+    """Yield cactus plots and performance profiles, unless all ways have the same line."""
     name, found = METRICS[metric], statistics.cactus(shown.rows, metric)
     solved = {way: line for way, line in found.items() if line}
     cut = " Runs that limits have ended are not solved." if _some_cut(shown.rows) else ""
@@ -252,17 +252,21 @@ def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
         cut += f" A problem counts at each value of {shown.over}."
     lines = _lines(found)
     if len(set(lines.values())) > 1:
-        told = f"How many problems are solved within so many {name} each: a cactus plot, its axes exchanged.{cut}"
-        told += _same(_lines(solved)) + _missing(found)
+        caption = (
+            f"The number of problems solved within a number of {name} each: a cactus plot, its axes exchanged.{cut}"
+        )
+        caption += _same(_lines(solved)) + _missing(found)
         draw = partial(plots.cactus, solved, name, shown.styles)
-        yield Drawing(f"cactus-{metric}", f"Solved within {name}", told, draw)
+        yield Drawing(f"cactus-{metric}", f"Solved within {name}", caption, draw)
     points = {way: line for way, line in statistics.performance_profile(shown.rows, metric).items() if line}
     factors = {way: [factor for factor, _ in line if math.isfinite(factor)] for way, line in points.items()}
     if len(set(_lines(factors).values())) > 1:
         each = min(share for line in points.values() for _, share in line)
-        told = f"Share of problems that are solved within a factor of the best way's {name} (performance profile).{cut}"
+        caption = (
+            f"Share of problems that are solved within a factor of the best way's {name} (performance profile).{cut}"
+        )
         draw = partial(plots.profile, factors, name, each, shown.styles)
-        yield Drawing(f"profile-{metric}", f"Performance profile of {name}", told + _same(_lines(factors)), draw)
+        yield Drawing(f"profile-{metric}", f"Performance profile of {name}", caption + _same(_lines(factors)), draw)
 
 
 def _vary(shown: _Shown, cases: Mapping[Case, float]) -> bool:
@@ -286,7 +290,7 @@ def _some_cut(rows: Rows) -> bool:
 
 
 def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, float]]) -> Iterator[Drawing]:
-    """Yield scatters of the first way to run against others, where one of the two varies."""
+    """Yield scatter plots of the first way to run against others, if one of the two varies."""
     name, (first, *others) = METRICS[metric], shown.styles
     drawn = 0
     for way in others:
@@ -294,27 +298,29 @@ def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, floa
         vary = any(_vary(shown, found[one]) for one in (first, way))
         if drawn < MOST_PAIRS and pairs and not _the_same(pairs) and vary:
             drawn += 1
-            told = f"A point for each problem that both have solved: {name} of the one against {name} of the other."
-            told += " Below the line the second needs less."
+            caption = (
+                f"A point for each problem that both have solved: {name} of the first against {name} of the second."
+            )
+            caption += " Below the line the second needs less."
             draw = partial(plots.scatter, pairs, name, (first, way), shown.styles[first].colour)
-            yield Drawing(f"{metric}-{first}-{way}", f"{name}: {first} and {way}", told, draw)
+            yield Drawing(f"{metric}-{first}-{way}", f"{name}: {first} and {way}", caption, draw)
 
 
 def _costs(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing]:
-    """Yield costs over what was spent, cycles first; and, if the final costs are asked for, these."""
+    """Yield costs over the effort, cycles first, and the final costs if they are requested."""
     for spent in sorted(statistics.SPENT, key=lambda one: one != "cycles"):
         bands = statistics.cost_bands(shown.rows, spent)
         if bands:
             same = _same({way: (band.spent, band.median) for way, band in bands.items()})
-            told = f"Cost of the best assignment so far: median and quartiles over runs.{same}"
+            caption = f"Cost of the best assignment so far: median and quartiles over runs.{same}"
             draw = partial(plots.cost_over, bands, METRICS[spent], shown.styles, steps=spent == "cycles")
-            yield Drawing(f"cost-over-{spent}", f"Cost over {METRICS[spent]}", told, draw)
+            yield Drawing(f"cost-over-{spent}", f"Cost over {METRICS[spent]}", caption, draw)
     if "cost" in metrics:
         yield from _final_costs(shown)
 
 
 def _final_costs(shown: _Shown) -> Iterator[Drawing]:
-    """Yield boxes of the final costs at each value of the parameter, as far as they have room; problems are one."""
+    """Yield boxes of the final costs at each value of the parameter, if they fit; problems are one group."""
     values = [None] if shown.over in summary.SINGLE else shown.values
     if len(values) * len(shown.styles) > MOST_BOXES:
         return
@@ -324,14 +330,16 @@ def _final_costs(shown: _Shown) -> Iterator[Drawing]:
         str(value): {way: one.values for way in shown.styles if (one := found.get((value, way))) and one.values}
         for value in values
     }
-    told = "Final costs: quartiles and median; whiskers reach to the furthest run within 1.5 times the box, and circles"
-    told += " are runs beyond."
+    caption = (
+        "Final costs: quartiles and median; whiskers reach to the furthest run within 1.5 times the box, and circles"
+    )
+    caption += " are runs beyond."
     draw = partial(plots.boxes, groups, (shown.over, METRICS["cost"]), shown.styles)
-    yield Drawing("final-costs", "Final costs", told, draw)
+    yield Drawing("final-costs", "Final costs", caption, draw)
 
 
 def _costs_differ(rows: Rows) -> bool:
-    """Return whether runs on the same problem have ended with different costs, as those of local search do."""
+    """Return whether runs on the same problem have ended with different costs, as in local search."""
     found: dict[str, set[Any]] = {}
     for row in rows:
         if row["cost"] is not None and row["status"] in {Status.DONE, Status.LIMIT}:
@@ -344,12 +352,12 @@ def _file(label: str) -> str:
 
 
 def file_name(name: str, part: str) -> str:
-    """Return the name of a file about a part of the problems."""
+    """Return the name of the file for a part of the problems."""
     return f"{name}-{_file(part)}" if part else name
 
 
-def told_apart(names: Sequence[str]) -> list[str]:
-    """Return names of files with a number behind each that would be there twice: `a/b` and `a-b` have the same."""
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Return names of files, duplicates with a number: `a/b` and `a-b` give the same name."""
     found: dict[str, None] = {}
     for name in names:
         numbered = (f"{name}-{number}" for number in itertools.count(2))

@@ -1,4 +1,4 @@
-"""Frames on a socket between the runner of a study and its workers: four bytes of length, then the content."""
+"""Frames on a socket between a study and its workers: four bytes of length, then the content."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ def write_frame(connection: socket.socket, content: bytes) -> None:
 
 
 def read_frame(connection: socket.socket) -> bytes | None:
-    """Wait for a frame, and return its content; None: the other end has been closed."""
-    frames = Frames()
+    """Wait for a frame, and return its content; None if the other end is closed."""
+    frames = FrameBuffer()
     while True:
         received = connection.recv(_CHUNK if frames.missing is None else frames.missing)
         if not received:
             return None
-        for content in frames.take(received):
+        for content in frames.feed(received):
             return content
 
 
-class Frames:
-    """Frames out of the pieces in which they arrive."""
+class FrameBuffer:
+    """A buffer that joins received pieces to frames."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     @property
     def missing(self) -> int | None:
-        """Return the bytes that are missing in the present frame, at least; None once there is a whole one."""
+        """The least number of bytes that are missing in the present frame; None if it is complete."""
         length = _LENGTH.unpack_from(self._buffer)[0] if len(self._buffer) >= _LENGTH.size else 0
         return max(0, _LENGTH.size + length - len(self._buffer)) or None
 
-    def take(self, received: bytes) -> list[bytes]:
-        """Return the contents of the frames that are complete with `received`."""
+    def feed(self, received: bytes) -> list[bytes]:
+        """Add `received` bytes, and return the contents of the complete frames."""
         self._buffer += received
         whole = []
         while len(self._buffer) >= _LENGTH.size:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from robochoc.experiments import summary
-from robochoc.experiments.account import PAIRS_TOLD, Account, headed
+from robochoc.experiments.report_content import PAIRS_EXPLANATION, ReportContent, headed
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS, Table
 from robochoc.formats.toml import toml_tables
@@ -16,9 +16,9 @@ from robochoc.system.files import write_atomically
 from robochoc.system.plain_text import on_one_line
 
 MOST_COLUMNS = 7
-"""Where there are more ways to run than this, and than values of the parameter, each has a line and not a column."""
+"""With more ways to run than this, and than values of the parameter, each has a line and not a column."""
 MOST_PAIRS = 10
-"""Where there are more pairs, only those with the first way to run are told of."""
+"""With more pairs, only those with the first way to run are shown."""
 _INTRODUCTION = re.compile(r'^text = (?:"""[^"]*"""|"[^"\n]*")\n', re.MULTILINE)
 
 
@@ -28,7 +28,7 @@ def write_markdown(results: Results, page: Path, over: str | None = None) -> Non
     Args:
         results: The results.
         page: The file to write.
-        over: The parameter over which tables are. None: as the study says, or the first that has several values.
+        over: The parameter of tables. None: the study's, or the first one with several values.
 
     Raises:
         InvalidInputError: if there are no results, or no such parameter.
@@ -38,12 +38,12 @@ def write_markdown(results: Results, page: Path, over: str | None = None) -> Non
 
 
 def markdown_page(results: Results, name: str, over: str | None = None) -> str:
-    """Return the report on the results of a study in Markdown. `name` is that of its file.
+    """Return the report on the results of a study in Markdown, for a file called `name`.
 
     Raises:
         InvalidInputError: as `write_markdown`.
     """
-    return "\n\n".join(block.strip() for block in _blocks(Account(results, over), name)) + "\n"
+    return "\n\n".join(block.strip() for block in _blocks(ReportContent(results, over), name)) + "\n"
 
 
 def markdown_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
@@ -56,26 +56,26 @@ def _cell(text: str) -> str:
     return on_one_line(text).replace("|", "\\|")
 
 
-def _blocks(told: Account, name: str) -> Iterator[str]:
-    yield f"# {on_one_line(told.title)}"
-    yield from told.paragraphs
-    yield " ".join(told.measured())
-    yield "\n".join(f"- {on_one_line(line)}" for line in told.answers())
+def _blocks(content: ReportContent, name: str) -> Iterator[str]:
+    yield f"# {on_one_line(content.title)}"
+    yield from content.paragraphs
+    yield " ".join(content.measured())
+    yield "\n".join(f"- {on_one_line(line)}" for line in content.answers())
     yield "## Medians"
-    yield "A `>=` marks a median that limits leave open: if the runs that they ended had gone on, it could be higher."
-    for part, rows in told.parts:
-        for metric in told.metrics:
+    yield "A `>=` marks a lower bound: without the limits that ended runs, the median could be higher."
+    for part, rows in content.parts:
+        for metric in content.metrics:
             yield f"### {headed(METRICS[metric], part)}"
-            yield markdown_table(*_lying(summary.medians(rows, metric, told.over)))
+            yield markdown_table(*_fitted(summary.medians(rows, metric, content.over)))
     yield "## How runs ended"
-    yield markdown_table(*summary.endings(told.rows))
-    yield from _solved(told)
-    yield from _pairs(told)
-    yield from _how_to_repeat(told, name)
+    yield markdown_table(*summary.endings(content.rows))
+    yield from _solved(content)
+    yield from _pairs(content)
+    yield from _how_to_repeat(content, name)
 
 
-def _lying(table: Table) -> Table:
-    """Return a table with lines and columns exchanged, if it is too wide."""
+def _fitted(table: Table) -> Table:
+    """Return a table, transposed if it is too wide."""
     heads, lines = table
     if len(heads) - 1 <= max(MOST_COLUMNS, len(lines)):
         return table
@@ -83,10 +83,10 @@ def _lying(table: Table) -> Table:
     return first, others
 
 
-def _solved(told: Account) -> Iterator[str]:
-    """Yield how many problems have a solution; nothing where all that were decided have one."""
-    over = "problems" if "case" in told.rows[0] else told.over
-    tables = [(part, summary.solved(rows, over)) for part, rows in told.parts]
+def _solved(content: ReportContent) -> Iterator[str]:
+    """Yield the numbers of problems with a solution, unless all decided problems have one."""
+    over = "problems" if "case" in content.rows[0] else content.over
+    tables = [(part, summary.solved(rows, over)) for part, rows in content.parts]
     if any(line[3] != "0" for _, (_, lines) in tables for line in lines):
         yield "## Problems with a solution"
         for part, table in tables:
@@ -94,29 +94,29 @@ def _solved(told: Account) -> Iterator[str]:
             yield markdown_table(*table)
 
 
-def _pairs(told: Account) -> Iterator[str]:
-    cases = {row.get("case") for row in told.rows}
-    first_only = len(list(itertools.combinations(summary.labels(told.rows), 2))) * len(cases) > MOST_PAIRS
-    tables = list(told.pairs(first_only=first_only))
+def _pairs(content: ReportContent) -> Iterator[str]:
+    cases = {row.get("case") for row in content.rows}
+    first_only = len(list(itertools.combinations(summary.labels(content.rows), 2))) * len(cases) > MOST_PAIRS
+    tables = list(content.pairs(first_only=first_only))
     if tables:
         yield "## Pairs"
         left = " Only those with the first way to run are shown, and all were tested." if first_only else ""
-        yield f"{PAIRS_TOLD} `*`: p is below 5 %.{left}"
+        yield f"{PAIRS_EXPLANATION} `*`: p is below 5 %.{left}"
     for name, table in tables:
         yield f"### Pairs: {name}"
         yield markdown_table(*table)
 
 
-def _how_to_repeat(told: Account, name: str) -> Iterator[str]:
+def _how_to_repeat(content: ReportContent, name: str) -> Iterator[str]:
     yield "## How to repeat it"
-    yield f"Save this as `{told.name}.toml`:"
-    yield f"```toml\n{_without_introduction(told.text).strip()}\n```"
-    run = f"robochoc experiment run {told.name}.toml"
-    yield f"```sh\n{run}\nrobochoc experiment report {told.name}.sqlite -o {name}\n```"
+    yield f"Save this as `{content.name}.toml`:"
+    yield f"```toml\n{_without_introduction(content.text).strip()}\n```"
+    run = f"robochoc experiment run {content.name}.toml"
+    yield f"```sh\n{run}\nrobochoc experiment report {content.name}.sqlite -o {name}\n```"
 
 
 def _without_introduction(text: str) -> str:
-    """Return a study's file without the text that stands on the page already; the whole file where in doubt."""
+    """Return a study's file without the introduction, which is on the page; the whole file in case of doubt."""
     rest = _INTRODUCTION.sub("", text)
     whole = toml_tables(text)
     whole.get("report", {}).pop("text", None)

@@ -1,4 +1,4 @@
-"""What is seen of a run besides its counts: the cost over time, and the load of each robot."""
+"""Observers of a run: the cost over time, the load of each robot, and the journal."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from robochoc.run.options import Options
 from robochoc.run.recording import journal_header, objective_to_record
 
 MOST_POINTS = 10_000
-"""A curve has no more points: the cost of an assignment falls seldom, but costs can be large."""
+"""The most points of a curve: the cost seldom falls, but costs can be large."""
 
 
 class CostOverTime:
-    """An observer: when the team's assignment became cheaper than ever, and what had been sent until then.
+    """An observer of the moments at which the team's assignment became cheaper than ever, with the effort until then.
 
     The moments are those of a journal's `Improved` events.
     """
@@ -45,12 +45,12 @@ class CostOverTime:
             case _:
                 pass
 
-    def sent(self, progress: Progress) -> None:
-        """Take in how many messages have been sent, where no event tells each."""
+    def note_sent(self, progress: Progress) -> None:
+        """Record the number of messages sent, in a runtime without an event for each."""
         self._messages = max(self._messages, progress.messages)
 
     def points(self) -> list[CostPoint]:
-        """Return the moments, in their order. None where nothing is minimised."""
+        """Return the moments, in order; empty if nothing is minimised."""
         return list(self._points())[:MOST_POINTS]
 
     def _points(self) -> Iterator[CostPoint]:
@@ -67,7 +67,7 @@ class CostOverTime:
 
 
 class RobotLoads:
-    """An observer: how many messages and bytes each robot has sent."""
+    """An observer of the messages and bytes that each robot has sent."""
 
     def __init__(self) -> None:
         self._messages: Counter[str] = Counter()
@@ -79,28 +79,28 @@ class RobotLoads:
             self._messages[event.sender] += 1
             self._bytes[event.sender] += event.bytes
 
-    def found(self) -> list[RobotLoad]:
-        """Return the load of each robot that has sent something, by name."""
+    def loads(self) -> list[RobotLoad]:
+        """Return the load of each robot that has sent a message, sorted by name."""
         return [RobotLoad(name, count, self._bytes[name]) for name, count in sorted(self._messages.items())]
 
 
 LARGEST_JOURNAL = 256 * 2**20
-"""Bytes. A run whose journal is larger keeps none."""
+"""The largest stored journal, in bytes; larger ones are dropped."""
 
 
 def journal_of(team: Team, options: Options) -> JournalRecorder:
-    """Return an observer that keeps the run's journal in memory."""
+    """Return an observer that writes the run's journal in memory."""
     return JournalRecorder(journal_header(team, options), objective_to_record(team, options))
 
 
-def written(journal: JournalRecorder, outcome: Outcome) -> bytes:
-    """Return the journal of a run that is over."""
+def journal_bytes(journal: JournalRecorder, outcome: Outcome) -> bytes:
+    """Return the journal of a finished run; empty if it is too large."""
     journal.outcome = outcome
     content = journal.content()
     return content if len(content) <= LARGEST_JOURNAL else b""
 
 
-def several(*observers: Callable[[AnyEvent], None] | None) -> Observer | None:
+def combined(*observers: Callable[[AnyEvent], None] | None) -> Observer | None:
     """Return one observer that passes events on to all `observers`; None if there are none."""
     there = [one for one in observers if one is not None]
     if not there:

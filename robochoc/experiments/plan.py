@@ -11,11 +11,11 @@ MAX_RUNS = 1_000_000
 
 
 class TooManyRunsError(ValueError):
-    """The study has more runs than a file of results can reasonably hold."""
+    """The study has too many runs for a file of results."""
 
 
 def plan_of(study: Study) -> dict[str, Task]:
-    """Return the runs of a study, by their keys. Those of one problem follow each other.
+    """Return the runs of a study, by their keys. Runs of one problem follow each other.
 
     Raises:
         TooManyRunsError: if there are more than `MAX_RUNS`.

@@ -10,9 +10,9 @@ from robochoc.experiments.statistics import by_problem, case_of, maximised
 from robochoc.experiments.summary import METRICS, Rows, labels
 
 MOST_TOLD = 3
-"""Ways that a sentence names."""
+"""The most ways that a sentence names."""
 _SEARCHED = ("messages", "ncccs", "bytes", "cost")
-"""Ways that are the same in all of these do the same."""
+"""The columns by which ways count as identical."""
 
 
 def answers(rows: Rows, metrics: Sequence[str]) -> list[str]:
@@ -22,15 +22,15 @@ def answers(rows: Rows, metrics: Sequence[str]) -> list[str]:
         rows: The results of several ways to run.
         metrics: The metrics that are reported.
     """
-    told = [line for metric in metrics if (line := _least(rows, metric))]
-    return [*told, *_twins(rows)] if len(labels(rows)) > 1 else []
+    sentences = [line for metric in metrics if (line := _least(rows, metric))]
+    return [*sentences, *_twins(rows)] if len(labels(rows)) > 1 else []
 
 
 def _least(rows: Rows, metric: str) -> str:
-    """Return in how many cases each way is the best, or as good as the best; empty where all do the same in all cases.
+    """Return a sentence on the cases in which each way is the best, or tied; empty if all ways are equal in all cases.
 
-    A case is a problem, and a value of the parameter of runs; it counts with the median of its runs. Higher utilities
-    are better. A case that no way has solved is open.
+    A case is a problem with a value of the parameter of runs, counted by the median of its runs. Higher utilities are
+    better. A case that no way has solved is open.
     """
     ways = labels(rows)
     needs = {way: by_problem(rows, way, metric) for way in ways}
@@ -59,7 +59,7 @@ def _run(row: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def _twins(rows: Rows) -> Iterator[str]:
-    """Yield who has done the same as who in all cases."""
+    """Yield sentences on ways with identical results in all cases."""
     did: dict[str, dict[tuple[Any, ...], tuple[Any, ...]]] = {}
     for row in rows:
         did.setdefault(str(row["label"]), {})[_run(row)] = (row["status"], *(row[name] for name in _SEARCHED))

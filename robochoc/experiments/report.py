@@ -1,4 +1,4 @@
-"""Reports: one page that needs nothing else, or a folder of figures for a paper."""
+"""Reports: one self-contained HTML page, or a folder of figures for a paper."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from robochoc.experiments import summary
-from robochoc.experiments.account import PAIRS_TOLD, Account, headed
 from robochoc.experiments.export import latex_table
-from robochoc.experiments.figures import Drawing, figures_of, file_name, told_apart
+from robochoc.experiments.figures import Drawing, figures_of, file_name, unique_names
+from robochoc.experiments.report_content import PAIRS_EXPLANATION, ReportContent, headed
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS
 from robochoc.formats.diagnostics import invalid_input
@@ -39,7 +39,7 @@ def write_page(results: Results, page: Path, over: str | None = None) -> None:
     Args:
         results: The results.
         page: The file to write.
-        over: The parameter over which is drawn. None: as the study says, or the first that has several values.
+        over: The parameter of tables and figures. None: the study's, or the first one with several values.
 
     Raises:
         InvalidInputError: if there are no results, or no such parameter.
@@ -52,11 +52,11 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
     """Write the figures of the report as SVG and PDF, their captions, and its table in LaTeX, into `folder`.
 
     Raises:
-        InvalidInputError: as `write_page`, and if a figure is there already and `replace` is not set.
+        InvalidInputError: as `write_page`, and if a figure already exists and `replace` is not set.
         OSError: if they cannot be written.
     """
     report = _Report(results, over)
-    tables = told_apart([file_name("medians", part) for part, _ in report.parts])
+    tables = unique_names([file_name("medians", part) for part, _ in report.parts])
     files = {
         f"{name}.tex": latex_table(rows, headed(report.title, part), report.over).encode()
         for name, (part, rows) in zip(tables, report.parts, strict=True)
@@ -67,25 +67,25 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
         files |= {f"{drawing.name}.svg": drawing.svg(), f"{drawing.name}.pdf": drawing.pdf()}
     there = [name for name in files if (folder / name).exists()]
     if there and not replace:
-        raise invalid_input(folder / there[0], "is there already", "--force replaces figures")
+        raise invalid_input(folder / there[0], "already exists", "replace figures by --force")
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         write_atomically(folder / name, content)
 
 
-class _Report(Account):
-    """The account of a study's results, with figures."""
+class _Report(ReportContent):
+    """The content of a report, with figures."""
 
     def __init__(self, results: Results, over: str | None) -> None:
         super().__init__(results, over)
         found = [(part, figures_of(rows, self.over, self.metrics, self.width)) for part, rows in self.parts]
         drawings = [_of_part(one, part) for part, figures in found for one in figures.drawings]
-        names = told_apart([one.name for one in drawings])
+        names = unique_names([one.name for one in drawings])
         self.drawings = [dataclasses.replace(one, name=name) for one, name in zip(drawings, names, strict=True)]
         self.remarks = [f"{part}: {line}" if part else line for part, figures in found for line in figures.remarks]
 
     def page(self) -> str:
-        """Return the whole page."""
+        """Return the HTML page."""
         title = html.escape(self.title)
         head = (
             f'<meta charset="utf-8"><title>{title}</title>'
@@ -98,8 +98,8 @@ class _Report(Account):
     def _body(self) -> Iterator[str]:
         yield from (f"<p>{html.escape(part)}</p>" for part in self.paragraphs)
         yield "".join(f"<p>{html.escape(line)}</p>" for line in self.measured())
-        told = "".join(f"<li>{html.escape(line)}</li>" for line in self.answers())
-        yield f"<ul>{told}</ul>" if told else ""
+        items = "".join(f"<li>{html.escape(line)}</li>" for line in self.answers())
+        yield f"<ul>{items}</ul>" if items else ""
         yield "<h2>How runs ended</h2>" + _table(*summary.endings(self.rows))
         yield "<h2>Figures</h2>"
         yield "".join(f"<p>{html.escape(line)}</p>" for line in self.remarks)
@@ -118,7 +118,7 @@ class _Report(Account):
     def _tests(self) -> Iterator[str]:
         for name, table in self.pairs():
             yield f"<h2>Pairs: {html.escape(name)}</h2>"
-            yield f"<p>{PAIRS_TOLD}</p>"
+            yield f"<p>{PAIRS_EXPLANATION}</p>"
             yield _table(*table)
 
     def _how_to_repeat(self) -> str:
@@ -143,7 +143,7 @@ def _table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 
 
 def _inline(drawing: Drawing) -> str:
-    """Return a figure as an element of the page: without the XML declaration, and with identifiers of its own."""
+    """Return a figure as an element of the page: without the XML declaration, and with unique identifiers."""
     svg = drawing.svg(text=True).decode()
     svg = svg[svg.index("<svg") :]
     for sign in ('id="', 'href="#', "url(#"):

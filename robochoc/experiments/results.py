@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from robochoc.experiments.database import JSON, NUMBERS, STRANGE, TRIED_AGAIN, invalid, opened
-from robochoc.experiments.study import study_wishes
+from robochoc.experiments.database import JSON, NUMBERS, STRANGE, TRIED_AGAIN, invalid, open_database
+from robochoc.experiments.study import report_settings
 from robochoc.experiments.task import KEY, Status
 from robochoc.formats.diagnostics import shortened
 from robochoc.system.plain_text import on_one_line
 
 _MOST_DIGITS = 300
-"""Before and behind the point: floats have no more, nor have costs, and to write `1e999999999` out takes for ever."""
+"""The most digits before and after the point: floats and costs have no more, and `1e999999999` takes for ever."""
 
 
 class Results(NamedTuple):
@@ -27,12 +27,12 @@ class Results(NamedTuple):
 
     Attributes:
         name: The name of the study's file, without the ending.
-        title: What the study is called.
-        text: The study's file.
-        stopped: Why it was stopped, and the commands that repeat it: two answers contradict each other, or the checker
-            refutes one. Empty: it was not.
-        planned: How many runs it has, made or not.
-        rows: Those that were made, as `read` returns them.
+        title: The title of the study.
+        text: The content of the study's file.
+        stopped: Why it was stopped, with the commands that repeat it: two answers contradict each other, or the checker
+            refutes one. Empty: it was not stopped.
+        planned: The number of all its runs, finished or not.
+        rows: The finished runs, as `read` returns them.
     """
 
     name: str
@@ -44,17 +44,17 @@ class Results(NamedTuple):
 
 
 def read(path: Path | str) -> list[dict[str, Any]]:
-    """Return the results of a study: one dictionary a run, in the order of the study's file.
+    """Return the results of a study: a dictionary for each run, in the order of the study's file.
 
     Args:
-        path: The SQLite file that `robochoc experiment run` writes; it may be running.
+        path: The SQLite file that `robochoc experiment run` writes; the study may be running.
 
     Returns:
-        Rows for `pandas.DataFrame(rows)` or `polars.DataFrame(rows)`. The problem's parameters have columns of their
-        own names; those that others have, too, begin with `problem_`.
+        Rows for `pandas.DataFrame(rows)` or `polars.DataFrame(rows)`. The problem's parameters are columns with their
+        names; names that other columns have begin with `problem_`.
 
     Raises:
-        InvalidInputError: if the file holds no results of a study.
+        InvalidInputError: if the file contains no results of a study.
     """
     return list(read_results(Path(path)).rows)
 
@@ -63,63 +63,63 @@ def read_results(path: Path) -> Results:
     """Return the results of a study with the study itself; it may be running.
 
     Raises:
-        InvalidInputError: if the file holds no results of a study.
+        InvalidInputError: if the file contains no results of a study.
     """
-    with closing(opened(path, writing=False)) as database:
+    with closing(open_database(path, writing=False)) as database:
         try:
             return results_of(database)
         except STRANGE as error:
-            raise invalid(path, f"holds no results of a study: {on_one_line(str(error))}") from None
+            raise invalid(path, f"contains no results of a study: {on_one_line(str(error))}") from None
 
 
 def journals(path: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield the journals of the study's runs, by their keys, where the study records them.
+    """Yield the keys and journals of the study's runs, if the study records journals.
 
     Raises:
-        InvalidInputError: if the file holds no results of a study.
+        InvalidInputError: if the file contains no results of a study.
     """
-    with closing(opened(path, writing=False)) as database:
+    with closing(open_database(path, writing=False)) as database:
         try:
             found = "SELECT key, content FROM plan JOIN journals USING (key) ORDER BY position"
             yield from map(_journal, database.execute(found))
         except (sqlite3.Error, TypeError) as error:
-            raise invalid(path, f"holds no results of a study: {error}") from None
+            raise invalid(path, f"contains no results of a study: {error}") from None
 
 
 def _journal(found: tuple[object, object]) -> tuple[str, bytes]:
-    """Return a key and a journal. Raises `TypeError`: the key will be the name of a file."""
+    """Return a key and a journal. Raises `TypeError` if they are invalid, as the key will be the name of a file."""
     key, content = found
     if isinstance(key, str) and KEY.fullmatch(key) and isinstance(content, bytes):
         return key, content
-    raise TypeError(f"{shortened(str(key))} is no key of a run, or has no journal")
+    raise TypeError(f"{shortened(str(key))} is not the key of a run, or has no journal")
 
 
 def results_of(database: sqlite3.Connection) -> Results:
-    """Return the results in an open file. Raises one of `STRANGE` for strange content."""
+    """Return the results in an open file. Raises one of `STRANGE` for foreign content."""
     found = database.execute("SELECT name, title, text, stopped FROM study").fetchone() or ("",) * 4
     if not all(isinstance(one, str) for one in found):
         raise TypeError("the study has no name")
     name, title, text, stopped = map(str, found)
-    study_wishes(text)  # which raises if the study's file is no longer one
+    report_settings(text)  # raises if the text is not a study
     (planned,) = database.execute("SELECT count(*) FROM plan").fetchone()
     return Results(name, title, text, stopped, planned, tuple(_results(database)))
 
 
-def keys_there(path: Path, again: Collection[str] = ()) -> set[str]:
-    """Return the keys of all runs that were ever made and are not tried again.
+def finished_keys(path: Path, again: Collection[str] = ()) -> set[str]:
+    """Return the keys of all finished runs that are not to be repeated.
 
     Args:
         path: The file of the results.
-        again: Runs that have ended so are tried again, besides those that always are.
+        again: The statuses of runs to repeat, besides those that are always repeated.
 
     Raises:
-        InvalidInputError: if the file holds no results of a study.
+        InvalidInputError: if the file contains no results of a study.
     """
-    with closing(opened(path, writing=False)) as database:
+    with closing(open_database(path, writing=False)) as database:
         try:
             found = database.execute("SELECT key, status FROM runs").fetchall()
         except sqlite3.Error as error:
-            raise invalid(path, f"holds no results of a study: {error}") from None
+            raise invalid(path, f"contains no results of a study: {error}") from None
     return {key for key, status in found if status not in {*TRIED_AGAIN, *again}}
 
 
@@ -142,7 +142,7 @@ def _results(database: sqlite3.Connection) -> Iterator[dict[str, Any]]:
         for name in ("maximises", "verified", "confirmed"):
             row[name] = bool(row[name])
         if strange := [name for name in NUMBERS if not _is_number(row[name])]:
-            raise TypeError(f"{strange[0]} is no number in run {row['key']}")
+            raise TypeError(f"{strange[0]} is not a number in run {row['key']}")
         yield {**{(f"problem_{name}" if name in row else name): value for name, value in parameters.items()}, **row}
 
 
@@ -151,17 +151,17 @@ def _is_number(value: object) -> bool:
 
 
 def _exact(text: str) -> int | float | Decimal:
-    """Return the number that a text is: as a float where that is exactly the same."""
+    """Return the number in a text: an integer, a float if it is exact, or a decimal."""
     exact = Decimal(text)
     if not exact.is_finite() or abs(exact.adjusted()) > _MOST_DIGITS:
-        raise TypeError(f"{shortened(text)} is no cost")
+        raise TypeError(f"{shortened(text)} is not a cost")
     if exact == int(exact):
         return int(exact)
     return float(text) if Decimal(repr(float(text))) == exact else exact
 
 
 def _number(text: str) -> str | int | float:
-    """Return the number that a text is, or the text."""
+    """Return the number in a text, or the text."""
     for kind in (int, float):
         with suppress(ValueError):
             return kind(text)

@@ -1,4 +1,4 @@
-"""A study is carried out: what is not there yet is run, compared and written down."""
+"""Running a study: missing runs are executed, compared and stored."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from robochoc.experiments.task import Row, Status, Task
 from robochoc.experiments.workers import LocalWorkers
 
 WRITE_S = 0.2
-"""Rows are written after so many seconds, together: what a kill costs at most."""
+"""Seconds between two writes of rows: the most that a kill loses."""
 
 
 class StudyProgress(NamedTuple):
-    """How far a study is.
+    """The progress of a study.
 
     Attributes:
-        done: The runs that are there.
-        planned: All runs of the study.
+        done: The number of finished runs.
+        planned: The number of all runs of the study.
         elapsed_s: Seconds since this start.
-        left_s: How long the rest takes, by what was run since this start. None: nothing was.
+        left_s: The estimated seconds of the rest, by the runs since this start. None: there were none.
     """
 
     done: int
@@ -39,18 +39,18 @@ class StudyProgress(NamedTuple):
 
 
 class Workers(Protocol):
-    """What carries out tasks: processes of this machine, or a cluster."""
+    """The workers that run tasks: processes of this machine, or a cluster."""
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
-        """Yield what comes of all tasks, in any order."""
+        """Yield the rows of all tasks, in any order."""
 
     def __enter__(self) -> Self:
-        """Start what is needed."""
+        """Start the workers."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
     ) -> None:
-        """End what was started."""
+        """End the workers."""
 
 
 def run_study(
@@ -62,29 +62,29 @@ def run_study(
     workers: Callable[[int | None], Workers] | None = None,
     again: Collection[Status] = (),
 ) -> Counter[str]:
-    """Run what `study` has and `store` has not.
+    """Execute the runs of `study` that are not in `store`.
 
-    Runs in the simulator go on side by side. Those whose robots have processes come after them, one at a time, for
-    their times would not be worth anything otherwise.
+    Runs in the simulator are executed in parallel. Runs with processes follow, one at a time, as their times would be
+    meaningless otherwise.
 
     Args:
         study: The study.
-        store: Where the results are kept.
-        jobs: How many workers this machine has. None: as many as it has processors.
-        progress: It is called after each run.
-        workers: Returns what carries out runs in the simulator, instead of this machine; it is given the limit on
-            memory in megabytes.
-        again: How runs have ended that are made again, besides those that always are.
+        store: The store of the results.
+        jobs: The number of workers on this machine. None: the number of processors.
+        progress: Called after each run.
+        workers: Returns the workers for runs in the simulator, instead of those of this machine, for a limit on memory
+            in megabytes.
+        again: The statuses of runs to repeat, besides those that are always repeated.
 
     Returns:
-        How many of the study's runs have which status.
+        The number of the study's runs by status.
 
     Raises:
         DisagreementError: if two answers contradict each other, or one is refuted. All rows so far are written.
         TooManyRunsError: if the study has too many runs.
     """
     plan = plan_of(study)
-    there = store.begin(study, plan, again)
+    there = store.start(study, plan, again)
     missing = [task for key, task in plan.items() if key not in there]
     agreement = Agreement()
     try:
@@ -92,7 +92,7 @@ def run_study(
         with _Writer(store, agreement, _Clock(len(plan), len(missing), progress)) as writer:
             _run_all(missing, writer, jobs, workers)
     except DisagreementError as wrong:
-        store.stop(str(wrong))
+        store.mark_stopped(str(wrong))
         raise
     store.check_place()
     return Counter(str(row["status"]) for row in store.results().rows)
@@ -101,7 +101,7 @@ def run_study(
 def _run_all(
     missing: Sequence[Task], writer: _Writer, jobs: int | None, workers: Callable[[int | None], Workers] | None
 ) -> None:
-    """Run the missing tasks, those of processes after the others."""
+    """Run the missing tasks, those with processes after the others."""
     for timed, tasks in itertools.groupby(sorted(missing, key=_is_timed), key=_is_timed):
         bundles = [[*bundle] for _, bundle in itertools.groupby(tasks, key=_problem)]
         memory_mb = bundles[0][0].limits.memory_mb
@@ -111,7 +111,7 @@ def _run_all(
             hands = workers(memory_mb)
         with hands:
             for task, row in hands.rows(bundles):
-                writer.take(task, row)
+                writer.add(task, row)
 
 
 def _is_timed(task: Task) -> bool:
@@ -127,7 +127,7 @@ def _processors() -> int:
 
 
 class _Clock:
-    """Tells the progress."""
+    """Reports the progress."""
 
     def __init__(self, planned: int, missing: int, progress: Callable[[StudyProgress], None] | None) -> None:
         self._planned, self._missing = planned, missing
@@ -154,15 +154,15 @@ def _compare_what_is_there(store: Store, plan: dict[str, Task], agreement: Agree
 
 
 class _Writer(AbstractContextManager["_Writer"]):
-    """Writes rows, several at a time: they come faster than a disk can be asked to keep each."""
+    """Writes rows, several at a time, as single writes would be slower than runs."""
 
     def __init__(self, store: Store, agreement: Agreement, clock: _Clock) -> None:
         self._store, self._agreement, self._clock = store, agreement, clock
         self._rows: list[tuple[str, Row]] = []
         self._due = 0.0
 
-    def take(self, task: Task, row: Row) -> None:
-        """Write a row, now or soon. Raises `DisagreementError`."""
+    def add(self, task: Task, row: Row) -> None:
+        """Add a row, and write it now or soon. Raises `DisagreementError`."""
         self._rows.append((task.key, row))
         if time.monotonic() >= self._due:
             self.flush()
@@ -171,10 +171,10 @@ class _Writer(AbstractContextManager["_Writer"]):
         self._agreement.add(task, row)
 
     def flush(self) -> None:
-        """Write what is waiting."""
+        """Write all waiting rows."""
         rows, self._rows = self._rows, []
         self._store.add(rows)
 
     def __exit__(self, *_: object) -> None:
-        """Write what is left."""
+        """Write the remaining rows."""
         self.flush()

@@ -1,4 +1,4 @@
-"""Statistics of results: intervals of medians, tests of pairs, profiles."""
+"""Statistics of results: confidence intervals of medians, tests of pairs, profiles."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robochoc.experiments.task import Status
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 _SEED = 0
-"""Of the resampling: the same results have the same intervals."""
+"""The seed of the resampling: the same results give the same intervals."""
 MOST_EXACT = 10
 FEWEST_PAIRS = 6
 """With fewer pairs no result of the test can be significant at 5 %."""
@@ -26,7 +26,7 @@ FEWEST_PAIRS = 6
 
 @dataclass(frozen=True)
 class Interval:
-    """A median, and the interval that holds it with the probability `CONFIDENCE`."""
+    """A median, and its confidence interval with the level `CONFIDENCE`."""
 
     median: float
     low: float
@@ -37,11 +37,11 @@ def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> In
     """Return the median of `values` and its interval by the percentile bootstrap.
 
     Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3. Problems are drawn, each with all of
-    its runs: repetitions of one problem say little of others.
+    its runs, as repetitions of one problem are not independent.
 
     Args:
         values: The values of runs.
-        problems: The problem of each. Without: all are of different problems.
+        problems: The problem of each run. Empty: all problems differ.
 
     Raises:
         ValueError: if there are no values.
@@ -60,7 +60,7 @@ def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> In
 
 
 def weighted_medians(values: Any, counts: Any) -> Any:  # noqa: ANN401 - arrays of numbers
-    """Return for each row of `counts` the median of `values`, in ascending order, each there so many times."""
+    """Return, for each row of `counts`, the median of the ascending `values`, repeated as counted."""
     until = np.cumsum(counts, axis=1)
     total = until[:, -1:]
     low = values[np.argmax(until >= (total + 1) // 2, axis=1)]
@@ -80,8 +80,7 @@ class Comparison:
         other_better: In how many of them the second is better.
         ratio: The median ratio of the first to the second. None: it does not exist.
         difference: The median difference of the first and the second. None: there are no pairs.
-        p: The probability of such a difference if there were none, corrected for the number of tests. None: too few
-            pairs.
+        p: The p-value of the difference, corrected for the number of tests. None: too few pairs.
         at: The value of the parameter of runs at which they are compared. None: tables are over none.
     """
 
@@ -124,7 +123,7 @@ Case = tuple[str, Any]
 
 
 def by_problem(rows: Rows, way: str, metric: str) -> dict[Case, float]:
-    """Return the median of a metric over a way's runs of each problem, where more than half have a verdict."""
+    """Return the median of a metric over a way's runs of each problem, if more than half of them have a verdict."""
     upwards = maximised(rows, metric)
     runs: dict[Case, list[float]] = {}
     for row in rows:
@@ -161,9 +160,9 @@ def _comparison(
 
 
 def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
-    """Return the median of the ratios of all `pairs`; None where it does not exist.
+    """Return the median of the ratios of all `pairs`; None if it does not exist.
 
-    The ratio of 0 to 0 is 1; the ratio of a positive number to 0 is higher than all others. Negative numbers have none.
+    The ratio of 0 to 0 is 1; the ratio of a positive number to 0 is infinite. Negative numbers have no ratio.
     """
     if not pairs or min(map(min, pairs)) < 0:
         return None
@@ -172,9 +171,9 @@ def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
 
 
 def _wilcoxon(differences: Sequence[float]) -> float | None:
-    """Return the two-sided probability; None for too few differences. Pairs without a difference are left out.
+    """Return the two-sided p-value; None for too few differences. Pairs without a difference are left out.
 
-    With ties it is exact for up to `MOST_EXACT` differences, and approximated else: scipy takes seconds for more.
+    With ties it is exact for up to `MOST_EXACT` differences, and otherwise approximate: scipy takes seconds for more.
     """
     some = [one for one in differences if one]
     if len(some) < FEWEST_PAIRS:
@@ -187,7 +186,7 @@ def _wilcoxon(differences: Sequence[float]) -> float | None:
 
 
 def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
-    """Return `found` with probabilities corrected for their number (Holm)."""
+    """Return `found` with p-values corrected for their number (Holm; scipy has no such function)."""
     tested = sorted((one.p, place) for place, one in enumerate(found) if one.p is not None)
     corrected: dict[int, float] = {}
     highest = 0.0
@@ -198,7 +197,7 @@ def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
 
 
 def cactus(rows: Rows, metric: str) -> dict[str, list[float]]:
-    """Return what each way to run needed for the problems that it has solved, in ascending order."""
+    """Return, for each way to run, the metric of its solved problems, in ascending order."""
     return {way: sorted(by_problem(rows, way, metric).values()) for way in labels(rows)}
 
 
@@ -223,7 +222,7 @@ def _factor(value: float, best: float) -> float:
 
 @dataclass(frozen=True)
 class Band:
-    """The quality of the best assignment so far, over what was spent: quartiles over runs, at each of `spent`."""
+    """The cost of the best assignment so far over the effort: quartiles over runs, at each of `spent`."""
 
     spent: tuple[float, ...]
     low: tuple[float, ...]
@@ -233,13 +232,13 @@ class Band:
 
 _POINTS = 200
 SPENT: Mapping[str, int] = MappingProxyType({"messages": 0, "ncccs": 1, "cycles": 2, "simulated_s": 2})
-"""What costs are drawn over, and where a point of the curve has it: the time is in the run's own unit."""
+"""The measures of effort, and their places in a point of a curve; the time is in the run's unit."""
 
 
 def cost_bands(rows: Rows, spent: str) -> dict[str, Band]:
     """Return for each way to run the cost of its best assignment over `spent`, one of `SPENT`.
 
-    A point is there from where all runs of the way have an assignment. Runs that do not count `spent` are left out.
+    Bands start where all runs of the way have an assignment. Runs that do not count `spent` are left out.
     """
     bands = {}
     for way in labels(rows):
@@ -265,6 +264,6 @@ def _band(curves: Sequence[Sequence[tuple[float, float]]]) -> Band:
 
 
 def _at(curve: Sequence[tuple[float, float]], spent: Any) -> list[float]:  # noqa: ANN401 - an array of floats
-    """Return the cost at each of `spent`: that of the last point before."""
+    """Return the cost of the last point before each of `spent`."""
     places = np.searchsorted([point[0] for point in curve], spent, side="right") - 1
     return [curve[max(0, int(place))][1] for place in places]

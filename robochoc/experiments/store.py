@@ -1,8 +1,8 @@
-"""What came of a study: one SQLite file, one row a run. docs/guides/experiments.md describes the columns.
+"""The results of a study: one SQLite file with a row for each run. docs/guides/experiments.md describes the columns.
 
-The table `runs` has every run that was ever made, by its key: a run is never there twice. The table `plan` has the runs
-of the study as it is now, in its order; the view `results` is both together. So a study that is changed, or was broken
-off, runs what is new, and its results are the same as if it had been run in one go.
+The table `runs` contains every finished run, by its unique key. The table `plan` contains the runs of the study,
+in its order; the view `results` joins both. So after a change or an interruption only missing runs are executed, and
+the results are the same as in one uninterrupted study.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Self
 
 import msgspec
 
-from robochoc.experiments.database import COLUMNS, JSON, STRANGE, TRIED_AGAIN, invalid, make_tables, opened
+from robochoc.experiments.database import COLUMNS, JSON, STRANGE, TRIED_AGAIN, invalid, make_tables, open_database
 from robochoc.experiments.results import Results, results_of
 from robochoc.experiments.study import Study
 from robochoc.experiments.task import GIVEN, Row, Status, Task
@@ -26,19 +26,19 @@ from robochoc.system.plain_text import on_one_line
 
 
 class StudyInUseError(Exception):
-    """Another process carries out this study."""
+    """Another process runs this study."""
 
 
 class Store:
-    """The file of a study's results, opened for writing. One process may have it open so.
+    """The file of a study's results, opened for writing by at most one process.
 
     Args:
-        path: The file. It is made if it does not exist. None: results are kept in memory.
+        path: The file, created if it does not exist. None: results are stored in memory.
 
     Raises:
-        InvalidInputError: if the file is none of ours.
+        InvalidInputError: if it is a foreign file.
         StudyInUseError: if another process writes to it.
-        OSError: if it cannot be made.
+        OSError: if it cannot be created.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -48,14 +48,14 @@ class Store:
             self._database = sqlite3.connect(":memory:")
             make_tables(self._database)
             return
-        # Closed after the database: to close any descriptor of a file drops SQLite's own locks on it.
+        # Closed after the database, as closing any descriptor of a file releases SQLite's locks on it.
         self._lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             try:
                 fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise StudyInUseError(f"{path} is being written to by another 'robochoc experiment run'") from None
-            self._database = opened(path)
+            self._database = open_database(path)
         except BaseException:
             os.close(self._lock)
             raise
@@ -72,13 +72,13 @@ class Store:
         if self._lock >= 0:
             os.close(self._lock)
 
-    def begin(self, study: Study, plan: Mapping[str, Task], again: Collection[Status] = ()) -> set[str]:
-        """Set the plan, and return the keys of the runs that are there already.
+    def start(self, study: Study, plan: Mapping[str, Task], again: Collection[Status] = ()) -> set[str]:
+        """Set the plan, and return the keys of the stored runs.
 
         Args:
             study: The study.
             plan: Its runs.
-            again: Runs that have ended so are forgotten, besides those that are always tried again.
+            again: The statuses of runs to repeat, besides those that are always repeated.
         """
         rows = [_planned(place, key, task) for place, (key, task) in enumerate(plan.items(), 1)]
         with self._writing() as writing:
@@ -94,7 +94,7 @@ class Store:
         return {key for (key,) in self._database.execute("SELECT key FROM runs")}
 
     def add(self, rows: Iterable[tuple[str, Row]]) -> None:
-        """Write the rows of runs, by their keys. One that is there already stays."""
+        """Write the rows of runs, by their keys. Existing rows are not changed."""
         marks = ", ".join("?" * (1 + len(COLUMNS)))
         several = list(rows)
         journals = [(key, row.journal) for key, row in several if row.journal]
@@ -107,15 +107,15 @@ class Store:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """Write all that is written within, or nothing. Raises `InvalidInputError` where that is not possible."""
+        """Commit all statements of the context, or none. Raises `InvalidInputError` if that is not possible."""
         try:
             with self._database as writing:
                 yield writing
         except sqlite3.Error as error:
             raise invalid(self._path or Path("results"), f"cannot be written to: {error}") from None
 
-    def stop(self, why: str) -> None:
-        """Write down why the study was stopped."""
+    def mark_stopped(self, why: str) -> None:
+        """Store the reason why the study was stopped."""
         with self._writing() as writing:
             writing.execute("UPDATE study SET stopped = ?", (why,))
 
@@ -128,13 +128,13 @@ class Store:
         """Return the results so far.
 
         Raises:
-            InvalidInputError: if somebody else has written into the file.
+            InvalidInputError: if another program has written into the file.
         """
         try:
             return results_of(self._database)
         except STRANGE as error:
-            told = f"holds no results of a study: {on_one_line(str(error))}"
-            raise invalid(self._path or Path("results"), told) from None
+            text = f"contains no results of a study: {on_one_line(str(error))}"
+            raise invalid(self._path or Path("results"), text) from None
 
 
 def _planned(place: int, key: str, task: Task) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""A study's file: which problems, which protocols, which limits. docs/guides/experiments.md describes it.
+"""A study's file: problems, protocols and limits. docs/guides/experiments.md describes it.
 
     [problems]
     family = "random"
@@ -11,7 +11,7 @@
     [runs]
     protocol = ["abt", "afc-ng", "dynabt", "awc"]
 
-A list, or a range as in `ranges.py`, stands for each of its values; several stand for all combinations.
+A list, or a range as in `study_file.py`, means each of its values; several lists mean all combinations.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ from typing import Annotated, Any
 
 import msgspec
 
-from robochoc.experiments.problem_table import PROBLEM_KEYS, problems_of
-from robochoc.experiments.run_table import RUN_KEYS, distinct, setups_of
+from robochoc.experiments.study_file import HINT, MAX_INTEGER, Place
+from robochoc.experiments.study_problems import PROBLEM_KEYS, problems_of
+from robochoc.experiments.study_runs import RUN_KEYS, distinct, setups_of
 from robochoc.experiments.summary import METRICS, OF_RUNS
-from robochoc.experiments.table import HINT, MAX_INTEGER, Place
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
 from robochoc.formats.diagnostics import MistakeError, invalid_input, shortened, suggestion
 from robochoc.formats.toml import convert, toml_tables
 from robochoc.run.options import Runtime
 
 LARGEST_FILE = 2**20
-"""A study's file has no more bytes."""
+"""The largest study's file, in bytes."""
 _TOP = ("title", "problems", "runs", "limits", "repeat", "record", "report")
 MOST_REPETITIONS = 1000
 MOST_MEMORY_MB = 2**30
 WIDTH = 4.6
-"""Inches: one column of a paper, and a little more."""
+"""The default width of figures in inches: one column of a paper, and a little more."""
 
 
-class ReportWishes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a report is to show: the table `[report]`.
+class ReportSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The settings of a report: the table `[report]`.
 
     Attributes:
-        over: The parameter over which figures are drawn. None: the first that has several values.
-        each: The parameter of problems that has tables and figures of its own for each of its values. None: all
-            problems are in the same.
-        metrics: The metrics that are drawn. Empty: those that there are.
-        text: What is to be read above the figures.
-        width: How wide figures are, in inches.
-        names: What figures and tables call ways to run: labels, or words in them, and their names.
+        over: The parameter over which figures are drawn. None: the first one with several values.
+        each: The parameter of problems with separate tables and figures for each of its values. None: all problems are
+            in the same ones.
+        metrics: The metrics to draw. Empty: the usual ones in the results.
+        text: The introduction above the figures.
+        width: The width of figures, in inches.
+        names: Names of ways to run in figures and tables, by labels or words in labels.
     """
 
     over: str | None = None
@@ -66,13 +66,13 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         name: The name of its file, without the ending.
-        title: What it is called.
-        text: Its file.
+        title: The title.
+        text: The content of its file.
         problems: The problems, in the file's order.
-        setups: The protocols, and how each is run, with the seeds of its runs and its limits.
-        repeat: How often each run is repeated.
-        record: What is recorded besides counts.
-        report: What a report is to show.
+        setups: The protocols with their options, each with the seeds of its runs and its limits.
+        repeat: The number of repetitions of each run.
+        record: The recordings besides counts.
+        report: The settings of a report.
     """
 
     name: str
@@ -82,14 +82,14 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     setups: tuple[tuple[Setup, tuple[int, ...], Limits], ...]
     repeat: int = 1
     record: tuple[Recording, ...] = ()
-    report: ReportWishes = ReportWishes()
+    report: ReportSettings = ReportSettings()
 
 
 def read_study(path: Path) -> Study:
     """Return the study in the TOML file at `path`.
 
     Raises:
-        InvalidInputError: with the line, if it is no study.
+        InvalidInputError: with the line, if the file is invalid.
     """
     text = _text(path)
     try:
@@ -102,17 +102,17 @@ def read_study(path: Path) -> Study:
 
 
 def study_of_tables(name: str, tables: Mapping[str, Any]) -> Study:
-    """Return the study that `tables` describe, and that no file has; `text` is what its file would be.
+    """Return the study that `tables` describe, without a file; `text` is the content of an equal file.
 
     Raises:
-        InvalidInputError: if they describe none.
+        InvalidInputError: if the tables are invalid.
     """
     study = study_of(tables, Place(Path(name), ""))
     return msgspec.structs.replace(study, text=toml_of(tables))
 
 
 def toml_of(tables: Mapping[str, Any]) -> str:
-    """Return plain values, and then tables, as TOML. JSON's numbers, words and lists are TOML's, too."""
+    """Return plain values, and then tables, as TOML. JSON's numbers, words and lists are valid TOML."""
     parts = []
     for name, table in tables.items():
         if not isinstance(table, Mapping):
@@ -137,14 +137,14 @@ def study_of(tables: Mapping[str, Any], place: Place) -> Study:
     setups = [one for table, at in _tables(tables, "runs", place) for one in setups_of(table, limits, at)]
     named = distinct([(setup, limit) for setup, _, limit in setups])
     if clash := _same_labels(named, setups):
-        raise place.below("runs").mistake("label", f"{shortened(clash)} stands for several ways to run")
+        raise place.below("runs").mistake("label", f"{shortened(clash)} is the label of several ways to run")
     repeat = tables.get("repeat", 1)
     if type(repeat) is not int or not 1 <= repeat <= MOST_REPETITIONS:
         raise place.mistake(
             "repeat", f"expected an integer from 1 to {MOST_REPETITIONS:,}, got {shortened(str(repeat))}"
         )
-    report = _convert(tables.get("report", {}), ReportWishes, place.below("report"))
-    _check_wishes(report, problems, named, place.below("report"))
+    report = _convert(tables.get("report", {}), ReportSettings, place.below("report"))
+    _check_report_settings(report, problems, named, place.below("report"))
     return Study(
         name=place.path.stem,
         title=_word(tables, "title", place) or place.path.stem,
@@ -184,7 +184,7 @@ def _convert(table: object, kind: Any, place: Place) -> Any:  # noqa: ANN401 - o
 
 
 def _same_labels(named: Sequence[Setup], setups: Sequence[tuple[Setup, tuple[int, ...], Limits]]) -> str:
-    """Return a label that several ways to run would have; empty: there is none. The same way twice is one way."""
+    """Return a label of several different ways to run; empty if there is none."""
     ways: dict[str, Any] = {}
     for one, (setup, _, limits) in zip(named, setups, strict=True):
         way = msgspec.structs.replace(setup, label=""), limits
@@ -193,8 +193,10 @@ def _same_labels(named: Sequence[Setup], setups: Sequence[tuple[Setup, tuple[int
     return ""
 
 
-def _check_wishes(wishes: ReportWishes, problems: Sequence[ProblemSpec], setups: Sequence[Setup], place: Place) -> None:
-    """Raise `InvalidInputError` for a parameter or a metric that the results will not have: before all is run."""
+def _check_report_settings(
+    wishes: ReportSettings, problems: Sequence[ProblemSpec], setups: Sequence[Setup], place: Place
+) -> None:
+    """Raise `InvalidInputError` before the runs for a parameter or a metric that the results will not have."""
     of_problems = {name for one in problems for name in (*one.parameters, *(f"scenario_{n}" for n in one.scenario))}
     of_problems |= {f"problem_{name}" for name in of_problems} | {"problems", "team"}
     of_runs = {*OF_RUNS, *(name for one in setups for name in one.settings)}
@@ -224,7 +226,7 @@ def _recordings(words: object, place: Place, runtimes: Collection[str]) -> tuple
             raise place.mistake("record", f"expected {' or '.join(Recording)}, got {shortened(str(word))}")
     for one in (Recording.ROBOTS, Recording.JOURNAL):
         if one in several and Runtime.ARRAYS in runtimes:
-            raise place.mistake("record", f"{one} is recorded from messages, and the runtime arrays sends none")
+            raise place.mistake("record", f"{one} cannot be used with the runtime arrays, which sends no messages")
     return tuple(one for one in Recording if one in several)
 
 
@@ -233,17 +235,19 @@ def _text(path: Path) -> str:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except OSError as error:
-        hint = "name the TOML file of a study; docs/guides/experiments.md shows one"
+        hint = "give the TOML file of a study; docs/guides/experiments.md shows one"
         raise invalid_input(path, f"cannot be read: {error.strerror}", hint) from None
     if len(content) > LARGEST_FILE:
-        raise invalid_input(path, f"is too large for a study's file, which has up to {LARGEST_FILE:,} bytes", "cut it")
+        raise invalid_input(
+            path, f"is too large for a study's file, which has up to {LARGEST_FILE:,} bytes", "shorten it"
+        )
     try:
         return content.decode()
     except UnicodeDecodeError:
-        raise invalid_input(path, "is not UTF-8", "a study's file is TOML, in UTF-8") from None
+        raise invalid_input(path, "is not UTF-8", "save it as TOML in UTF-8") from None
 
 
-def study_wishes(text: str) -> ReportWishes:
-    """Return what the report on a study that was read before is to show."""
+def report_settings(text: str) -> ReportSettings:
+    """Return the report settings in the text of a valid study."""
     table = toml_tables(text).get("report", {}) if text else {}
-    return msgspec.convert(table, ReportWishes)
+    return msgspec.convert(table, ReportSettings)

@@ -1,4 +1,4 @@
-"""Results summed up: medians of a metric over a parameter, for each way to run."""
+"""Summaries of results: medians of a metric over a parameter, for each way to run."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from robochoc.experiments.duplicates import SEEDS, without_duplicates
 from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
 from robochoc.model.priorities import natural_key
+from robochoc.system.plain_text import listed
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -33,17 +33,21 @@ METRICS: Mapping[str, str] = MappingProxyType(
         "largest": "bytes of the largest message",
     }
 )
-"""Each metric, and what it is called on an axis."""
+"""The metrics, with their names on an axis."""
 CENSORED = ("messages", "ncccs", "bytes", "checks", "cycles", "simulated_s", "wall_s", "total_s", "cpu_s")
-"""Metrics that would have gone on growing where a limit has ended a run."""
+"""Metrics whose values are lower bounds if a limit has ended a run."""
 OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
-"""Parameters of runs, over which results can be shown, too."""
+"""Parameters of runs, over which results can also be shown."""
 SINGLE = ("instance", "team")
-"""What single problems are called by: parameters that are no number or choice."""
+"""Parameters that identify single problems."""
 MOST_TEAMS = 12
-"""More problems have no lines of their own, unless it is asked for."""
+"""The most problems that have their own lines by default."""
 _MOST = {"instance": MOST_TEAMS}
-"""Results are shown over these by themselves only where they have no more values."""
+"""The most values of a parameter over which results are shown by default."""
+SEEDS = ("seed", "problem_seed", "scenario_seed")
+"""Parameters that are drawn at random: they do not belong to a setting."""
+Setting = tuple[tuple[str, Any], ...]
+"""The name and parameters of problems, without seeds."""
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
 
@@ -53,15 +57,14 @@ class NoSuchColumnError(ValueError):
 
 @dataclass(frozen=True)
 class Sample:
-    """What one way to run came to at one value of the parameter.
+    """The results of one way to run at one value of the parameter.
 
     Attributes:
-        values: The metric of the runs with a verdict, and of those that a limit has ended where that says something.
-        problems: The problem of each.
-        censored: How many of these a limit has ended.
-        failed: How many runs have no value: they crashed, were refused, and so on.
-        open_ended: Whether the median would be higher if the runs that a limit has ended had gone on for ever: it is a
-            lower bound.
+        values: The metric of the runs with a verdict, and of those that a limit has ended if it is known.
+        problems: The problem of each value.
+        censored: The number of these runs that a limit has ended.
+        failed: The number of runs without a value: they crashed, were refused, and so on.
+        open_ended: Whether the median is a lower bound: it would be higher without the limit that has ended runs.
     """
 
     values: tuple[float, ...]
@@ -92,8 +95,8 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
 
     Args:
         rows: The results.
-        wanted: The name that was asked for. None: the first parameter that all problems have, with several values,
-            seeds aside; if there is none, the problems, or the kinds of problems where there are many.
+        wanted: The requested name. None: the first parameter that all problems have, with several values,
+            except seeds; if there is none, the problems, or the kinds of problems if there are many.
 
     Raises:
         NoSuchColumnError: if there is no such parameter.
@@ -124,10 +127,10 @@ def _parts_labels(rows: Rows, name: str) -> bool:
 
 
 def by_parameter(rows: Rows, over: str) -> Rows:
-    """Return `rows` for tables and figures over a parameter: a parameter of runs becomes a column of its own.
+    """Return `rows` for tables and figures over a parameter: a parameter of runs becomes a column.
 
-    What the labels say of it is taken out of them: `abt delay=20` and `abt delay=50` are both `abt`, over `delay`. The
-    column `case` keeps runs of the same label and problem apart.
+    It is removed from the labels: `abt delay=20` and `abt delay=50` are both `abt`, over `delay`. The column `case`
+    distinguishes runs with the same label and problem.
     """
     if over in OF_RUNS:
         values = [row[over] for row in rows]
@@ -159,13 +162,13 @@ class Prepared(NamedTuple):
     remarks: list[str]
 
 
-def prepared(rows: Rows, over: str | None, names: Mapping[str, str]) -> Prepared:
+def prepare(rows: Rows, over: str | None, names: Mapping[str, str]) -> Prepared:
     """Return the results as tables and figures show them.
 
     Args:
         rows: The results.
-        over: The parameter that was asked for; see `parameter_to_draw_over`.
-        names: What ways to run are called; see `named`.
+        over: The requested parameter; see `parameter_to_draw_over`.
+        names: The names of ways to run; see `named`.
 
     Raises:
         NoSuchColumnError: as these two.
@@ -178,17 +181,17 @@ def prepared(rows: Rows, over: str | None, names: Mapping[str, str]) -> Prepared
 
 
 def _way(row: Mapping[str, Any], over: str) -> str:
-    """Return the way to run without the parameter `over`: labels alone may be called alike."""
+    """Return the way to run without the parameter `over`, as different ways may have the same label."""
     settings = {name: value for name, value in row["settings"].items() if name != over}
     return str([row["protocol"], sorted(settings.items()), *(row[name] for name in OF_RUNS if name != over)])
 
 
 def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
-    """Return the parts of the results that have tables and figures of their own, each with its name.
+    """Return the parts of the results with separate tables and figures, each with its name.
 
     Args:
         rows: The results.
-        each: The parameter whose values make the parts. None: all results are one part, without a name.
+        each: The parameter whose values define the parts. None: all results are one part, without a name.
 
     Raises:
         NoSuchColumnError: if there is no such parameter.
@@ -203,7 +206,7 @@ def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
 
 
 def named(rows: Rows, names: Mapping[str, str]) -> Rows:
-    """Return `rows` with ways to run called by other names: of a whole label, or of words in it.
+    """Return `rows` with ways to run renamed: by a whole label, or by words in it.
 
     Raises:
         NoSuchColumnError: if two ways to run would have the same name.
@@ -225,9 +228,9 @@ def _without(label: str, name: str, value: object) -> str:
 
 
 def metrics_to_show(rows: Rows, wanted: Sequence[str] = (), over: str = "") -> list[str]:
-    """Return the metrics that are shown: the wanted ones, or the usual ones as far as the results have them.
+    """Return the metrics to show: the wanted ones, or the usual ones that the results have.
 
-    What is shown `over` is none: `cycles` is a setting of local searches, too.
+    The parameter `over` is not among them, as `cycles` is also a setting of local searches.
 
     Raises:
         NoSuchColumnError: if there is no such metric.
@@ -249,7 +252,7 @@ def labels(rows: Rows) -> list[str]:
 
 
 def values_of(rows: Rows, name: str) -> list[Any]:
-    """Return the values of a parameter: numbers in ascending order, problems in that of names, others as they come."""
+    """Return the values of a parameter: numbers ascending, problems sorted by name, others in their order."""
     found = list(dict.fromkeys(row.get(name) for row in rows))
     if name in SINGLE:
         return sorted(found, key=lambda value: natural_key(str(value)))
@@ -258,7 +261,7 @@ def values_of(rows: Rows, name: str) -> list[Any]:
 
 
 def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]:
-    """Return what each way to run came to, by the value of the parameter `over` and its label."""
+    """Return the sample of each way to run, by the value of the parameter `over` and its label."""
     groups: dict[tuple[Any, str], list[Mapping[str, Any]]] = {}
     for row in rows:
         groups.setdefault((row.get(over), str(row["label"])), []).append(row)
@@ -266,7 +269,7 @@ def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]
 
 
 def sample(rows: Rows, metric: str) -> Sample:
-    """Return what `rows` came to."""
+    """Return the sample of a metric in `rows`."""
     counted = [row for row in rows if _counts(row, metric)]
     cut = [metric in CENSORED and row["status"] == Status.LIMIT for row in counted]
     values, problems = tuple(float(row[metric]) for row in counted), tuple(str(row["digest"]) for row in counted)
@@ -297,7 +300,7 @@ def medians(rows: Rows, metric: str, over: str) -> Table:
 
 
 def reached(rows: Rows, over: str) -> Table:
-    """Return how many runs came to the best cost that any run of the same problem has come to, and of how many."""
+    """Return the numbers of runs that reached the best known cost of their problem, out of all runs."""
     best: dict[str, float] = {}
     for row in rows:
         if _counts(row, "cost"):
@@ -318,7 +321,7 @@ def _share(found: Sequence[bool]) -> str:
 
 
 def endings(rows: Rows) -> Table:
-    """Return how runs have ended, a line for each way to run: their verdicts, or why they have none."""
+    """Return the verdicts of runs, or the statuses of those without one: a line for each way to run."""
     kinds = Counter(_ending(row) for row in rows)
     by_way: dict[str, Counter[str]] = {way: Counter() for way in labels(rows)}
     for row in rows:
@@ -328,7 +331,7 @@ def endings(rows: Rows) -> Table:
 
 
 def solved(rows: Rows, over: str) -> Table:
-    """Return how many problems have a solution and how many have none, as far as a run says so, over a parameter."""
+    """Return the numbers of problems with and without a solution, as far as known, over a parameter."""
     found: dict[Any, dict[str, set[str]]] = {}
     for row in rows:
         kinds = found.setdefault(row.get(over), {kind: set() for kind in ("problems", "with", "without")})
@@ -344,7 +347,7 @@ def _ending(row: Mapping[str, Any]) -> str:
 
 
 def cell(one: Sample | None) -> str:
-    """Return a sample in a table: its median, with a sign where limits leave it open."""
+    """Return the text of a sample in a table: its median, with a sign if it is a lower bound."""
     if one is None or one.median is None:
         return "-"
     return f"{'>= ' * one.open_ended}{number(one.median)}"
@@ -357,3 +360,43 @@ def number(value: float) -> str:
     if value == int(value) or abs(value) >= 1000:  # noqa: PLR2004 - digits before the point suffice
         return f"{value:,.0f}"
     return f"{value:.3g}" if abs(value) < 1 else f"{value:,.2f}"
+
+
+def without_duplicates(
+    rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]
+) -> tuple[list[Mapping[str, Any]], list[str]]:
+    """Return the results of the first of all settings with the same problems, and a sentence about the others.
+
+    Two settings are the same if they have the same problem for each seed. Different seeds of one setting may well have
+    the same problem: small problems are often drawn twice.
+
+    Args:
+        rows: The results of a study.
+        parameters: The names of the problems' parameters.
+    """
+    problems: dict[Setting, dict[Setting, str]] = {}
+    for row in rows:
+        seeds = tuple((name, row.get(name)) for name in parameters if name in SEEDS)
+        problems.setdefault(_setting(row, parameters), {})[seeds] = row["digest"]
+    first: dict[Setting, Setting] = {}
+    alike: dict[frozenset[tuple[Setting, str]], list[Setting]] = {}
+    for setting, digests in problems.items():
+        content = frozenset(digests.items()) if all(digests.values()) else frozenset({(setting, "")})
+        alike.setdefault(content, []).append(setting)
+    for settings in alike.values():
+        first.update(dict.fromkeys(settings, settings[0]))
+    kept = [row for row in rows if first[setting := _setting(row, parameters)] == setting]
+    return kept, [_sentence(settings) for settings in alike.values() if len(settings) > 1]
+
+
+def _setting(row: Mapping[str, Any], parameters: Sequence[str]) -> Setting:
+    """Return the problems' name and parameters, without the seeds."""
+    given = tuple((name, row.get(name)) for name in parameters if name not in SEEDS)
+    return (("problems", row.get("problems")), *given)
+
+
+def _sentence(settings: Sequence[Setting]) -> str:
+    """Return a sentence about settings with the same problems."""
+    several = [name for place, (name, _) in enumerate(settings[0]) if len({one[place] for one in settings}) > 1]
+    words = [", ".join(f"{name} {value}" for name, value in one if name in several) for one in settings]
+    return f"{listed(words)} generate the same problems: they are counted once, as {words[0]}."

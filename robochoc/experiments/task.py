@@ -1,4 +1,4 @@
-"""One run of a study, and the row that comes of it: plain data, which travels to workers as JSON."""
+"""One run of a study and its row: plain data, sent to workers and back as JSON."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from robochoc.run.options import CENTRAL, Options, Runtime, ScheduleName
 
 Parameter = str | int | float | bool
 Content = bytes
-"""As a name of its own: in a row `bytes` is a count."""
+"""An alias, as `bytes` is a count in a row."""
 GIVEN = "given"
 """The priority order of the files."""
 _KEY_BYTES = 16
 KEY = re.compile(f"[0-9a-f]{{{2 * _KEY_BYTES}}}")
-"""What the key of a run looks like."""
+"""The pattern of a run's key."""
 
 
 class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """A problem: of a family, or from files.
 
     Attributes:
-        group: What the study calls the problems that it is one of.
+        group: The study's name for the group of problems.
         family: The family of generated problems. Empty: the problem is in files.
         parameters: The family's parameters, or options of reading the files.
-        path: The team's folder or the file, where it is in one.
-        digest: Of the files' content. Two problems of the same content are the same problem.
+        path: The team's folder or file, if it is in files.
+        digest: The digest of the files' content. Two problems with the same content are the same problem.
         scenario: The parameters of a random scenario. Empty: there is none.
     """
 
@@ -44,15 +44,15 @@ class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
 
     @property
     def identity(self) -> str:
-        """Return what the problem is, whatever it is called and wherever its files are."""
+        """The identity of the problem, independent of its name and the place of its files."""
         identity = msgspec.structs.replace(self, group="", path="" if self.digest else self.path)
         return msgspec.json.encode(identity, order="deterministic").decode()
 
 
 class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
-    """A protocol and how it is run. Attributes are as in `robochoc.run.options.Options`.
+    """A protocol with its options. Attributes are as in `robochoc.run.options.Options`.
 
-    `label` is what tables and figures call it.
+    `label` is its name in tables and figures.
     """
 
     label: str = ""
@@ -85,8 +85,8 @@ class Limits(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     cycles: int | None = None
     memory_mb: int | None = None
 
-    def meant_for(self, setup: Setup) -> Limits:
-        """Return those of the limits that there can be for `setup`."""
+    def applicable_to(self, setup: Setup) -> Limits:
+        """Return the limits that apply to `setup`."""
         by_robots = setup.protocol != CENTRAL
         return msgspec.structs.replace(
             self,
@@ -113,11 +113,11 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
 
     Attributes:
         problem: The problem.
-        setup: The protocol, and how it is run.
+        setup: The protocol with its options.
         seed: The run's seed.
         limits: The run's limits.
         repetition: The number of the repetition, from 1.
-        record: What is recorded besides counts; see `Recording`.
+        record: The recordings besides counts; see `Recording`.
     """
 
     problem: ProblemSpec
@@ -129,7 +129,7 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
 
     @property
     def key(self) -> str:
-        """Return the digest of all that decides what the run does; labels and places of files do not."""
+        """The digest of everything that determines the run; labels and places of files do not."""
         plain = msgspec.structs.replace(self, setup=msgspec.structs.replace(self.setup, label=""))
         content = msgspec.json.encode(
             [self.problem.identity, msgspec.structs.replace(plain, problem=_NOWHERE)], order="deterministic"
@@ -138,7 +138,7 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
 
     @property
     def is_timed(self) -> bool:
-        """Return whether robots have processes: then nothing else is to run on the machine."""
+        """Whether robots have processes: then nothing else should run on the machine."""
         return self.setup.runtime not in {Runtime.SIMULATOR, Runtime.ARRAYS}
 
 
@@ -146,7 +146,7 @@ _NOWHERE = ProblemSpec()
 
 
 class Recording(StrEnum):
-    """What is recorded besides the counts of the whole run."""
+    """The recordings besides the counts of the whole run."""
 
     COST_OVER_TIME = "cost-over-time"
     ROBOTS = "robots"
@@ -154,12 +154,12 @@ class Recording(StrEnum):
 
 
 class Status(StrEnum):
-    """How a run has ended.
+    """The status of a finished run.
 
-    `DONE`: with a verdict. `LIMIT`: a limit was reached before. `ENDED`: an incomplete protocol has come to its end,
-    and has found nothing that holds. `REFUSED`: problem, protocol and options do not go together. `INVALID`: there is
-    no such problem. `LOST`: robots were lost. `REFUTED`: the checker refutes the answer. `MEMORY`: the memory did not
-    suffice. `CRASHED`: the process that solved has ended. `ERROR`: something else.
+    `DONE`: it has a verdict. `LIMIT`: a limit was reached before. `ENDED`: an incomplete protocol has ended without a
+    valid answer. `REFUSED`: problem, protocol and options cannot be combined. `INVALID`: the problem is invalid.
+    `LOST`: robots were lost. `REFUTED`: the checker refutes the answer. `MEMORY`: there was not enough memory.
+    `CRASHED`: the solving process has ended. `ERROR`: any other error.
     """
 
     DONE = "done"
@@ -191,7 +191,7 @@ class CostPoint(msgspec.Struct, frozen=True, array_like=True):
 
 
 class RobotLoad(msgspec.Struct, frozen=True, array_like=True):
-    """What one robot has sent: messages and bytes."""
+    """The load of one robot: messages and bytes sent."""
 
     robot: str
     messages: int

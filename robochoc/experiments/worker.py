@@ -1,7 +1,7 @@
-"""A worker of this machine: it reads tasks from a socket, and writes their rows to it, until that is closed.
+"""A worker of this machine: reads tasks from a socket, and writes their rows to it, until the socket is closed.
 
-It is a program of its own, `python -m robochoc.experiments.worker DESCRIPTOR PARENT MEMORY_MB`: what a task breaks is
-broken here.
+It is a separate program, `python -m robochoc.experiments.worker DESCRIPTOR PARENT MEMORY_MB`, so that a crash of a task
+ends only this process.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 
 import msgspec
 
-from robochoc.experiments.execute import Bench
+from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.frames import read_frame, write_frame
 from robochoc.experiments.task import Status, Task
 from robochoc.system.orphans import signal_when_orphaned
@@ -27,9 +27,9 @@ def main(descriptor: int, parent: int, memory_mb: int) -> None:
     """Run tasks until there are no more.
 
     Args:
-        descriptor: The socket's.
-        parent: The process that has started this one.
-        memory_mb: How much memory it may use; 0: any.
+        descriptor: The descriptor of the socket.
+        parent: The id of the parent process.
+        memory_mb: The limit on memory; 0: none.
     """
     leave_ctrl_c_to_the_parent()
     signal_when_orphaned(signal.SIGKILL)
@@ -37,12 +37,12 @@ def main(descriptor: int, parent: int, memory_mb: int) -> None:
         return
     if memory_mb:
         resource.setrlimit(resource.RLIMIT_DATA, (memory_mb * _MB, resource.RLIM_INFINITY))
-    with socket.socket(fileno=descriptor) as connection, Bench() as bench:
+    with socket.socket(fileno=descriptor) as connection, TaskRunner() as bench:
         while (content := read_frame(connection)) is not None:
             row = bench.run(msgspec.json.decode(content, type=Task))
             write_frame(connection, msgspec.json.encode(row))
             if row.status == Status.MEMORY:
-                return  # what is left is in pieces; another worker takes over
+                return  # the process is damaged; another worker replaces it
 
 
 if __name__ == "__main__":

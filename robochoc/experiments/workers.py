@@ -1,4 +1,4 @@
-"""The workers of this machine: processes that carry out the runs of a study."""
+"""The workers of this machine: processes that execute the runs of a study."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from typing import Self
 
 import msgspec
 
-from robochoc.experiments.frames import Frames, write_frame
+from robochoc.experiments.frames import FrameBuffer, write_frame
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.system.signals import signals_held
 
 SETUP_S = 60.0
-"""Seconds that a run may take beyond its limit: for reading, compiling, and ending. Then its worker is killed."""
+"""Seconds beyond its limit, for reading, compiling and ending, after which a run's worker is killed."""
 LEAVING_S = 5.0
-"""Seconds that a worker without a task has to end by itself."""
+"""Seconds in which a worker without a task may end by itself."""
 _CHUNK = 1 << 16
 
 
 class LocalWorkers:
     """Processes of this machine. Each has one bundle of tasks at a time: those of one problem.
 
-    A worker that dies, or does not come to an end, costs the task that it was at; others go on with the rest.
+    If a worker dies, or does not finish, its present task is lost; other workers continue with the rest.
     """
 
     def __init__(self, count: int, memory_mb: int | None = None) -> None:
@@ -47,30 +47,30 @@ class LocalWorkers:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End all workers, and what they were at."""
+        """End all workers and their tasks."""
         for worker in self._workers:
             worker.end(busy=bool(worker.tasks))
         self._selector.close()
 
     @property
     def pids(self) -> list[int]:
-        """Return the ids of the workers' processes."""
+        """The ids of the workers' processes."""
         return [worker.pid for worker in self._workers]
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
-        """Yield what comes of all tasks, as soon as it is there."""
+        """Yield the rows of all tasks, as soon as they are finished."""
         waiting = deque(deque(bundle) for bundle in bundles)
         while waiting or any(worker.tasks for worker in self._workers):
             self._hand_out(waiting)
             for key, _ in self._selector.select(self._patience_s()):
-                yield from self._heard(key.data, waiting)
+                yield from self._receive(key.data, waiting)
             for worker in [one for one in self._workers if one.is_late]:
                 task = worker.tasks.popleft()
                 self._replace(worker, waiting, busy=True)
                 yield task, _late(task)
 
     def _hand_out(self, waiting: deque[deque[Task]]) -> None:
-        """Give each worker that has nothing to do a bundle; start workers as long as there may be more."""
+        """Give each idle worker a bundle; start workers up to the allowed number."""
         while waiting and len(self._workers) < self._count:
             worker = _Worker(self._memory_mb)
             self._workers.append(worker)
@@ -83,26 +83,26 @@ class LocalWorkers:
         left = [worker.deadline - time.monotonic() for worker in self._workers if worker.deadline is not None]
         return max(0.0, min(left)) if left else None
 
-    def _heard(self, worker: _Worker, waiting: deque[deque[Task]]) -> Iterator[tuple[Task, Row]]:
+    def _receive(self, worker: _Worker, waiting: deque[deque[Task]]) -> Iterator[tuple[Task, Row]]:
         try:
             received = worker.connection.recv(_CHUNK)
         except OSError:
             received = b""
-        for content in worker.frames.take(received):
+        for content in worker.frames.feed(received):
             row = msgspec.json.decode(content, type=Row)
             task = worker.tasks.popleft()
-            if row.status == Status.MEMORY:  # the worker ends after this result
+            if row.status == Status.MEMORY:  # the worker ends after this row
                 self._replace(worker, waiting)
             else:
                 worker.next()
             yield task, row
         if not received and worker in self._workers:
             if worker.tasks:
-                yield worker.tasks.popleft(), Row(status=Status.CRASHED, reason=worker.how_it_ended())
+                yield worker.tasks.popleft(), Row(status=Status.CRASHED, reason=worker.exit_reason())
             self._replace(worker, waiting)
 
     def _replace(self, worker: _Worker, waiting: deque[deque[Task]], *, busy: bool = False) -> None:
-        """End a worker; another one gets the tasks that it has not come to."""
+        """End a worker, and return its remaining tasks to the queue."""
         if worker.tasks:
             waiting.appendleft(worker.tasks)
         self._selector.unregister(worker.connection)
@@ -111,16 +111,16 @@ class LocalWorkers:
 
 
 class _Worker:
-    """One process, the tasks that it was given, and until when the first of them is to be answered."""
+    """One process, its tasks, and the deadline of the first of them."""
 
     def __init__(self, memory_mb: int | None) -> None:
         self.connection, theirs = socket.socketpair()
-        self.frames = Frames()
+        self.frames = FrameBuffer()
         self.tasks: deque[Task] = deque()
         self.deadline: float | None = None
         command = [sys.executable, "-P", "-m", "robochoc.experiments.worker"]
         words = [str(theirs.fileno()), str(os.getpid()), str(memory_mb or 0)]
-        # In a session of its own, so that Ctrl-C on a terminal is heard by one process: it decides what ends when.
+        # In a separate session, so that Ctrl-C on a terminal reaches only the parent, which ends the workers.
         with theirs, signals_held():
             self._process = subprocess.Popen(  # noqa: S603 - our own module
                 [*command, *words],
@@ -133,11 +133,11 @@ class _Worker:
 
     @property
     def pid(self) -> int:
-        """Return the id of the process."""
+        """The id of the process."""
         return self._process.pid
 
     def give(self, tasks: deque[Task]) -> None:
-        """Give it a bundle, one task after the other: it has the next one when it has answered."""
+        """Give it a bundle; each task is sent after the row of the previous one."""
         self.tasks = tasks
         self.next()
 
@@ -148,24 +148,24 @@ class _Worker:
             return
         limit_s = self.tasks[0].limits.timeout
         self.deadline = None if limit_s is None else time.monotonic() + limit_s + SETUP_S
-        with suppress(OSError):  # it has ended after its last answer, and its socket says so
+        with suppress(OSError):  # it has ended after its last row, which the socket shows
             write_frame(self.connection, msgspec.json.encode(self.tasks[0]))
 
     @property
     def is_late(self) -> bool:
-        """Return whether its task has taken too long."""
+        """Whether its task has taken too long."""
         return self.deadline is not None and time.monotonic() > self.deadline
 
-    def how_it_ended(self) -> str:
-        """Return why there is no answer."""
+    def exit_reason(self) -> str:
+        """Return the reason why there is no row."""
         status = self._process.wait()
         if status < 0:
-            hint = "; perhaps the memory did not suffice" if status == -signal.SIGKILL else ""
+            hint = "; perhaps there was not enough memory" if status == -signal.SIGKILL else ""
             return f"the process was ended by {signal.Signals(-status).name}{hint}"
         return f"the process ended with status {status}"
 
     def end(self, *, busy: bool) -> None:
-        """End the process: by itself, with its solver, unless it is `busy`."""
+        """End the process: let it end by itself, with its solver, unless it is `busy`."""
         self.connection.close()
         if not busy:
             with suppress(subprocess.TimeoutExpired):
@@ -176,5 +176,5 @@ class _Worker:
 
 def _late(task: Task) -> Row:
     limit_s = task.limits.timeout or 0
-    told = f"it did not stop at its limit of {limit_s:g} s, nor {SETUP_S:g} s later; its set-up may take so long"
-    return Row(status=Status.LIMIT, reason=told, total_s=limit_s + SETUP_S)
+    reason = f"it did not stop at its limit of {limit_s:g} s, nor {SETUP_S:g} s later; perhaps its set-up takes long"
+    return Row(status=Status.LIMIT, reason=reason, total_s=limit_s + SETUP_S)

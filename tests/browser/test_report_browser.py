@@ -57,7 +57,7 @@ def test_figures_for_a_paper(results: Path, tmp_path: Path) -> None:
         assert etree.parse(path).getroot().tag.endswith("svg")
     assert all(path.read_bytes().startswith(b"%PDF") for path in folder.glob("*.pdf"))
     refused = robochoc_within("experiment", "report", results, "-o", folder)
-    assert (refused.returncode, "is there already (--force replaces figures)" in refused.stderr) == (1, True)
+    assert (refused.returncode, "already exists (replace figures by --force)" in refused.stderr) == (1, True)
 
 
 @pytest.mark.slow

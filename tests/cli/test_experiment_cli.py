@@ -92,7 +92,7 @@ def test_journals_are_files_that_other_commands_read(tmp_path: Path) -> None:
         altered(path, f"UPDATE {table} SET key = '../out' WHERE key = (SELECT min(key) FROM journals)")  # noqa: S608
     refused = robochoc_within(*export, "-o", tmp_path / "other")
     assert refused.returncode == 1
-    assert "../out is no key of a run" in refused.stderr
+    assert "../out is not the key of a run" in refused.stderr
     assert not (tmp_path / "out.journal").exists()
 
 
@@ -194,7 +194,7 @@ def test_strange_content_is_a_message(small: Path) -> None:
                 altered(path, change)
                 for words in (["show"], ["export"], ["export", "--format", "latex"]):
                     done = robochoc_within("experiment", *words, path)
-                    assert (done.returncode, "holds no results of a study" in done.stderr) == (1, True), done.stderr
+                    assert (done.returncode, "contains no results of a study" in done.stderr) == (1, True), done.stderr
 
 
 @pytest.mark.usefixtures("runs_here")
@@ -233,7 +233,7 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
     with cases() as each:
         for words, status, said in [
             (["run", "nothing.toml"], 1, "nothing.toml: cannot be read"),
-            (["show", "nothing.sqlite"], 1, "is no file (name the file that 'robochoc experiment run' writes)"),
+            (["show", "nothing.sqlite"], 1, "is not a file (give the file that 'robochoc experiment run' writes)"),
             (["show", "{}", "--over", "tight"], 2, "there is no parameter 'tight'; there are agents,"),
             (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
             (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),
@@ -263,7 +263,7 @@ def test_a_contradiction_ends_with_status_4(small: Path) -> None:
     digest = finished(SMALL).rows[0]["digest"]
     with Store(path) as store:
         plan = plan_of(study(SMALL))
-        store.begin(study(SMALL), plan)
+        store.start(study(SMALL), plan)
         store.add([(next(iter(plan)), Row(status=Status.DONE, verdict="no-solution", digest=digest, team="wrong"))])
     done = robochoc_within("experiment", "run", small)
     assert done.returncode == 4

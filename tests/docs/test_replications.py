@@ -23,7 +23,7 @@ from robochoc.experiments.markdown import markdown_table
 from robochoc.experiments.plan import plan_of
 from robochoc.experiments.runner import run_study
 from robochoc.experiments.store import Store
-from robochoc.experiments.study import read_study, study_wishes
+from robochoc.experiments.study import read_study, report_settings
 from tests.support.program import ROOT
 
 PAGES = [ROOT / "docs" / "explanation" / name for name in ("replications.md", "sfb.md")]
@@ -69,7 +69,7 @@ def tables_of(name: str, headings: Sequence[Heading], results: Path | None = Non
     with Store(results and results / f"{name}.sqlite") as store:
         run_study(study, store)
         rows: summary.Rows = store.results().rows
-    own = study_wishes(study.text).over
+    own = report_settings(study.text).over
     return {heading: _table(rows, heading, own) for heading in headings}
 
 

@@ -14,12 +14,12 @@ from typing import Any
 
 import msgspec
 
-from robochoc.experiments.execute import Bench
+from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.results import Results, read_results
 from robochoc.experiments.runner import StudyProgress, run_study
 from robochoc.experiments.store import Store
 from robochoc.experiments.study import Study, study_of
-from robochoc.experiments.table import Place
+from robochoc.experiments.study_file import Place
 from robochoc.experiments.task import Row, Task
 
 SMALL = """
@@ -59,7 +59,7 @@ def study(text: str, place: Path = Path("study.toml")) -> Study:
     return study_of(tomllib.loads(text), Place(place, text))
 
 
-class RunsHere(Bench):
+class RunsHere(TaskRunner):
     """Runs the tasks of a study in this process, in place of workers, which take half a second to start."""
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:

@@ -127,7 +127,7 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
     robochoc experiment export study.sqlite --format journals -o journals/
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.failures import errors_as_failures
-    from robochoc.experiments.export import exported
+    from robochoc.experiments.export import export_results
     from robochoc.experiments.results import read_results
     from robochoc.system.files import write_atomically
 
@@ -139,7 +139,7 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
         _write_journals(results, output)
         return
     with errors_as_failures(results):
-        content = exported(read_results(results), form)
+        content = export_results(read_results(results), form)
     if output is None:
         click.echo(content, nl=False)
     else:

@@ -60,7 +60,7 @@ def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[
         again: The statuses of ended runs that are to be repeated, besides those that always are.
     """
     from robochoc.experiments.plan import TooManyRunsError, plan_of
-    from robochoc.experiments.results import keys_there, read
+    from robochoc.experiments.results import finished_keys, read
 
     try:
         plan = plan_of(study)
@@ -68,7 +68,7 @@ def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[
         raise Failure(USAGE, str(refused)) from None
     there_is_a_file = path.exists()
     rows = {row["key"]: row for row in read(path)} if there_is_a_file else {}
-    known = keys_there(path, again) if there_is_a_file else set()
+    known = finished_keys(path, again) if there_is_a_file else set()
     missing = [task for key, task in plan.items() if key not in known]
     problems = len({task.problem.identity for task in plan.values()})
     labels = list(dict.fromkeys(task.setup.label for task in plan.values()))
@@ -112,11 +112,11 @@ def print_summary(results: Results, over: str | None, metrics: Sequence[str]) ->
 def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> None:
     """Print medians, the statuses of runs, and the ranking. The defaults are those in the study's `[report]`."""
     from robochoc.experiments import summary
-    from robochoc.experiments.study import study_wishes
+    from robochoc.experiments.study import report_settings
 
-    wishes = study_wishes(results.text)
+    wishes = report_settings(results.text)
     try:
-        over, rows, remarks = summary.prepared(results.rows, over or wishes.over, wishes.names)
+        over, rows, remarks = summary.prepare(results.rows, over or wishes.over, wishes.names)
         shown = summary.metrics_to_show(rows, metrics or wishes.metrics, over)
         parts = summary.parts(rows, wishes.each)
     except summary.NoSuchColumnError as wrong:

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.experiments.agreement import Agreement, DisagreementError, contradiction, repeat
-from robochoc.experiments.execute import Bench
+from robochoc.experiments.agreement import Agreement, DisagreementError, contradiction, repeat_commands
+from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.task import Limits, ProblemSpec, Row, Setup, Status, Task
 from tests.support.cases import cases
 from tests.support.program import robochoc_within
@@ -32,13 +32,13 @@ def test_contradictions() -> None:
             (row("optimal", "3"), row("no-solution"), "optimal and no-solution"),
             (row("optimal", "3"), row("optimal", "3"), ""),
             (row("optimal", "3.0"), row("optimal", "3"), ""),
-            (row("optimal", "3"), row("optimal", "4"), "3 is said to be optimal, and 4 was found"),
+            (row("optimal", "3"), row("optimal", "4"), "3 was reported as optimal, but 4 was found"),
             (row("optimal", "3"), row("solution", "4"), ""),
             (row("optimal", "3"), row("solution", "2.99"), "2.99 was found"),
             (row("optimal", "3", maximises=True), row("solution", "2", maximises=True), ""),
             (row("optimal", "3", maximises=True), row("solution", "4", maximises=True), "4 was found"),
             (row("solution", "4"), row("solution", "2"), ""),
-            (row("optimal", withdrawn=1), row("optimal", withdrawn=2), "1 and 2 robots"),
+            (row("optimal", withdrawn=1), row("optimal", withdrawn=2), "at least 1 and at least 2 robots withdraw"),
             (row("optimal", "3", withdrawn=1), row("solution", "1", withdrawn=2), ""),
         ]:
             with each((one.verdict, one.cost, other.verdict, other.cost)):
@@ -50,13 +50,13 @@ def test_contradictions() -> None:
 
 def test_the_commands_leave_the_users_files_alone() -> None:
     problem = ProblemSpec(path="mine", digest="x", scenario={"events": 3, "rate": 0.3, "seed": 1})
-    told = repeat(Task(problem=problem, setup=Setup(protocol="dynabt"), limits=Limits(messages=9)))
+    told = repeat_commands(Task(problem=problem, setup=Setup(protocol="dynabt"), limits=Limits(messages=9)))
     assert told == (
         "robochoc generate scenario mine --events 3 --rate 0.3 --seed 1 -o PROBLEM"
         " && robochoc solve PROBLEM --protocol dynabt --runtime simulator --messages 9"
     )
     foreign = ProblemSpec(path="w.yaml", digest="x", parameters={"instance": "w.yaml", "infinity": 10, "owner": "(.)"})
-    told = repeat(Task(problem=foreign, setup=Setup(protocol="sfb")))
+    told = repeat_commands(Task(problem=foreign, setup=Setup(protocol="sfb")))
     assert told == "robochoc solve w.yaml --protocol sfb --runtime simulator --owner '(.)' --infinity 10"
 
 
@@ -111,11 +111,11 @@ def test_the_commands_repeat_the_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     task = Task(problem=msgspec.convert(problem, ProblemSpec), setup=msgspec.convert(setup, Setup), seed=5)
-    *made, solved = repeat(task).split(" && ")
+    *made, solved = repeat_commands(task).split(" && ")
     for words in made:
         assert robochoc_within(*shlex.split(words)[1:]).returncode == 0, words
     done = robochoc_within(*shlex.split(solved)[1:], "--json")
-    with Bench() as bench:
+    with TaskRunner() as bench:
         found = bench.run(task)
     result = msgspec.json.decode(done.stdout)
     assert result["metrics"]["messages"] == found.messages

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from robochoc.experiments.digests import digest_of_files
-from robochoc.experiments.execute import Bench, team_of
+from robochoc.experiments.execute import TaskRunner, team_of
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
 from robochoc.formats.folder import write_team
 from robochoc.generators.queens3d import queens3d
@@ -28,12 +28,14 @@ BOTH = ("cost-over-time", "robots")
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
-    with Bench() as one:
+def bench() -> Iterator[TaskRunner]:
+    with TaskRunner() as one:
         yield one
 
 
-def row(bench: Bench, problem: ProblemSpec, setup: Mapping[str, object] = ABT, record: tuple[str, ...] = ()) -> Row:
+def row(
+    bench: TaskRunner, problem: ProblemSpec, setup: Mapping[str, object] = ABT, record: tuple[str, ...] = ()
+) -> Row:
     """Return what comes of a run, as a worker sends it."""
     task = Task(problem=problem, setup=msgspec.convert(setup, Setup), seed=3, record=record)
     return msgspec.json.decode(msgspec.json.encode(bench.run(task)), type=Row)
@@ -51,7 +53,7 @@ def row(bench: Bench, problem: ProblemSpec, setup: Mapping[str, object] = ABT, r
         (ProblemSpec(family="queens3d", parameters={"n": 3}), {"protocol": "abt", "withdraw": "minimum"}),
     ],
 )  # fmt: skip
-def test_a_row_says_what_the_run_says(problem: ProblemSpec, setup: dict[str, object], bench: Bench) -> None:
+def test_a_row_says_what_the_run_says(problem: ProblemSpec, setup: dict[str, object], bench: TaskRunner) -> None:
     found = row(bench, problem, setup)
     team = team_of(problem)
     outcome = solve(team, options_of(msgspec.convert(setup, Setup), seed=3))
@@ -70,7 +72,7 @@ def test_a_row_says_what_the_run_says(problem: ProblemSpec, setup: dict[str, obj
     assert (found.robots, found.constraints) == (len(team.robots), len(list(team.constraints())))
 
 
-def test_the_cost_over_time_is_that_of_the_journal(bench: Bench) -> None:
+def test_the_cost_over_time_is_that_of_the_journal(bench: TaskRunner) -> None:
     setup: dict[str, object] = {"protocol": "dsa", "settings": {"cycles": "8"}}
     found = row(bench, COSTS, setup, BOTH)
     assert [(point.time, point.cost) for point in found.cost_over_time] == _improved(team_of(COSTS), setup)
@@ -90,7 +92,7 @@ def _improved(team: Team, setup: dict[str, object]) -> list[tuple[float, str]]:
     return [(event.t, str(event.cost)) for event in events if isinstance(event, Improved)]
 
 
-def test_what_cannot_be_run_is_a_row_that_says_why(bench: Bench, tmp_path: Path) -> None:
+def test_what_cannot_be_run_is_a_row_that_says_why(bench: TaskRunner, tmp_path: Path) -> None:
     refused = row(bench, COSTS)
     assert refused.status is Status.REFUSED
     assert "abt" in str(refused.reason)
@@ -104,14 +106,14 @@ def test_what_cannot_be_run_is_a_row_that_says_why(bench: Bench, tmp_path: Path)
     assert (unknown.status, "no protocol" in str(unknown.reason)) == (Status.REFUSED, True)
 
 
-def test_a_limit_is_a_row_with_what_was_counted_until_then(bench: Bench) -> None:
+def test_a_limit_is_a_row_with_what_was_counted_until_then(bench: TaskRunner) -> None:
     found = bench.run(Task(problem=RANDOM, setup=Setup(protocol="abt"), limits=Limits(messages=5)))
     assert (found.status, found.verdict) == (Status.LIMIT, "unknown")
     assert found.messages is not None
     assert found.messages >= 5
 
 
-def test_limits_on_cycles_and_ncccs(bench: Bench) -> None:
+def test_limits_on_cycles_and_ncccs(bench: TaskRunner) -> None:
     in_step = Setup(protocol="abt", schedule="cycles")
     whole = bench.run(Task(problem=RANDOM, setup=in_step))
     assert whole.status is Status.DONE
@@ -125,13 +127,15 @@ def test_limits_on_cycles_and_ncccs(bench: Bench) -> None:
 
 def test_limits_are_for_those_that_can_keep_them() -> None:
     limits = Limits(timeout=9, messages=8, ncccs=7, cycles=6, memory_mb=5)
-    assert limits.meant_for(Setup(protocol="abt", schedule="cycles")) == limits
-    assert limits.meant_for(Setup(protocol="abt")) == Limits(timeout=9, messages=8, ncccs=7, memory_mb=5)
-    assert limits.meant_for(Setup(protocol="abt", runtime="processes")) == Limits(timeout=9, messages=8, memory_mb=5)
-    assert limits.meant_for(Setup(protocol="central")) == Limits(timeout=9, memory_mb=5)
+    assert limits.applicable_to(Setup(protocol="abt", schedule="cycles")) == limits
+    assert limits.applicable_to(Setup(protocol="abt")) == Limits(timeout=9, messages=8, ncccs=7, memory_mb=5)
+    assert limits.applicable_to(Setup(protocol="abt", runtime="processes")) == Limits(
+        timeout=9, messages=8, memory_mb=5
+    )
+    assert limits.applicable_to(Setup(protocol="central")) == Limits(timeout=9, memory_mb=5)
 
 
-def test_a_journal_is_that_of_the_run(bench: Bench) -> None:
+def test_a_journal_is_that_of_the_run(bench: TaskRunner) -> None:
     found = row(bench, COSTS, {"protocol": "syncbb"}, (Recording.JOURNAL,))
     journal = read_journal(found.journal)
     assert (journal.header.protocol, journal.header.seed) == ("syncbb", 3)
@@ -141,7 +145,7 @@ def test_a_journal_is_that_of_the_run(bench: Bench) -> None:
     assert str(journal.outcome.verdict) == found.verdict
 
 
-def test_what_ends_by_itself_is_no_limit(bench: Bench) -> None:
+def test_what_ends_by_itself_is_no_limit(bench: TaskRunner) -> None:
     """A problem without a solution: local search comes to its end all the same."""
     found = row(
         bench, ProblemSpec(family="queens3d", parameters={"n": 4}), {"protocol": "dsa", "settings": {"cycles": "3"}}
@@ -150,7 +154,7 @@ def test_what_ends_by_itself_is_no_limit(bench: Bench) -> None:
     assert found.messages
 
 
-def test_problems_differ_by_how_files_are_read_and_by_their_scenarios(bench: Bench, tmp_path: Path) -> None:
+def test_problems_differ_by_how_files_are_read_and_by_their_scenarios(bench: TaskRunner, tmp_path: Path) -> None:
     write_team(team_of(RANDOM), tmp_path / "team")
     path, digest = str(tmp_path / "team"), digest_of_files(tmp_path / "team")
     scenarios = [{"events": 3, "rate": 0.3, "seed": seed} for seed in (1, 2)]
@@ -167,13 +171,13 @@ def test_files_that_have_changed_since_the_plan_are_not_run(tmp_path: Path) -> N
     planned = digest_of_files(tmp_path / "team")
     with (tmp_path / "team" / "Robot1.1.xml").open("a") as file:
         file.write("\n")
-    with Bench() as bench:
+    with TaskRunner() as bench:
         found = row(bench, ProblemSpec(path=str(tmp_path / "team"), digest=planned))
     assert found.status is Status.INVALID
-    assert "has changed since the study began" in str(found.reason)
+    assert "has changed since the start of the study" in str(found.reason)
 
 
-def test_a_protocol_that_fails_is_a_row(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_protocol_that_fails_is_a_row(bench: TaskRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> None:
         raise KeyError("mine")
 
@@ -188,7 +192,7 @@ def _no_memory(*_: object, **__: object) -> None:
     raise MemoryError
 
 
-def test_problems_in_files_and_generated_ones_are_the_same_problem(bench: Bench, tmp_path: Path) -> None:
+def test_problems_in_files_and_generated_ones_are_the_same_problem(bench: TaskRunner, tmp_path: Path) -> None:
     path = tmp_path / "queens"
     write_team(queens3d(3), path)
     counts = [
@@ -201,7 +205,7 @@ def test_problems_in_files_and_generated_ones_are_the_same_problem(bench: Bench,
     assert counts[0] == counts[1]
 
 
-def test_a_scenario_is_drawn(bench: Bench) -> None:
+def test_a_scenario_is_drawn(bench: TaskRunner) -> None:
     problem = msgspec.structs.replace(RANDOM, scenario={"events": 3, "rate": 0.2, "seed": 1, "kinds": "add-constraint"})
     found = row(bench, problem, {"protocol": "dynabt"})
     assert found.status is Status.DONE

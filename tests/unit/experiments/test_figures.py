@@ -177,7 +177,7 @@ def test_what_says_nothing_is_left_out() -> None:
         f"Each way to run needs {need} in all of its runs{at}, within 1 %: no profiles of them are drawn.",
         f"a and b need {need} for all problems that both have solved.",
     ]
-    assert "Lines that lie upon each other: a and b." in figures.drawings[0].caption
+    assert "Identical lines: a and b." in figures.drawings[0].caption
     some = [{**one, "verdict": "no-solution"} if one["n"] > 1 else one for one in given]
     assert list(by_name(figures_of(some, "n", ["messages"]))) == ["messages-over-n", "solutions-over-n"]
     cut = [*given, row("b", 99, 1, "limit", n=1)]
@@ -194,7 +194,7 @@ def test_ways_with_the_same_values_are_both_seen() -> None:
         lines = [line for line in axes_of(figures[name]).get_lines() if len(line.get_xdata()) > 1]
         widths = [line.get_linewidth() for line in lines]
         assert widths[0] > widths[1] > widths[2]
-        assert "Lines that lie upon each other: a, b, c and d." in figures[name].caption
+        assert "Identical lines: a, b, c and d." in figures[name].caption
     assert "messages-a-b" not in figures
     assert "messages-a-e" in figures
 
@@ -226,7 +226,7 @@ def test_hollow_marks_and_ways_without_a_value_are_told_of() -> None:
     given += [row("b", case, 9 + case, "limit", n=case % 2) for case in range(4)]
     given += [row("c", case, None, "refused", n=case % 2) for case in range(4)]
     drawing = figures_of(given, "n", ["messages"]).drawings[0]
-    assert "A hollow mark: a lower bound" in drawing.caption
+    assert "A hollow mark is a lower bound" in drawing.caption
     assert drawing.caption.endswith("Without a value: c.")
     faces = [line.get_markerfacecolor() for line in axes_of(drawing).get_lines() if len(line.get_xdata()) == 1]
     assert [face == "white" for face in faces] == [False, False, True, True]
@@ -268,6 +268,6 @@ def test_labels_are_written_as_they_are() -> None:
 
 
 def test_names_of_files_are_told_apart() -> None:
-    from robochoc.experiments.figures import told_apart  # noqa: PLC0415 - heavy
+    from robochoc.experiments.figures import unique_names  # noqa: PLC0415 - heavy
 
-    assert told_apart(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]
+    assert unique_names(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 
 from robochoc.experiments import statistics, summary
-from robochoc.experiments.account import Account
-from robochoc.experiments.duplicates import without_duplicates
 from robochoc.experiments.ranking import answers
+from robochoc.experiments.report_content import ReportContent
 from robochoc.experiments.results import Results
 from robochoc.experiments.statistics import Band, Comparison, median_ratio
+from robochoc.experiments.summary import without_duplicates
 from tests.support.cases import cases
 
 pytest.importorskip("scipy")
@@ -54,8 +54,8 @@ def study(**more: object) -> list[dict[str, Any]]:
     ]
 
 
-def account(rows: list[dict[str, Any]]) -> Account:
-    return Account(Results("small", "Small", "", "", len(rows), tuple(rows)), None)
+def account(rows: list[dict[str, Any]]) -> ReportContent:
+    return ReportContent(Results("small", "Small", "", "", len(rows), tuple(rows)), None)
 
 
 def test_medians() -> None:
@@ -171,7 +171,7 @@ def test_shares_and_captions() -> None:
         [round(2 / 3, 6), 1.0],
     ]
     (over_teams, *_) = figures_of(study(), "team", ["messages"]).drawings
-    assert "A hollow mark: a lower bound" in over_teams.caption
+    assert "A hollow mark is a lower bound" in over_teams.caption
 
 
 def test_the_sentence_about_runs() -> None:
@@ -209,7 +209,7 @@ def test_problems_that_are_the_same_by_chance_are_kept() -> None:
 
 def test_problems_without_a_parameter_have_their_name_in_its_place() -> None:
     given = [{"tightness": 0.4, **row("a", 1, 1, 0)}, {**row("a", 2, 2, 0), "problems": "rooms"}]
-    assert summary.prepared(given, "tightness", {}).rows[1]["tightness"] == "rooms"
-    prepared = summary.prepared(given, "tightness", {})
+    assert summary.prepare(given, "tightness", {}).rows[1]["tightness"] == "rooms"
+    prepared = summary.prepare(given, "tightness", {})
     assert summary.medians(prepared.rows, "messages", "tightness")[1] == [["0.4", "1"], ["rooms", "2"]]
     assert summary.parameter_to_draw_over(given, "name") == "problems"

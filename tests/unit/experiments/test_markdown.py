@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from robochoc.experiments import statistics, summary
-from robochoc.experiments.account import Account
-from robochoc.experiments.export import exported
+from robochoc.experiments.export import export_results
 from robochoc.experiments.markdown import markdown_page, markdown_table
+from robochoc.experiments.report_content import ReportContent
 from robochoc.experiments.results import Results
 from robochoc.formats.diagnostics import InvalidInputError
 from tests.support.studies import COSTS, SMALL, finished
@@ -89,7 +89,7 @@ def test_ways_to_run_have_the_names_that_a_paper_gives_them() -> None:
     wished = made(COSTS)._replace(text=text)
     ways = ["SFB", "syncbb", "DSA variant=A", "DSA-B"]
     assert tables(told(COSTS, text), "### cost")[0] == ["agents", *ways]
-    assert f" & {' & '.join(ways)} \\\\" in exported(wished, "latex").decode()
+    assert f" & {' & '.join(ways)} \\\\" in export_results(wished, "latex").decode()
     with pytest.raises(InvalidInputError, match="two ways to run would have the same name"):
         told(COSTS, '[report]\nnames = { sfb = "x", syncbb = "x" }\n')
 
@@ -133,7 +133,7 @@ def test_runs_are_compared_at_each_value_of_a_parameter_of_runs() -> None:
 def test_delays_are_told_apart() -> None:
     results = made(SMALL.replace("1..3", "1..4") + "delay = [0, 9]\n")
     wished = results._replace(text='[report]\nover = "delay"\nmetrics = ["messages"]\n')
-    ((name, (heads, lines)),) = Account(wished, None).pairs()
+    ((name, (heads, lines)),) = ReportContent(wished, None).pairs()
     assert (name, heads[:2], [line[:3] for line in lines]) == (
         "messages",
         ["delay", ""],

@@ -77,15 +77,15 @@ def test_all_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="is no file"):
+    with pytest.raises(InvalidInputError, match="is not a file"):
         read(tmp_path / "nothing.sqlite")
     (tmp_path / "text.sqlite").write_text("no database, but long enough to be one" * 100)
     altered(tmp_path / "other.sqlite", "CREATE TABLE mine (x)")
     for name in ("text", "other"):
         before = (tmp_path / f"{name}.sqlite").read_bytes()
-        with pytest.raises(InvalidInputError, match=r"holds no results|none of 'robochoc experiment run'"):
+        with pytest.raises(InvalidInputError, match=r"contains no results|not written by 'robochoc experiment run'"):
             read(tmp_path / f"{name}.sqlite")
-        with pytest.raises(InvalidInputError, match=r"holds no results|none of 'robochoc experiment run'"):
+        with pytest.raises(InvalidInputError, match=r"contains no results|not written by 'robochoc experiment run'"):
             Store(tmp_path / f"{name}.sqlite")
         assert (tmp_path / f"{name}.sqlite").read_bytes() == before
 
@@ -104,7 +104,7 @@ def test_results_that_somebody_has_altered_are_refused(tmp_path: Path) -> None:
             with each(change):
                 finished(SMALL, path)
                 altered(path, change)
-                with pytest.raises(InvalidInputError, match=r"study\.sqlite: holds no results of a study"):
+                with pytest.raises(InvalidInputError, match=r"study\.sqlite: contains no results of a study"):
                     read(path)
 
 
@@ -140,7 +140,7 @@ def test_a_worker_that_is_killed_costs_the_run_that_it_was_at() -> None:
     assert set(found) == {task.key for task in tasks}
     assert sorted(row.status for row in found.values()) == ["crashed", *["done"] * 11]
     (crashed,) = [row for row in found.values() if row.status is Status.CRASHED]
-    assert crashed.reason == "the process was ended by SIGKILL; perhaps the memory did not suffice"
+    assert crashed.reason == "the process was ended by SIGKILL; perhaps there was not enough memory"
 
 
 def _keyed(task: Task, row: Row) -> tuple[str, Row]:
@@ -151,7 +151,7 @@ def test_what_has_crashed_is_tried_again(tmp_path: Path) -> None:
     path = tmp_path / "study.sqlite"
     plan = plan_of(study(SMALL))
     with Store(path) as store:
-        store.begin(study(SMALL), plan)
+        store.start(study(SMALL), plan)
         store.add([(key, Row(status=Status.CRASHED)) for key in list(plan)[:3]])
     assert comparable(results_of(SMALL, path)) == comparable(finished(SMALL))
 
@@ -160,7 +160,7 @@ def test_answers_that_contradict_each_other_stop_the_study(tmp_path: Path) -> No
     path = tmp_path / "study.sqlite"
     with Store(path) as store:
         plan = plan_of(study(SMALL))
-        store.begin(study(SMALL), plan)
+        store.start(study(SMALL), plan)
         digest = finished(SMALL).rows[0]["digest"]
         wrong = Row(status=Status.DONE, verdict="no-solution", digest=digest, team="wrong")
         store.add([(next(iter(plan)), wrong)])

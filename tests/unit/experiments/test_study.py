@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from robochoc.experiments.plan import TooManyRunsError, plan_of
-from robochoc.experiments.ranges import range_of
 from robochoc.experiments.study import read_study, study_of_tables
+from robochoc.experiments.study_file import range_of
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.formats.folder import write_team
 from robochoc.generators.queens3d import queens3d
@@ -136,9 +136,13 @@ WRONG = {
     "repeated never": (f"repeat = 0\n{SMALL}", 1, "expected an integer from 1 to 1,000"),
     "unknown recording": (f'record = ["cost"]\n{SMALL}', 1, "expected cost-over-time or robots or journal"),
     "no team there": ('[problems]\npath = "nothing-*"\n[runs]\nprotocol = "abt"\n', 2, "there is no team at nothing-*"),
-    "option of files": (SMALL.replace("domain", "infinity = 3\ndomain"), 5, "is for files of other tools"),
+    "option of files": (
+        SMALL.replace("domain", "infinity = 3\ndomain"),
+        5,
+        "can only be used with files of other tools",
+    ),
     "half a scenario": (SMALL.replace("domain", "scenario = { events = 2 }\ndomain"), 5, "rate is missing"),
-    "label of several": (f'{SMALL}label = "x"\n', 12, "in a table that stands for one way to run"),
+    "label of several": (f'{SMALL}label = "x"\n', 12, "in a table with one way to run"),
     "wish for no metric": (
         f'{SMALL}[report]\nmetrics = ["costs"]\n',
         13,
@@ -149,7 +153,7 @@ WRONG = {
     "too many settings": (
         SMALL.replace('["abt", "afc-ng"]', '"dsa"') + 'settings = { cycles = "1..1000", probability = "1..1000" }\n',
         12,
-        "stands for 1,000,000 combinations",
+        "describes 1,000,000 combinations",
     ),
     "a range of many digits": (f'{SMALL}seed = "{10**19}..{10**19}"\n', 12, "expected numbers, words"),
     "a recording of a list": (f"record = [[1]]\n{SMALL}", 1, "expected cost-over-time or"),
@@ -158,7 +162,7 @@ WRONG = {
     "loads of arrays": (
         f'record = ["robots"]\n{SMALL}runtime = "arrays"\n'.replace('["abt", "afc-ng"]', '"dsa"'),
         1,
-        "robots is recorded from messages, and the runtime arrays sends none",
+        "robots cannot be used with the runtime arrays, which sends no messages",
     ),
     "a title of two lines": (f'title = "a\\nb"\n{SMALL}', 1, "expected one line"),
     "a range with a dash": (SMALL.replace('"1..3"', '"1-3"'), 8, "a range is written 1..30"),

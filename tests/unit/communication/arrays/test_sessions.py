@@ -13,7 +13,7 @@ from robochoc.cli.group import cli
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.session import ArraysRun
 from robochoc.communication.run_result import Progress
-from robochoc.experiments.execute import Bench
+from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.task import ProblemSpec, Recording, Setup, Task
 from robochoc.generators.families import FAMILIES
 from robochoc.journal.events import AnyEvent, Decided
@@ -79,7 +79,7 @@ def test_decisions_are_told_cycle_by_cycle_after_the_progress() -> None:
 def test_a_study_has_the_cost_over_time_of_the_simulator_in_step() -> None:
     rows = {}
     problem = ProblemSpec(family="coloring", parameters={"agents": 30, "colors": 3, "degree": 4.0, "seed": 1})
-    with Bench() as bench:
+    with TaskRunner() as bench:
         for runtime, schedule in (("arrays", "concurrent"), ("simulator", "cycles")):
             setup = Setup(protocol="dsa", runtime=runtime, schedule=schedule, settings={"cycles": "20"})
             rows[runtime] = bench.run(Task(problem=problem, setup=setup, record=(Recording.COST_OVER_TIME,)))

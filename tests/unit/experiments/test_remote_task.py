@@ -15,9 +15,9 @@ import msgspec
 import pytest
 
 from robochoc.experiments import read
-from robochoc.experiments.elsewhere import files_of, run_one
-from robochoc.experiments.execute import Bench
+from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.plan import plan_of
+from robochoc.experiments.remote_task import files_of, run_one
 from robochoc.experiments.task import Row, Task
 from robochoc.formats import InvalidInputError, write_team
 from robochoc.generators.queens3d import queens3d
@@ -43,7 +43,7 @@ def test_files_travel_with_their_runs(tmp_path: Path) -> None:
     (tmp_path / "here" / "graph.yaml").write_text(_PYDCOP)
     tasks = [*_of("here", "dynabt", tmp_path), *_of("here/graph.yaml", "dpop", tmp_path)]
     assert len(tasks) == 3
-    with Bench() as bench:
+    with TaskRunner() as bench:
         here = [same(bench.run(task)) for task in tasks]
     travelling = [(msgspec.json.encode(task), files_of(task)) for task in tasks]
     shutil.rmtree(tmp_path / "here")
@@ -71,7 +71,7 @@ agents: [x, y]
 def test_generated_problems_are_made_there() -> None:
     task = next(iter(plan_of(study(SMALL)).values()))
     assert files_of(task) == {}
-    with Bench() as bench:
+    with TaskRunner() as bench:
         assert same(msgspec.json.decode(run_one(msgspec.json.encode(task), {}), type=Row)) == same(bench.run(task))
 
 
@@ -100,7 +100,7 @@ class Cluster:
     ("content", "said"),
     [
         ("{}", "missing required field `address`"),
-        ("[1", "it is no file of a scheduler"),
+        ("[1", "it is not a scheduler's file"),
         ('{"address": "nonsense"}', "missing port number in address 'nonsense'"),
     ],
 )

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from robochoc.experiments.digests import digest_of_files
-from robochoc.experiments.table import HINT, Place
+from robochoc.experiments.study_file import HINT, Place
 from robochoc.experiments.task import ProblemSpec
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.team import find_teams
@@ -26,19 +26,19 @@ _SCENARIO: Mapping[str, tuple[type, ...]] = {
     "after": (int,),
 }
 _OF_FILES: Mapping[str, tuple[type, ...]] = {"infinity": (int,), "owner": (str,)}
-_HYPHENED = re.compile(r"\d+-\d+")
-"""What looks like a range, and is none."""
+_HYPHENATED = re.compile(r"\d+-\d+")
+"""A text that resembles a range, but is not one."""
 
 
 MOST_PROBLEMS = 100_000
-"""A table stands for no more problems."""
+"""The most problems of a table."""
 
 
 def problems_of(table: Mapping[str, Any], place: Place) -> Iterator[ProblemSpec]:
-    """Yield the problems that a table stands for.
+    """Yield the problems of a table.
 
     Raises:
-        InvalidInputError: if it stands for none.
+        InvalidInputError: if the table is invalid.
     """
     scenarios = list(_scenarios(table, place))
     name = table.get("name", "")
@@ -55,7 +55,7 @@ def problems_of(table: Mapping[str, Any], place: Place) -> Iterator[ProblemSpec]
         found = _of_files(table["path"], rest, name, place)
     for count, (problem, scenario) in enumerate((one, scenario) for one in found for scenario in scenarios):
         if count >= MOST_PROBLEMS:
-            raise place.mistake("", f"stands for too many problems; at most {MOST_PROBLEMS:,} are allowed")
+            raise place.mistake("", f"describes too many problems; at most {MOST_PROBLEMS:,} are allowed")
         yield msgspec.structs.replace(problem, scenario=scenario)
 
 
@@ -69,7 +69,9 @@ def _scenarios(table: Mapping[str, Any], place: Place) -> Iterable[dict[str, Any
     at.check_keys(given, _SCENARIO)
     for key in ("events", "rate"):
         if key not in given:
-            raise place.mistake("scenario", f"{key} is missing; a scenario has so many events, and changes at a rate")
+            raise place.mistake(
+                "scenario", f"{key} is missing; a scenario needs a number of events, and a rate of changes"
+            )
     found = list(at.combinations(given))
     for one in found:
         _check_types(one, _SCENARIO, at)
@@ -85,7 +87,7 @@ def _of_family(family: object, given: Mapping[str, Any], name: str, place: Place
     place.check_keys(given, (*PROBLEM_KEYS, *known))
     for key in ("infinity", "owner"):
         if key in given:
-            raise place.mistake(key, "is for files of other tools", "leave it out")
+            raise place.mistake(key, "can only be used with files of other tools", "remove it")
     for key in required_of(family):
         if key not in given:
             raise place.mistake(
@@ -100,7 +102,7 @@ def _check_types(parameters: Mapping[str, Any], known: Mapping[str, tuple[type, 
     for key, value in parameters.items():
         if type(value) not in known[key]:
             expected = {int: "an integer", float: "a number", str: "a word", bool: "true or false"}[known[key][0]]
-            hint = "a range is written 1..30" if isinstance(value, str) and _HYPHENED.fullmatch(value) else HINT
+            hint = "a range is written 1..30" if isinstance(value, str) and _HYPHENATED.fullmatch(value) else HINT
             raise place.mistake(key, f"expected {expected}, got {shortened(repr(value))}", hint)
 
 
@@ -114,7 +116,9 @@ def _of_files(paths: object, given: Mapping[str, Any], name: str, place: Place) 
         found = _named(place.path.parent, word)
         problems = [one for path in found for one in _teams(path)]
         if not problems:
-            raise place.mistake("path", f"there is no team at {shortened(word)}", "paths begin at the study's folder")
+            raise place.mistake(
+                "path", f"there is no team at {shortened(word)}", "paths are relative to the study's folder"
+            )
         for path in problems:
             for option in options:
                 yield ProblemSpec(
@@ -126,7 +130,7 @@ def _of_files(paths: object, given: Mapping[str, Any], name: str, place: Place) 
 
 
 def _named(folder: Path, word: str) -> list[Path]:
-    """Return the paths that a word with or without wildcards names. What is there as it is written has no wildcards."""
+    """Return the paths that match a word with or without wildcards; an existing path is used literally."""
     path = folder / word
     if path.exists() or not has_magic(word):
         return [path]

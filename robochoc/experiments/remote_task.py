@@ -1,4 +1,4 @@
-"""One run on another machine: what travels there, and what is done with it."""
+"""One run on a worker of a cluster: its data, and its execution there."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from robochoc.experiments.execute import Bench
+from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.task import Task
 from robochoc.system.temporary_files import PrivateFolder
 
@@ -16,7 +16,7 @@ _KEPT = threading.local()
 
 
 def files_of(task: Task) -> dict[str, bytes]:
-    """Return the files of a task's problem by their names, if it is in files: they travel with it."""
+    """Return the contents of the files of a task's problem by name, to be sent with it; empty if it is generated."""
     path = Path(task.problem.path)
     if not task.problem.path:
         return {}
@@ -30,7 +30,7 @@ def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
 
     Args:
         content: The task as JSON.
-        files: The files of its problem, which are not here.
+        files: The contents of its problem's files.
     """
     task = msgspec.json.decode(content, type=Task)
     if not files:
@@ -47,9 +47,9 @@ def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
         return msgspec.json.encode(_bench().run(msgspec.structs.replace(task, problem=here)))
 
 
-def _bench() -> Bench:
-    """Return the bench of this thread: a constraint solver serves one run at a time."""
+def _bench() -> TaskRunner:
+    """Return the task runner of this thread: a constraint solver serves one run at a time."""
     if not hasattr(_KEPT, "bench"):
-        _KEPT.bench = Bench()
-    bench: Bench = _KEPT.bench
+        _KEPT.bench = TaskRunner()
+    bench: TaskRunner = _KEPT.bench
     return bench

@@ -1,4 +1,4 @@
-"""The table `[runs]` of a study: protocols, and how each is run."""
+"""The table `[runs]` of a study: protocols with their options."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from robochoc.communication.simulator.channel import CHANNELS, ChannelModel, read_channel
-from robochoc.experiments.table import MAX_INTEGER, Place
+from robochoc.experiments.study_file import MAX_INTEGER, Place
 from robochoc.experiments.task import GIVEN, Limits, Setup, options_of
 from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.orders import Order
@@ -31,26 +31,26 @@ _CHOICES: Mapping[str, Sequence[str]] = {
     "order": tuple(dict.fromkeys((GIVEN, *map(str, Order)))),
 }
 MOST_SETUPS = 2000
-"""A table stands for no more ways to run."""
-_TOLD = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "verify")
-"""What a label may say, besides the protocol and its settings."""
+"""The most ways to run of a table."""
+_LABELLED = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "verify")
+"""The options that a label may contain, besides the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
 _WITHIN = ("label", "settings", "seed", *_OWN_LIMITS)
-"""Keys that stand for no combinations of their own here."""
+"""Keys that are not combined here."""
 
 
 def setups_of(
     table: Mapping[str, Any], limits: Limits, place: Place
 ) -> Iterator[tuple[Setup, tuple[int, ...], Limits]]:
-    """Yield the setups that a table stands for, each with its seeds and its limits.
+    """Yield the setups of a table, each with its seeds and its limits.
 
     Args:
         table: The table.
-        limits: Those of the whole study.
-        place: Where the table stands.
+        limits: The limits of the whole study.
+        place: The place of the table.
 
     Raises:
-        InvalidInputError: if it stands for none.
+        InvalidInputError: if the table is invalid.
     """
     place.check_keys(table, RUN_KEYS)
     if "protocol" not in table:
@@ -61,7 +61,7 @@ def setups_of(
     own = _own_limits(table, place)
     found = list(_setups(table, own, place))
     for setup in _labelled(found, table.get("label"), place):
-        yield setup, seeds, msgspec.structs.replace(limits, **own).meant_for(setup)
+        yield setup, seeds, msgspec.structs.replace(limits, **own).applicable_to(setup)
 
 
 def _setups(table: Mapping[str, Any], limits: Mapping[str, Any], place: Place) -> Iterator[Setup]:
@@ -72,7 +72,7 @@ def _setups(table: Mapping[str, Any], limits: Mapping[str, Any], place: Place) -
     combined = list(at.combinations(settings))
     plain_ones = list(place.combinations({key: value for key, value in table.items() if key not in _WITHIN}))
     if (count := len(combined) * len(plain_ones)) > MOST_SETUPS:
-        raise place.mistake("", f"stands for {count:,} ways to run; at most {MOST_SETUPS:,} are allowed")
+        raise place.mistake("", f"describes {count:,} ways to run; at most {MOST_SETUPS:,} are allowed")
     for plain in plain_ones:
         for one in combined:
             setup = _setup(plain, {name: _text(value) for name, value in one.items()}, place)
@@ -111,7 +111,7 @@ def _channel(word: object, place: Place) -> ChannelModel:
 
 
 def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
-    """Raise `InvalidInputError` if the options of `setup` do not go together, whatever the problem is."""
+    """Raise `InvalidInputError` if the options of `setup` cannot be combined for any problem."""
     try:
         refuse_options(options_of(setup, limits))
         if setup.protocol not in {CENTRAL, AUTO}:
@@ -123,7 +123,7 @@ def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
 
 
 def _own_limits(table: Mapping[str, Any], place: Place) -> dict[str, Any]:
-    """Return the limits that a table names by itself."""
+    """Return the limits in a table of runs."""
     own = {name: table[name] for name in _OWN_LIMITS if name in table}
     for name, value in own.items():
         kinds = (int, float) if name == "timeout" else (int,)
@@ -133,15 +133,15 @@ def _own_limits(table: Mapping[str, Any], place: Place) -> dict[str, Any]:
 
 
 def _labelled(setups: Sequence[Setup], label: object, place: Place) -> Iterator[Setup]:
-    """Yield the setups of a table, each with a label that says in what it differs from the others."""
+    """Yield the setups of a table, each with a label that contains its differences from the others."""
     if label is not None and (not isinstance(label, str) or len(setups) > 1 or not label.isprintable()):
-        raise place.mistake("label", "expected one line of text, in a table that stands for one way to run")
+        raise place.mistake("label", "expected one line of text, in a table with one way to run")
     for one in setups:
         yield msgspec.structs.replace(one, label=label or " ".join([one.protocol, *_differences(one, setups)]))
 
 
 def distinct(given: Sequence[tuple[Setup, Limits]]) -> list[Setup]:
-    """Return the setups of all tables, with longer labels where some that differ have the same.
+    """Return the setups of all tables, with longer labels for different setups with the same label.
 
     Args:
         given: The setups, each with its limits, in which they may differ as well.
@@ -164,15 +164,15 @@ def distinct(given: Sequence[tuple[Setup, Limits]]) -> list[Setup]:
 
 
 def _differences(one: Setup, others: Sequence[Setup]) -> list[str]:
-    """Return the words that say in what a setup differs from others."""
+    """Return words for the differences of a setup from others."""
     settings = sorted({name for other in others for name in other.settings})
     differing = [name for name in settings if len({other.settings.get(name) for other in others}) > 1]
-    names = [name for name in _TOLD if any(getattr(other, name) != getattr(one, name) for other in others)]
+    names = [name for name in _LABELLED if any(getattr(other, name) != getattr(one, name) for other in others)]
     words = [f"{name}={one.settings[name]}" for name in differing if name in one.settings]
-    return [word for word in [*words, *(_told(name, getattr(one, name)) for name in names)] if word]
+    return [word for word in [*words, *(_label_word(name, getattr(one, name)) for name in names)] if word]
 
 
-def _told(name: str, value: object) -> str:
+def _label_word(name: str, value: object) -> str:
     if isinstance(value, ChannelModel):
         return value.name
     if name in {"delay", "verify"}:

@@ -1,4 +1,4 @@
-"""The content of a report on a study, for the forms that it has: HTML (`report.py`) and Markdown (`markdown.py`)."""
+"""The content of a report on a study, shared by HTML (`report.py`) and Markdown (`markdown.py`)."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from robochoc.experiments import ranking, statistics, summary
 from robochoc.experiments.results import Results
-from robochoc.experiments.study import study_wishes
+from robochoc.experiments.study import report_settings
 from robochoc.experiments.summary import CENSORED, Table
 from robochoc.formats.diagnostics import invalid_input
 
 SIGNIFICANT = 0.05
 MOST_TESTED = 2
-"""Pairs are compared by no more metrics."""
-PAIRS_TOLD = (
-    "On problems that both have solved: how often each is better (in the median of its runs), the median of the"
+"""The most metrics by which pairs are compared."""
+PAIRS_EXPLANATION = (
+    "On problems that both have solved: how often each is better (by the median of its runs), the median of the"
     " ratio first / second and of the difference first - second, and Wilcoxon's signed-rank test, corrected for the"
     " number of pairs (Holm). A ratio of 0 to 0 is 1. There is no median ratio (-) of negative values, and where half"
     " of the ratios or more are to 0."
@@ -23,13 +23,12 @@ _OF_MACHINES = {"wall_s", "total_s", "cpu_s", "memory"}
 """Metrics that differ from machine to machine."""
 
 
-class Account:
-    """The results of a study, and what is to be told of them.
+class ReportContent:
+    """The results of a study, with the texts and tables of a report.
 
     Args:
         results: The results.
-        over: The parameter over which tables and figures are. None: as the study says, or the first that has several
-            values.
+        over: The parameter of tables and figures. None: the study's, or the first one with several values.
 
     Raises:
         InvalidInputError: if there are no results, or no such parameter.
@@ -39,25 +38,27 @@ class Account:
         self.name, self.title, self.text, self.stopped, self.planned, rows = results
         self._all = rows
         if not rows:
-            raise invalid_input(self.name, "has no results yet", "robochoc experiment run goes on with the study")
-        wishes = study_wishes(self.text)
+            raise invalid_input(self.name, "has no results yet", "continue the study by robochoc experiment run")
+        wishes = report_settings(self.text)
         self.introduction, self.width = wishes.text, wishes.width
         try:
-            self.over, self.rows, self._remarks = summary.prepared(rows, over or wishes.over, wishes.names)
+            self.over, self.rows, self._remarks = summary.prepare(rows, over or wishes.over, wishes.names)
             self.metrics = summary.metrics_to_show(self.rows, wishes.metrics, self.over)
             self.parts = summary.parts(self.rows, wishes.each)
         except summary.NoSuchColumnError as wrong:
-            raise invalid_input(self.name, str(wrong), "--over names one, or the table [report] of the study") from None
+            raise invalid_input(
+                self.name, str(wrong), "choose one by --over, or in the table [report] of the study"
+            ) from None
 
     @property
     def paragraphs(self) -> list[str]:
-        """Return the study's own text."""
+        """The paragraphs of the study's introduction."""
         return [part for part in self.introduction.strip().split("\n\n") if part]
 
     def measured(self) -> Iterator[str]:
-        """Yield what was measured, and where, a sentence or two at a time."""
+        """Yield sentences on the runs, the machines, and the checks of answers."""
         count, rows = self.planned, self._all
-        there = f"{len(rows):,} of {count:,} runs are there" if len(rows) < count else f"{count:,} runs"
+        there = f"{len(rows):,} of {count:,} runs are finished" if len(rows) < count else f"{count:,} runs"
         problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(self.rows))
         yield f"{there}: {problems:,} problems, {ways} ways to run."
         runtimes = {row["runtime"] for row in rows}
@@ -70,12 +71,12 @@ class Account:
             where = "in the simulator or in arrays" if "arrays" in runtimes else "in the simulator"
             yield f"All runs were {where}: counts are exact, and the same wherever they are repeated."
         checked = sum(row["verified"] for row in rows)
-        told = f"The answers of {checked:,} runs were checked against every constraint in force"
+        text = f"The answers of {checked:,} runs were checked against every constraint in force"
         if self.stopped:
             why = self.stopped.partition("\n")[0]  # the commands that repeat them follow
-            yield f"{told}. The study was stopped: {why}"
+            yield f"{text}. The study was stopped: {why}"
         else:
-            yield f"{told}, and no two answers to a problem contradict each other."
+            yield f"{text}, and no two answers to a problem contradict each other."
         yield from self._remarks
 
     def answers(self) -> list[str]:
@@ -83,10 +84,10 @@ class Account:
         return ranking.answers(self.rows, self.metrics)
 
     def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:
-        """Yield for each metric that is compared its name, and a table of pairs; none where no test was possible.
+        """Yield the name and a table of pairs for each compared metric, unless no test was possible.
 
         Args:
-            first_only: Whether only pairs with the first way to run are told of. The tests are of all pairs.
+            first_only: Whether only pairs with the first way to run are shown. All pairs are tested.
         """
         for metric in [one for one in self.metrics if one in (*CENSORED, "cost")][:MOST_TESTED]:
             for part, rows in self.parts:
@@ -105,7 +106,7 @@ class Account:
 
 
 def headed(what: str, part: str) -> str:
-    """Return a heading, with the part of the problems that it is about."""
+    """Return a heading, with the name of the part of the problems."""
     return f"{what}: {part}" if part else what
 
 

@@ -1,23 +1,29 @@
-"""A table of a study's file: where its keys stand, and what their lists and ranges come to."""
+"""The tables of a study's file: the lines of keys, and the values of lists and ranges."""
 
 from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from robochoc.experiments.ranges import range_of
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input, shortened, suggestion
 from robochoc.formats.toml import line_of
 
 HINT = "docs/guides/experiments.md describes the file of a study"
 MAX_INTEGER = 2**53
-"""JSON and SQLite hold all integers up to it, and floats have them exactly."""
+"""The largest integer that JSON, SQLite and floats represent exactly."""
 MOST_COMBINATIONS = 100_000
-"""A table stands for no more."""
+"""The most combinations of a table."""
+MAX_VALUES = 100_000
+"""The most values of a range."""
+_NUMBER = r"-?\d+(?:\.\d+)?"
+_RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?::({_NUMBER}))?", re.ASCII)
+_MAX_LENGTH = 100
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,7 @@ class Place:
         path: The file.
         text: Its content.
         table: The table's name. Empty: keys before all tables.
-        number: Which of several tables of that name, from 0.
+        number: The number of the table among those of the same name, from 0.
     """
 
     path: Path
@@ -41,14 +47,14 @@ class Place:
         return replace(self, table=table, number=number)
 
     def line(self, key: str) -> int:
-        """Return the line of a key, or of its table if the key is empty or stands elsewhere; 0 if there is none."""
+        """Return the line of a key, or of its table if the key is empty or not there; 0 if there is none."""
         return line_of(self.text, self.table, key, self.number)
 
     def mistake(self, key: str, message: str, hint: str = HINT) -> InvalidInputError:
-        """Return the error that something is wrong with a key; empty: with the table."""
+        """Return the error for an invalid key (empty: for the table)."""
         named = ".".join(filter(None, (self.table, key)))
-        told = f"{shortened(named)}: {message}" if named else message
-        return invalid_input(self.path, told, hint, self.line(key))
+        text = f"{shortened(named)}: {message}" if named else message
+        return invalid_input(self.path, text, hint, self.line(key))
 
     def check_keys(self, table: Mapping[str, Any], known: Collection[str]) -> None:
         """Raise `InvalidInputError` for a key that is not known."""
@@ -57,10 +63,10 @@ class Place:
                 raise self.mistake(key, "there is no such key", suggestion(key, known, "keys"))
 
     def values(self, key: str, given: object) -> list[Any]:
-        """Return the values that a list, a range or a plain value stands for.
+        """Return the values of a list, a range or a plain value.
 
         Raises:
-            InvalidInputError: if there are none, or they are no plain values.
+            InvalidInputError: if there are none, or they are not plain values.
         """
         found: list[Any] = []
         for one in given if isinstance(given, list) else [given]:
@@ -69,8 +75,8 @@ class Place:
             except ValueError as wrong:
                 raise self.mistake(key, str(wrong)) from None
             if not all(map(_is_plain, [one] if numbers is None else numbers)):
-                told = f"expected numbers, words, or a list of them (integers up to 2^53), got {shortened(str(one))}"
-                raise self.mistake(key, told)
+                text = f"expected numbers, words, or a list of them (integers up to 2^53), got {shortened(str(one))}"
+                raise self.mistake(key, text)
             found += [one] if numbers is None else numbers
         if not found:
             raise self.mistake(key, "expected at least one value")
@@ -80,19 +86,41 @@ class Place:
         """Yield all combinations of the values in `table`; the last key varies fastest.
 
         Raises:
-            InvalidInputError: if there are too many, or values are none.
+            InvalidInputError: if there are too many, or values are invalid.
         """
         keys = list(table)
         several = [self.values(key, table[key]) for key in keys]
         if (count := math.prod(map(len, several))) > MOST_COMBINATIONS:
-            told = f"stands for {count:,} combinations; at most {MOST_COMBINATIONS:,} are allowed"
-            raise self.mistake("", told, "cut its lists and ranges")
+            text = f"describes {count:,} combinations; at most {MOST_COMBINATIONS:,} are allowed"
+            raise self.mistake("", text, "shorten its lists and ranges")
         for values in itertools.product(*several):
             yield dict(zip(keys, values, strict=True))
 
 
 def _is_plain(value: object) -> bool:
-    """Return whether a value is a word or a number of which JSON and SQLite can hold all digits."""
+    """Return whether a value is a word, or a number that JSON and SQLite store exactly."""
     if isinstance(value, float):
         return math.isfinite(value)
     return isinstance(value, str) or (isinstance(value, int) and abs(value) <= MAX_INTEGER)
+
+
+def range_of(text: str) -> list[int] | list[float] | None:
+    """Return the numbers of a range, both ends included; None if `text` is not a range.
+
+    Args:
+        text: `FIRST..LAST`, or `FIRST..LAST:STEP` (the default is 1). Integers if all written numbers are integers.
+
+    Raises:
+        ValueError: if it has no value, or too many.
+    """
+    found = _RANGE.fullmatch(text) if len(text) <= _MAX_LENGTH else None
+    if found is None:
+        return None
+    first, last, step = (Decimal(one or 1) for one in found.groups())
+    if step <= 0 or last < first:
+        raise ValueError(f"the range {text!r} has no value; expected FIRST..LAST or FIRST..LAST:STEP")
+    count = int((last - first) / step) + 1
+    if count > MAX_VALUES:
+        raise ValueError(f"the range {text!r} has {count:,} values; at most {MAX_VALUES:,} are allowed")
+    numbers = [first + place * step for place in range(count)]
+    return [float(one) for one in numbers] if "." in text.replace("..", "") else [int(one) for one in numbers]
