@@ -267,7 +267,7 @@ def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Kind]]) -> 
     names = {field for field, _ in parts}
     if not value.keys() <= names:
         unknown = next(iter(value.keys() - names))
-        raise _FieldError(f"is no field of {kind}, which has {', '.join(sorted(names))}", str(unknown))
+        raise _FieldError(f"is not a field of {kind}, which has {', '.join(sorted(names))}", str(unknown))
     values = []
     for field, part in parts:
         try:

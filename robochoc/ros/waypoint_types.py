@@ -113,7 +113,7 @@ def definition_of(kind: str) -> str:
 
 
 def _fault(found: object) -> str:
-    return "" if isinstance(found, WaypointMapping) or callable(found) else "is no function and no WaypointMapping"
+    return "" if isinstance(found, WaypointMapping) or callable(found) else "is not a function or WaypointMapping"
 
 
 def point(at: Point) -> Fields:

@@ -122,7 +122,7 @@ def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
     try:
         return read_yaml(content.decode(), lambda root: _fleet(root, kind), _EXPECTED)
     except UnicodeDecodeError:
-        raise FleetError(on_one_line(f"{path}: is no text in UTF-8")) from None
+        raise FleetError(on_one_line(f"{path}: is not UTF-8 text")) from None
     except MistakeError as mistake:
         where = f"{path}:{mistake.line}" if mistake.line else f"{path}"
         raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
@@ -208,7 +208,7 @@ def _url(node: Node, name: str, kind: Kind) -> str:
 def _fence(node: Node) -> Fence:
     corners = [_point(one, "a corner of the fence") for one in node.items or ()]
     if len(corners) != _CORNERS:
-        raise MistakeError("'fence' is no box", "expected two corners, as in [[0, 0, 0], [6, 6, 6]]", node.line)
+        raise MistakeError("'fence' is not a box", "expected two corners, as in [[0, 0, 0], [6, 6, 6]]", node.line)
     low_x, low_y, low_z = (min(pair) for pair in zip(*corners, strict=True))
     high_x, high_y, high_z = (max(pair) for pair in zip(*corners, strict=True))
     return Fence((low_x, low_y, low_z), (high_x, high_y, high_z))
@@ -219,7 +219,7 @@ def _origin(node: Node) -> GpsPlace:
     latitude, longitude, altitude = values if len(values) == _AXES else (None, None, None)
     if latitude is None or longitude is None or altitude is None:
         raise MistakeError(
-            "'origin' is no place", "expected [latitude, longitude, metres above sea level], in degrees", node.line
+            "'origin' is not a place", "expected [latitude, longitude, metres above sea level], in degrees", node.line
         )
     if abs(latitude) > LATITUDE_MAX or abs(longitude) > 180 or not -500 <= altitude <= 9_000:  # noqa: PLR2004
         limits = f"latitudes within {LATITUDE_MAX:g}, longitudes within 180 degrees, -500 to 9,000 m"

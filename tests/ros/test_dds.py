@@ -76,24 +76,24 @@ def test_places(monkeypatch: pytest.MonkeyPatch, place: str, found: DdsPlace) ->
 @looped(
     ("place", "told"),
     [
-        ("nonsense", r"'nonsense' is no domain of DDS; expected a number from 0 to 232, as in dds:0"),
-        ("233", "'233' is no domain"),
-        ("-1", "'-1' is no domain"),
-        ("٣", "is no domain"),
-        ("5/6", "'5/6' is no domain"),
-        ("1" * 5000, r"is no domain|'1{50,}\.\.\."),
-        ("5?a=b", "'a' is no option of this place; known are partition, reliability, durability, depth, wait"),
+        ("nonsense", r"'nonsense' is not a DDS domain; expected a number from 0 to 232, as in dds:0"),
+        ("233", "'233' is not a DDS domain"),
+        ("-1", "'-1' is not a DDS domain"),
+        ("٣", "is not a DDS domain"),
+        ("5/6", "'5/6' is not a DDS domain"),
+        ("1" * 5000, r"is not a DDS domain|'1{50,}\.\.\."),
+        ("5?a=b", "'a' is not an option of this place; known are partition, reliability, durability, depth, wait"),
         ("5?depth", "the options 'depth' cannot be read; expected OPTION=VALUE&OPTION=VALUE"),
         ("5?partition=a&", "cannot be read"),
         ("5?partition=%ff", "cannot be read"),
-        ("?depth=0", "depth=0 is no depth; expected a number from 1 to 1,000"),
-        ("?depth=9999", "depth=9999 is no depth"),
+        ("?depth=0", "depth=0 is not a depth; expected a number from 1 to 1,000"),
+        ("?depth=9999", "depth=9999 is not a depth"),
         ("?reliability=no", "reliability=no is unknown; expected reliable or best_effort"),
         ("?durability=persistent", "durability=persistent is unknown; expected transient_local or volatile"),
-        ("?wait=nan", "wait=nan is no time; expected seconds from 0 to 600"),
-        ("?wait=1e9", "wait=1e9 is no time"),
-        ("?partition=", "partition= is no name; expected 1 to 255 characters of ASCII"),
-        ("?partition=%1b[31m", r"partition=\\x1b\[31m is no name"),
+        ("?wait=nan", "wait=nan is not a time; expected seconds from 0 to 600"),
+        ("?wait=1e9", "wait=1e9 is not a time"),
+        ("?partition=", "partition= is not a name; expected 1 to 255 characters of ASCII"),
+        ("?partition=%1b[31m", r"partition=\\x1b\[31m is not a name"),
         ("?" + "&".join(["partition=a"] * 17), "a place has at most 16 partitions"),
     ],
 )
@@ -103,7 +103,7 @@ def test_places_that_are_none(place: str, told: str) -> None:
 
 
 def test_a_source_waits_for_nobody() -> None:
-    with pytest.raises(SourceError, match="'wait' is no option of this place"):
+    with pytest.raises(SourceError, match="'wait' is not an option of this place"):
         DdsSource("5?wait=1")
 
 
@@ -128,7 +128,7 @@ def test_the_program_refuses_a_bad_place_in_one_line() -> None:
     done = robochoc_within("solve", HANGAR, "--ros", "dds:nonsense")
     assert done.returncode != 0
     assert done.stderr.count("\n") == 1
-    assert "'nonsense' is no domain of DDS" in done.stderr
+    assert "'nonsense' is not a DDS domain" in done.stderr
 
 
 # Waypoints

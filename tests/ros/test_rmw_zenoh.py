@@ -191,7 +191,7 @@ def test_a_type_or_a_field_that_is_none(router: Router) -> None:
     with RmwZenohSink(router.place) as sink:
         with pytest.raises(SinkError, match="/a: ROS 2 has no type 'moon_msgs/Rover'"):
             sink.advertise({"/a": "moon_msgs/Rover"})
-        with pytest.raises(SinkError, match="/b: geometry_msgs/PoseStamped: colour is no field"):
+        with pytest.raises(SinkError, match="/b: geometry_msgs/PoseStamped: colour is not a field"):
             sink.publish("/b", POSE, {"colour": 1}, STAMP)
     with RmwZenohSource(router.place) as source, pytest.raises(SourceError, match="/a: ROS 2 has no type 'moon_msgs"):
         source.listen({"/a": "moon_msgs/Rover"})

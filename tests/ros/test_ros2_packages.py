@@ -107,7 +107,7 @@ def test_a_launch_file_starts_what_robochoc_knows(path: Path, tmp_path: Path) ->
     else:
         words[words.index("--ros") + 1] = "dds:nowhere"
         done = CliRunner().invoke(cli, words[1:], catch_exceptions=False)
-        assert "'nowhere' is no domain of DDS" in done.stderr, "all else was accepted"
+        assert "'nowhere' is not a DDS domain" in done.stderr, "all else was accepted"
 
 
 def test_the_service_is_the_one_that_is_offered() -> None:

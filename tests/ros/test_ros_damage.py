@@ -245,8 +245,8 @@ def test_a_file_larger_than_it_says_is_refused(monkeypatch: pytest.MonkeyPatch) 
     ("content", "told"),
     [
         (None, "No such file"),
-        (b"", "is no MCAP file"),
-        (b"#ROSBAG V2.0\n", "is no MCAP file"),
+        (b"", "is not an MCAP file"),
+        (b"#ROSBAG V2.0\n", "is not an MCAP file"),
     ],
 )
 def test_files_that_are_no_recordings(content: bytes | None, told: str) -> None:

@@ -111,7 +111,7 @@ def test_damage_is_found_before_anything_is_acted_upon() -> None:
     with pytest.raises(SourceError, match="it is damaged"):
         read(READ)
     FILE.write_bytes(b"no bag")
-    with pytest.raises(SourceError, match="is no bag of ROS 2 in SQLite"):
+    with pytest.raises(SourceError, match="is not a ROS 2 bag in SQLite"):
         read(READ)
 
 

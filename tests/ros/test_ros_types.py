@@ -86,7 +86,7 @@ def test_the_reference_reads_what_is_written(fields: dict[str, Any]) -> None:
     [
         (POSE, {"pose": {"position": {"x": "1"}}}, "pose.position.x must be a number, is '1'"),
         (POSE, {"pose": {"position": {"x": True}}}, "pose.position.x must be a number, is True"),
-        (POSE, {"pose": {"place": {}}}, "pose.place is no field of geometry_msgs/Pose, which has orientation, pos"),
+        (POSE, {"pose": {"place": {}}}, "pose.place is not a field of geometry_msgs/Pose, which has orientation, pos"),
         (POSE, {"pose": None}, "pose must be fields by their names, is None"),
         (POSE, {"header": {"stamp": 1.0}}, "header.stamp must be a whole number"),
         (POSE, {"header": {"stamp": 1 << 70}}, "header.stamp must be a time in nanoseconds"),

@@ -47,7 +47,7 @@ class RosMaster:
                 return {topic: set(nodes) for topic, nodes in subscribed}
             case answer:
                 raise self._failed(
-                    f"what answers at {self.uri} is no ROS master: {shortened(on_one_line(str(answer)))}"
+                    f"what answers at {self.uri} is not a ROS master: {shortened(on_one_line(str(answer)))}"
                 )
 
     def _ask(self, what: str) -> object:

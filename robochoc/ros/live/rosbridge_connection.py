@@ -55,7 +55,7 @@ class RosbridgeAddress(NamedTuple):
         except ValueError as error:
             raise ValueError(f"{shortened(place)!r}: {error}; {wanted}") from error
         if not parts.hostname or parts.scheme not in {"", "ws", "wss"} or parts.query or parts.username or port == 0:
-            raise ValueError(f"{shortened(place)!r} is no place of a rosbridge; {wanted}")
+            raise ValueError(f"{shortened(place)!r} is not the place of a rosbridge; {wanted}")
         return cls(parts.hostname, port, parts.scheme == "wss", parts.path)
 
     @property
@@ -207,7 +207,7 @@ def _reach(address: RosbridgeAddress, failed: type[Exception]) -> None:
         why = error.strerror or str(error) or type(error).__name__
         raise failed(f"no rosbridge listens at {address.url} ({why}); {_START}") from error
     except UnicodeError as error:
-        raise failed(f"{shortened(address.host)!r} is no name of a host") from error
+        raise failed(f"{shortened(address.host)!r} is not a host name") from error
 
 
 def _roslibpy(failed: type[Exception]) -> Any:  # noqa: ANN401 - it is untyped

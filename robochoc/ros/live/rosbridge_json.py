@@ -88,4 +88,4 @@ def _stamp(value: object) -> int:
         ):
             return seconds * _BILLION + rest
         case _:
-            raise MalformedMessageError("'stamp' is no time")
+            raise MalformedMessageError("'stamp' is not a time")

@@ -128,7 +128,7 @@ class McapSource(ChunkedRecording):
         self._faults: dict[tuple[str, str, bytes], str] = {}
         source = self._input
         if source.size < len(MCAP0_MAGIC) or source.take(len(MCAP0_MAGIC), "its beginning") != MCAP0_MAGIC:
-            raise RecordingDamagedError("is no MCAP file")
+            raise RecordingDamagedError("is not an MCAP file")
         opcode = 0
         while opcode != Opcode.DATA_END:
             begin, before = source.at, source.sum

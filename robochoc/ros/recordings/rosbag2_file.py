@@ -55,7 +55,7 @@ class Rosbag2Source(Recording):
     def _opened(self) -> Iterator[Entry]:
         self._input.rewind()
         if self._input.take(min(self._input.size, len(_MAGIC)), "its beginning") != _MAGIC:
-            raise RecordingDamagedError("is no bag of ROS 2 in SQLite")
+            raise RecordingDamagedError("is not a ROS 2 bag in SQLite")
         journal = Path(f"{self.place}-wal")
         if journal.exists() and journal.stat().st_size:
             raise RecordingDamagedError(
@@ -118,7 +118,7 @@ def _check(rows: sqlite3.Connection) -> None:
         # A column whose value is computed is hidden, and has another number than 0 there.
         plain = {row[1] for row in rows.execute(f"PRAGMA table_xinfo({table})") if row[6] == 0}
         if table not in tables or not {*columns} <= plain:
-            raise RecordingDamagedError(f"is no bag of ROS 2: it has no table {table!r} with {', '.join(columns)}")
+            raise RecordingDamagedError(f"is not a ROS 2 bag: it has no table {table!r} with {', '.join(columns)}")
     (told,) = rows.execute("PRAGMA integrity_check(1)").fetchone()
     if told != "ok":
         raise RecordingDamagedError(f"it is damaged: {told}")

@@ -132,7 +132,7 @@ class RosbagSource(ChunkedRecording):
         magic = source.take(min(source.size, len(_MAGIC)), "its beginning")
         if magic != _MAGIC:
             known = magic.startswith(b"#ROSBAG V")
-            raise RecordingDamagedError("is a bag of another version than 2.0" if known else "is no bag of ROS 1")
+            raise RecordingDamagedError("is a bag of another version than 2.0" if known else "is not a ROS 1 bag")
         expected = self._first()
         found = {_CHUNK: 0, _CHUNK_INFO: 0, _CONNECTION: 0}
         while source.at < source.size:

@@ -95,14 +95,14 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
             f"vehicles: {{A: {{link: '{LINK}', at: [0, 0, 0]}}}}\n{FENCE}\norigin: [1, 2, 3]",
             "'at' is for vehicles with",
         ),
-        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0]]", "'fence' is no box; expected two corners"),
+        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0]]", "'fence' is not a box; expected two corners"),
         (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, 9e99]]", "a corner of the fence is no place"),
         (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, true]]", "a corner of the fence is no place"),
         (
             f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [9, 9, 2]]",
             "a take-off to 2.5 m leaves a fence that is 2 m high",
         ),
-        (f"{GOOD}origin: [47, 8]", "'origin' is no place"),
+        (f"{GOOD}origin: [47, 8]", "'origin' is not a place"),
         (f"{GOOD}origin: [80, 8, 0]", "'origin' is too far off; expected latitudes within 75"),
         (f"{GOOD}takeoff: 0", "'takeoff' is '0'; expected 0.5 to 100"),
         (f"{GOOD}takeoff: high", "'takeoff' is 'high'"),
@@ -213,7 +213,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(FleetError, match="No such file or directory; name a fleet file"):
         read_fleet(tmp_path / "nowhere.yaml")
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\0")
-    with pytest.raises(FleetError, match="is no text in UTF-8"):
+    with pytest.raises(FleetError, match="is not UTF-8 text"):
         read_fleet(tmp_path / "bytes")
 
 
