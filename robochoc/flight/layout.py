@@ -13,7 +13,7 @@ from fractions import Fraction
 from itertools import count, product
 
 from robochoc.flight.crafts import Cell, Craft, row_and_column
-from robochoc.formats.ground_map import GroundMap
+from robochoc.maps.ground_map import GroundMap
 
 Point = tuple[float, float, float]
 

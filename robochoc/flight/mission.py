@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
 from robochoc.flight.walls import Walls, walls_of
-from robochoc.formats.ground_map import ALL_SIDES, GroundMap
+from robochoc.maps.ground_map import ALL_SIDES, GroundMap
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.voxel_frame import VoxelFrame
-from robochoc.formats.ground_map import GroundMap, WallPixels
-from robochoc.formats.occupancy.packed import unpacked
+from robochoc.maps.ground_map import GroundMap, WallPixels
+from robochoc.maps.occupancy.packed import unpacked
 
 Flags = npt.NDArray[np.bool_]
 

@@ -25,7 +25,7 @@ from robochoc.flight.mission import (
     mission_of,
 )
 from robochoc.flight.reports import Report
-from robochoc.formats.ground_map import GroundMap
+from robochoc.maps.ground_map import GroundMap
 from robochoc.model.change import apply_possible_changes
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team

@@ -14,8 +14,8 @@ from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Axis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission
-from robochoc.formats.ground_map import ALL_SIDES
 from robochoc.formats.headline import describe_outcome
+from robochoc.maps.ground_map import ALL_SIDES
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
 from robochoc.view.footprints import DrawnWalls, walls_drawn

@@ -12,8 +12,6 @@ import pytest
 from robochoc.cli.options.generate import next_step
 from robochoc.cli.reports.failures import INVALID
 from robochoc.formats import read_team
-from robochoc.formats.occupancy.grid import read_occupancy_grid
-from robochoc.formats.octomap.voxels import read_voxels
 from robochoc.generators.coloring import coloring_of
 from robochoc.generators.graphs import grid, scale_free, small_world, tree
 from robochoc.generators.ising import ising
@@ -29,6 +27,8 @@ from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
 from robochoc.generators.tasks import Skills, Ways, tasks
 from robochoc.generators.tracking import tracking
+from robochoc.maps.occupancy.grid import read_occupancy_grid
+from robochoc.maps.octomap.voxels import read_voxels
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team

@@ -15,11 +15,11 @@ from robochoc.flight.flight import fly
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.quadrotor.conditions import FlightConditions
-from robochoc.formats.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice
+from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 

@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.wall_watch import WallWatch
-from robochoc.formats.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
+from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from tests.support.flights_on_maps import rooms

@@ -10,7 +10,7 @@ import msgspec
 from robochoc.app.runs.run import CHANGE, Run
 from robochoc.app.sketch.shape import is_sound
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.formats.ground_map import BlockedCell, GroundMap
+from robochoc.maps.ground_map import BlockedCell, GroundMap
 
 MAP = "map.json"
 

@@ -22,9 +22,9 @@ from robochoc.cli.reports.notes import bound_warning, difference_lines
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
-    from robochoc.formats.ground_map import GroundMap
     from robochoc.formats.problems import ReadProblem
     from robochoc.journal.journal import JournalRecorder
+    from robochoc.maps.ground_map import GroundMap
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.robots.closed_loop import ClosedLoop
@@ -167,8 +167,8 @@ def _print_outcome(
     if warning := bound_warning(problem, outcome.cost):
         click.echo(f"{problem.team.name}: {warning}", err=True)
     if request.as_json:
-        from robochoc.formats.places import MapPlaces
         from robochoc.formats.result import result_json
+        from robochoc.maps.places import MapPlaces
         from robochoc.model.change import team_after_events
 
         places = MapPlaces(team_after_events(problem.team, outcome.events), ground).of(outcome.assignment)

@@ -15,8 +15,8 @@ from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
 
 if TYPE_CHECKING:
-    from robochoc.formats.ground_map import GroundMap
     from robochoc.generators.graphs import Graph
+    from robochoc.maps.ground_map import GroundMap
     from robochoc.model.problem import Team
 
 MAX = 1000
@@ -97,7 +97,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     folder = output or Path("instances") / team.name
     other_files = {}
     if ground:
-        from robochoc.formats.ground_map import ground_map_json
+        from robochoc.maps.ground_map import ground_map_json
 
         other_files[GROUND_FILE] = ground_map_json(ground)
     with elapsed_time("generate", f"writing {len(team.robots):,} robots"):

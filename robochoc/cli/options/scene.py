@@ -12,7 +12,7 @@ from robochoc.cli.options.paths import InputPath, OutputFile
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
-    from robochoc.formats.ground_map import GroundMap
+    from robochoc.maps.ground_map import GroundMap
 
 Command = TypeVar("Command", bound=Callable[..., object])
 
@@ -43,7 +43,7 @@ def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
     """Return the map in `file`, or else in the `folder` of the team; None if there is none. Raises `Failure`."""
     from robochoc.formats import on_one_line
     from robochoc.formats.folder import GROUND_FILE
-    from robochoc.formats.ground_map import MAX_BYTES, read_ground_map
+    from robochoc.maps.ground_map import MAX_BYTES, read_ground_map
 
     if file is None and folder and (folder / GROUND_FILE).is_file():
         file = folder / GROUND_FILE

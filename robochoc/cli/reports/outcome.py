@@ -9,9 +9,9 @@ from decimal import Decimal
 from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
-from robochoc.formats.ground_map import GroundMap
 from robochoc.formats.headline import describe_outcome
-from robochoc.formats.places import MapPlaces, Place
+from robochoc.maps.ground_map import GroundMap
+from robochoc.maps.places import MapPlaces, Place
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict

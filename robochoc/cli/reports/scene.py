@@ -12,7 +12,7 @@ from robochoc.formats import write_atomically
 if TYPE_CHECKING:
     from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
-    from robochoc.formats.ground_map import GroundMap
+    from robochoc.maps.ground_map import GroundMap
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.view.scene import Scene

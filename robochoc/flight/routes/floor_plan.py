@@ -19,7 +19,7 @@ from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.routes.lattice import Lattice
 from robochoc.flight.routes.spacing import Array, Flags
 from robochoc.flight.routes.taut import taut
-from robochoc.formats.occupancy.lattice import clearances, parts_of
+from robochoc.maps.occupancy.lattice import clearances, parts_of
 
 SPARE_M = 0.1
 """Ways keep so much more than they have to, if that is no detour of more than a quarter."""

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.routes.spacing import Array, Flags, norms
-from robochoc.formats.occupancy.lattice import quarters
+from robochoc.maps.occupancy.lattice import quarters
 
 _LENGTHS = (15, 21, 26)
 """The lengths of steps along one axis, two and three."""

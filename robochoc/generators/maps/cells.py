@@ -14,11 +14,11 @@ from math import floor
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Flags, OccupancyGrid, before
-from robochoc.formats.occupancy.turn import Place as Place  # noqa: PLC0414 - from here, too
 from robochoc.generators.maps.cell_grid import CellGrid, sums
 from robochoc.generators.maps.room import Room
 from robochoc.generators.maps.turned import TurnedSquares
+from robochoc.maps.occupancy.grid import Flags, OccupancyGrid, before
+from robochoc.maps.occupancy.turn import Place as Place  # noqa: PLC0414 - from here, too
 
 _CHECKED_MAX = 10_000
 """The maximum number of cells that are checked individually. More cells are too many for a problem."""

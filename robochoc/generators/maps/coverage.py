@@ -18,7 +18,6 @@ from fractions import Fraction
 from itertools import combinations
 from math import floor
 
-from robochoc.formats.ground_map import GroundMap
 from robochoc.generators.draws import bounded, seeded
 from robochoc.generators.maps.reach import (
     PLACES,
@@ -31,6 +30,7 @@ from robochoc.generators.maps.reach import (
     reach_of,
 )
 from robochoc.generators.maps.sight import sight_on
+from robochoc.maps.ground_map import GroundMap
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import CostUnits

@@ -13,9 +13,9 @@ from math import floor
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Flags
-from robochoc.formats.octomap.voxels import VoxelGrid
 from robochoc.generators.maps.cell_grid import CellGrid, sums
+from robochoc.maps.occupancy.grid import Flags
+from robochoc.maps.octomap.voxels import VoxelGrid
 
 Place = tuple[Fraction, ...]
 """The x, y and z of a place, in metres."""

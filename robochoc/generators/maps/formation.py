@@ -20,7 +20,6 @@ from math import ceil, cos, pi, radians, sin, sqrt
 from pathlib import Path
 
 from robochoc.formats.diagnostics import invalid_input, shortened
-from robochoc.formats.ground_map import GroundMap
 from robochoc.generators.draws import bounded, check_bounds, seeded
 from robochoc.generators.maps.reach import (
     MAX_ROBOTS,
@@ -36,6 +35,7 @@ from robochoc.generators.maps.reach import (
     reach_of,
 )
 from robochoc.generators.maps.sizes import Place
+from robochoc.maps.ground_map import GroundMap
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team

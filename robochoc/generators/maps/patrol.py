@@ -23,7 +23,6 @@ from math import floor, isqrt
 from random import Random
 
 from robochoc.formats import PREDEFINED
-from robochoc.formats.ground_map import GroundMap
 from robochoc.generators.draws import bounded, check_bounds, seeded, uniform
 from robochoc.generators.maps.reach import (
     PLACES,
@@ -38,6 +37,7 @@ from robochoc.generators.maps.reach import (
     squared,
 )
 from robochoc.generators.maps.sizes import Place
+from robochoc.maps.ground_map import GroundMap
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits

@@ -14,14 +14,14 @@ from random import Random
 import msgspec
 
 from robochoc.formats import PREDEFINED
-from robochoc.formats.ground_map import MAX_BLOCKED, GroundMap, Volume, WallPixels, WallVoxels
-from robochoc.formats.maps import read_map
-from robochoc.formats.occupancy.packed import packed
 from robochoc.generators.draws import check_bounds, some
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.sizes import AnyCells, Place, cells_of
 from robochoc.generators.maps.travel import STRAIGHT, UNREACHED, lengths_from
+from robochoc.maps.ground_map import MAX_BLOCKED, GroundMap, Volume, WallPixels, WallVoxels
+from robochoc.maps.map_file import read_map
+from robochoc.maps.occupancy.packed import packed
 from robochoc.model.assembly import Extras
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.expression import Apply, Constant, Expression, Name

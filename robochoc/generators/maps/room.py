@@ -1,7 +1,7 @@
 """Room for robots on a map of the ground: where one of a radius fits, and from which pixel it gets to which.
 
 Distances are measured to the borders of pixels, so that no way leads through a door that is narrower than a robot. What
-fits is found on the lattice on which flights look for their ways (`formats/occupancy/lattice.py`): where two pixels are
+fits is found on the lattice on which flights look for their ways (`maps/occupancy/lattice.py`): where two pixels are
 joined, a flight gets from one to the other.
 """
 
@@ -14,8 +14,8 @@ from math import floor
 
 import numpy as np
 
-from robochoc.formats.occupancy.grid import Counts, Flags
-from robochoc.formats.occupancy.lattice import clearances, open_points, parts_of
+from robochoc.maps.occupancy.grid import Counts, Flags
+from robochoc.maps.occupancy.lattice import clearances, open_points, parts_of
 
 _ROUNDING = 1e-9
 

@@ -9,11 +9,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robochoc.formats.maps import Map
-from robochoc.formats.occupancy.grid import Flags, OccupancyGrid
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.room import room_on
+from robochoc.maps.map_file import Map
+from robochoc.maps.occupancy.grid import Flags, OccupancyGrid
 
 MAX_RADIUS = 100
 """The maximum radius of a robot, in pixels."""

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Flags
+from robochoc.maps.occupancy.grid import Flags
 
 STRAIGHT, DIAGONAL, SPACE_DIAGONAL = 15, 21, 26
 """The lengths of steps along one axis, two and three."""

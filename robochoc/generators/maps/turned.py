@@ -13,7 +13,7 @@ from math import ceil, floor
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Counts, Flags, OccupancyGrid
+from robochoc.maps.occupancy.grid import Counts, Flags, OccupancyGrid
 
 _HAIR = 1e-6
 """Pixels. What a square touches by less is due to rounding."""

@@ -18,9 +18,9 @@ from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.preview import preview_of
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.routes.floor_plan import FloorPlan
-from robochoc.formats.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
+from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
 from tests.support.examples import examples

@@ -11,7 +11,7 @@ import pytest
 from robochoc.flight.flight import fly
 from robochoc.flight.mission import Block, mission_of
 from robochoc.flight.preview import preview_of
-from robochoc.formats.ground_map import GroundMap, Volume, ground_map_json, read_ground_map
+from robochoc.maps.ground_map import GroundMap, Volume, ground_map_json, read_ground_map
 from robochoc.model.expression import Constant, Name
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable

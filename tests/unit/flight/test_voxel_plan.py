@@ -15,7 +15,7 @@ from robochoc.flight.routes.spacing import Array
 from robochoc.flight.routes.timetable import plan_routes
 from robochoc.flight.routes.voxel_plan import Resting, VoxelPlan
 from robochoc.flight.voxel_frame import VoxelFrame
-from robochoc.formats.octomap.voxels import read_voxels
+from robochoc.maps.octomap.voxels import read_voxels
 from tests.support.examples import count
 from tests.support.flights_in_space import gaps_in_space, house
 from tests.support.octomaps import FREE, Voxel, drawn_voxels, write_octomap

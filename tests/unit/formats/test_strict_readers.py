@@ -28,10 +28,10 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.names_file import original_names
 from robochoc.formats.dialects.registry import read_foreign
-from robochoc.formats.ground_map import read_ground_map
-from robochoc.formats.occupancy.grid import read_occupancy_grid
-from robochoc.formats.octomap.octree import read_octree
 from robochoc.formats.order_file import read_order
+from robochoc.maps.ground_map import read_ground_map
+from robochoc.maps.occupancy.grid import read_occupancy_grid
+from robochoc.maps.octomap.octree import read_octree
 from robochoc.vehicles.fleet import FleetError, read_fleet
 from tests.support.cases import looped
 from tests.support.foreign_files import CFN, FRODO, WCSP, XDISCSPS

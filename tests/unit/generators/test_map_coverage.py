@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team, read_team, write_team
-from robochoc.formats.occupancy.grid import read_occupancy_grid
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage, worth_of_a_cell
 from robochoc.generators.maps.reach import MapChoice, reach_of
 from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sight import sight_on
+from robochoc.maps.occupancy.grid import read_occupancy_grid
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.cases import looped

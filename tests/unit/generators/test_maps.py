@@ -15,15 +15,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team, read_team, write_team
-from robochoc.formats.ground_map import ground_map_json, read_ground_map
-from robochoc.formats.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
-from robochoc.formats.occupancy.packed import unpacked
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
 from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sizes import cells_of, passable
 from robochoc.generators.maps.travel import UNREACHED, lengths_from
+from robochoc.maps.ground_map import ground_map_json, read_ground_map
+from robochoc.maps.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
+from robochoc.maps.occupancy.packed import unpacked
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
@@ -149,7 +149,7 @@ def test_pixels_are_summed_once_for_all_sides_of_cells(monkeypatch: pytest.Monke
         sizes.append(flags.shape)
         return before(flags)
 
-    monkeypatch.setattr("robochoc.formats.occupancy.grid.before", counted)
+    monkeypatch.setattr("robochoc.maps.occupancy.grid.before", counted)
     assert cells_of(grid, Fraction(0), 4).side == 6  # of twelve pixels
     assert sizes == [(40, 40)]
 

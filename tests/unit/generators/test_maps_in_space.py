@@ -16,7 +16,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team, read_team, write_team
-from robochoc.formats.octomap.voxels import VoxelGrid, read_voxels
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.formation import formation
@@ -25,6 +24,7 @@ from robochoc.generators.maps.reach import MapChoice, reach_of
 from robochoc.generators.maps.sight import sight_on
 from robochoc.generators.maps.sizes import cells_of, passable
 from robochoc.generators.maps.travel import UNREACHED, lengths_from
+from robochoc.maps.octomap.voxels import VoxelGrid, read_voxels
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.formats.occupancy.grid import OccupancyGrid, read_occupancy_grid
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
@@ -22,6 +21,7 @@ from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice, reach_of
 from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sight import sight_on
+from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve

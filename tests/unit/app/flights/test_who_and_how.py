@@ -21,7 +21,7 @@ from robochoc.app.runs.run import CHANGE, Checked, Run, State
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch
 from robochoc.formats import write_team
-from robochoc.formats.ground_map import BlockedCell
+from robochoc.maps.ground_map import BlockedCell
 from robochoc.model.problem import RemoveAgent, ScenarioEvent
 from tests.support.cases import looped
 from tests.support.kept_runs import STARTED, cube, kept_run

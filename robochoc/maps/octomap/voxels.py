@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.occupancy.content import content_of, told
-from robochoc.formats.occupancy.grid import Flags
-from robochoc.formats.octomap.octree import DEPTH, MAX_BYTES, Corners, Integers, Leaves, Octree, read_octree
+from robochoc.maps.occupancy.content import content_of, told
+from robochoc.maps.occupancy.grid import Flags
+from robochoc.maps.octomap.octree import DEPTH, MAX_BYTES, Corners, Integers, Leaves, Octree, read_octree
 
 MAX_VOXELS = 16_000_000
 """The maximum number of voxels around all that is free. A larger map is read coarser."""

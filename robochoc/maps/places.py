@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from robochoc.formats.ground_map import GroundMap
+from robochoc.maps.ground_map import GroundMap
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate, names
 from robochoc.model.problem import Robot, Team
 

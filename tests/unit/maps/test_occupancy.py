@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInputError
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.occupancy.grid import MAX_YAML, read_occupancy_grid
-from robochoc.formats.occupancy.pgm import MAX_PIXELS, read_pgm
+from robochoc.maps.occupancy.grid import MAX_YAML, read_occupancy_grid
+from robochoc.maps.occupancy.pgm import MAX_PIXELS, read_pgm
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.maps import write_map

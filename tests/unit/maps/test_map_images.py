@@ -17,9 +17,9 @@ from PIL import Image as Pillow
 
 from robochoc.formats import InvalidInputError
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.occupancy.grid import OccupancyGrid, read_occupancy_grid
-from robochoc.formats.occupancy.images import read_image
-from robochoc.formats.occupancy.pgm import MAX_PIXELS
+from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid
+from robochoc.maps.occupancy.images import read_image
+from robochoc.maps.occupancy.pgm import MAX_PIXELS
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.maps import write_map

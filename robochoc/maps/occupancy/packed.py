@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from robochoc.formats.occupancy.grid import Flags
+from robochoc.maps.occupancy.grid import Flags
 
 
 def packed(flags: Flags) -> bytes:

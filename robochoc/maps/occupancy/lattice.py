@@ -13,7 +13,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Counts, Flags, before
+from robochoc.maps.occupancy.grid import Counts, Flags, before
 
 POINTS_MAX = 4_000_000
 _FINE = 4

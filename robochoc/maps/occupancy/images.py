@@ -18,7 +18,7 @@ from PIL import Image as Pillow
 from PIL import UnidentifiedImageError
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.occupancy.pgm import MAX_PIXELS, Pixels, read_pgm
+from robochoc.maps.occupancy.pgm import MAX_PIXELS, Pixels, read_pgm
 
 _PGM = (b"P2", b"P5")
 _OTHERS = {b"\x89PNG\r\n\x1a\n": "PNG", b"BM": "BMP"}

@@ -20,11 +20,11 @@ from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInputError
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.maps import read_map
-from robochoc.formats.occupancy.grid import OccupancyGrid
-from robochoc.formats.octomap import octree
-from robochoc.formats.octomap.octree import read_octree
-from robochoc.formats.octomap.voxels import VoxelGrid, read_voxels
+from robochoc.maps.map_file import read_map
+from robochoc.maps.occupancy.grid import OccupancyGrid
+from robochoc.maps.octomap import octree
+from robochoc.maps.octomap.octree import read_octree
+from robochoc.maps.octomap.voxels import VoxelGrid, read_voxels
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.limits import HANG_S
@@ -89,7 +89,7 @@ def test_too_many_voxels_are_joined(sides: Voxel, first: Voxel, seed: int, most:
     if FREE not in voxels.values():
         return
     with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.formats.octomap.voxels.MAX_VOXELS", most)
+        patch.setattr("robochoc.maps.octomap.voxels.MAX_VOXELS", most)
         try:
             grid = read_voxels(write_octomap(Path(folder) / "plan.bt", voxels, "0.1"))
         except InvalidInputError as error:
@@ -208,7 +208,7 @@ def test_sizes_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(octree, "MAX_NODES", 5)
     with pytest.raises(InvalidInputError, match="has more than 5 nodes"):
         read_voxels(path)
-    monkeypatch.setattr("robochoc.formats.octomap.voxels.MAX_BYTES", 100)
+    monkeypatch.setattr("robochoc.maps.octomap.voxels.MAX_BYTES", 100)
     with pytest.raises(InvalidInputError, match="is too large"):
         read_voxels(path)
 

@@ -20,10 +20,10 @@ import numpy.typing as npt
 
 from robochoc.formats.diagnostics import InvalidInputError, MistakeError, shortened
 from robochoc.formats.dialects.yaml_tree import Node, Scalar, read_yaml
-from robochoc.formats.occupancy.content import beginning_of, content_of, told
-from robochoc.formats.occupancy.images import Image, is_image, read_image
-from robochoc.formats.occupancy.pgm import MAX_BYTES
-from robochoc.formats.occupancy.turn import UNTURNED, Place, Turn, turn_of
+from robochoc.maps.occupancy.content import beginning_of, content_of, told
+from robochoc.maps.occupancy.images import Image, is_image, read_image
+from robochoc.maps.occupancy.pgm import MAX_BYTES
+from robochoc.maps.occupancy.turn import UNTURNED, Place, Turn, turn_of
 
 MAX_YAML = 64 * 1024
 _SIDE_MAX_M = Fraction(100)

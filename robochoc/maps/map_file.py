@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeAlias
 
-from robochoc.formats.occupancy.content import beginning_of, told
-from robochoc.formats.occupancy.grid import OccupancyGrid, read_occupancy_grid
-from robochoc.formats.octomap.octree import is_octomap
-from robochoc.formats.octomap.voxels import VoxelGrid, read_voxels
+from robochoc.maps.occupancy.content import beginning_of, told
+from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid
+from robochoc.maps.octomap.octree import is_octomap
+from robochoc.maps.octomap.voxels import VoxelGrid, read_voxels
 
 Map: TypeAlias = OccupancyGrid | VoxelGrid
 _BEGINNING = 64

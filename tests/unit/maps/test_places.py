@@ -9,11 +9,11 @@ from random import Random
 import msgspec
 import pytest
 
-from robochoc.formats.ground_map import GroundMap
-from robochoc.formats.places import MapPlaces
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice, reach_of
+from robochoc.maps.ground_map import GroundMap
+from robochoc.maps.places import MapPlaces
 from robochoc.model.constraint import Domain, Variable
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.problem import Robot, Team, Topic
