@@ -9,7 +9,7 @@ Names:
         any_of: Constraints and costs of a model that no operator makes.
     from_cpmpy: Splits a CPMpy model over robots (the extra `cpmpy`).
     ModelError: What a model says that cannot be.
-    Outcome: What a run comes to; `Solution`, which `solve()` returns, is one.
+    Outcome: The result of a run; `solve()` returns its subclass `Solution`.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
     AgentsContainer: The master or robots on one of several machines.
     journal: Journals of runs; `journal.rows(path)` are for pandas or polars.

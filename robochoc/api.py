@@ -41,7 +41,7 @@ class Problem(Solvable):
         team: The robots, their variables and constraints: from files, a generator, or built in Python.
         names: The original names of robots and variables, by the team's, where it is from a file of another tool.
             Solutions speak in these.
-        notes: What reading such a file has changed, as `robochoc import` tells it: pairs of a keyword and a sentence.
+        notes: The changes made on reading the file, as `robochoc import` reports them: pairs of keyword and sentence.
         ordered: Whether somebody has given the robots their priority order. Files of other tools give none.
 
     Raises:
@@ -137,7 +137,7 @@ class AgentsContainer:
             UnknownProtocolError: if no such protocol is installed.
         """
         if not kind.startswith((_MASTER, _AGENT)):
-            raise ValueError(f"{kind!r} is no type of agent: MasterABT or AgentABT, or with another protocol's name")
+            raise ValueError(f"{kind!r} is not a type of agent: MasterABT or AgentABT, or with another protocol's name")
         protocol_called(kind.removeprefix(_MASTER).removeprefix(_AGENT))
         self._type = kind
 
@@ -158,7 +158,7 @@ class AgentsContainer:
             place: `HOST` or `HOST:PORT`.
 
         Raises:
-            AddressError: if it is no address.
+            AddressError: if it is not an address.
         """
         from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
@@ -171,7 +171,7 @@ class AgentsContainer:
             place: `HOST` or `HOST:PORT`.
 
         Raises:
-            AddressError: if it is no address.
+            AddressError: if it is not an address.
         """
         from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 

@@ -112,7 +112,7 @@ class Authority:
         with locked(folder):
             if (folder / _KEY).exists() or (folder / _CERTIFICATE).exists():
                 raise AuthorityError(
-                    f"there is an Authority in {folder} already; it has to stay, or all must enrol anew"
+                    f"there is an Authority in {folder} already; keep it, or all robots must enrol again"
                 )
             key = new_key()
             certificate = ca_certificate(key, moment(clock()))
@@ -135,14 +135,14 @@ class Authority:
             content, mode = (folder / _KEY).read_bytes(), (folder / _KEY).stat().st_mode
             key, certificate = read_key(content), read_certificate((folder / _CERTIFICATE).read_bytes())
         except FileNotFoundError:
-            raise AuthorityError(f"there is no Authority in {folder}; say: robochoc authority init") from None
+            raise AuthorityError(f"there is no Authority in {folder}; run: robochoc authority init") from None
         except OSError as error:
             raise AuthorityError(f"the Authority in {folder} cannot be read: {error.strerror}") from error
         except CertificateError as error:
             raise AuthorityError(f"the Authority in {folder} is damaged: {error}") from error
         if mode & _OTHERS:
             raise AuthorityError(
-                f"others can read the key of the Authority (mode {mode & 0o777:o}); say: chmod 600 {folder / _KEY}"
+                f"others can read the key of the Authority (mode {mode & 0o777:o}); run: chmod 600 {folder / _KEY}"
             )
         if certificate.public_key() != key.public_key():
             raise AuthorityError(f"the Authority in {folder} is damaged: {_KEY} is not the key of {_CERTIFICATE}")

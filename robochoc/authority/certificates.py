@@ -154,7 +154,7 @@ def read_certificate(content: bytes) -> x509.Certificate:
     try:
         found = x509.load_pem_x509_certificates(content)
     except (ValueError, TypeError, x509.InvalidVersion) as error:
-        raise CertificateError("that is no certificate") from error
+        raise CertificateError("not a certificate") from error
     if len(found) != 1:
         raise CertificateError(f"expected one certificate, found {len(found)}")
     return found[0]
@@ -165,7 +165,7 @@ def read_key(content: bytes) -> ec.EllipticCurvePrivateKey:
     try:
         key = serialization.load_pem_private_key(content, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise CertificateError("that is no private key") from error
+        raise CertificateError("not a private key") from error
     if not isinstance(key, ec.EllipticCurvePrivateKey):
         raise CertificateError("the private key is not on P-256")
     _on_p256(key.public_key())
@@ -231,7 +231,7 @@ def _host(host: str) -> x509.DNSName | x509.IPAddress:
         except ValueError:
             name = ""
         if not name:
-            raise HostNameError(f"{on_one_line(shortened(host))!r} is no host name, and no address") from None
+            raise HostNameError(f"{on_one_line(shortened(host))!r} is neither a host name nor an address") from None
         return x509.DNSName(name)
     if address.is_unspecified:
         raise HostNameError(f"{host} means all addresses: name the host or the addresses that robots connect to")

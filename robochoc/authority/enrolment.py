@@ -1,6 +1,6 @@
 """Enrolment as a robot does it: a token for a first certificate, a certificate for the next one.
 
-A new robot believes nobody yet. It asks whoever answers for the Authority's certificate, compares that with the
+A new robot trusts no one yet. It requests the Authority's certificate from the service, compares that with the
 fingerprint in its token, and hangs up. Only then, on a second connection which OpenSSL verifies against that very
 certificate, and whose other end has to be the master, does it show the token's secret.
 """
@@ -100,7 +100,7 @@ def _introduced(place: tuple[str, int], token: EnrolmentToken, patience_s: float
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.check_hostname = False
-    context.verify_mode = ssl.CERT_NONE  # nothing secret is said here, and nothing heard is believed unchecked
+    context.verify_mode = ssl.CERT_NONE  # nothing secret is sent here, and every answer is checked
     answer = _ask(place, Introduce(), context, patience_s)
     try:
         ca = read_certificate(answer.ca) if isinstance(answer, Introduction) else None
@@ -166,12 +166,12 @@ def _certified(answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivat
                 certificate = read_certificate(answer.certificate)
                 proven = check_issued(certificate, ca, moment(time.time()))
             except CertificateError as error:
-                raise EnrolmentError(f"the Authority has given a certificate that is not good: {error}") from error
+                raise EnrolmentError(f"the Authority issued an invalid certificate: {error}") from error
             if proven == name and holder_of(certificate) == key.public_key():
                 return certificate
-            raise EnrolmentError("the Authority has given the certificate of another name or key")
+            raise EnrolmentError("the Authority issued a certificate for another name or key")
         case _:
-            raise EnrolmentError("the Authority has answered another question")
+            raise EnrolmentError("the Authority answered another question")
 
 
 def _shown(place: tuple[str, int]) -> str:

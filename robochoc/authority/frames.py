@@ -70,7 +70,7 @@ def decode_question(content: bytes) -> Question:
     try:
         question: Question = _questions.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise FrameError(f"that is no question: {error}") from error
+        raise FrameError(f"not a valid question: {error}") from error
     return question
 
 
@@ -79,7 +79,7 @@ def decode_answer(content: bytes) -> Answer:
     try:
         answer: Answer = _answers.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise FrameError(f"that is no answer: {error}") from error
+        raise FrameError(f"not a valid answer: {error}") from error
     return answer
 
 

@@ -70,9 +70,9 @@ class Identity:
             certificate, ca = read_certificate(_read(folder / CERTIFICATE)), read_certificate(_read(folder / CA))
             name = check_issued(certificate, ca, moment(time.time() if now is None else now))
             if holder_of(certificate) != key.public_key():
-                raise IdentityError(f"{folder}: {KEY} is not the key of {CERTIFICATE}; enrol anew, with a new token")
+                raise IdentityError(f"{folder}: {KEY} is not the key of {CERTIFICATE}; enrol again, with a new token")
         except CertificateError as error:
-            raise IdentityError(f"{folder}: {error}; enrol anew, with a new token") from error
+            raise IdentityError(f"{folder}: {error}; enrol again, with a new token") from error
         return cls(folder, name, key, certificate, ca)
 
     @classmethod
@@ -155,7 +155,7 @@ def _secret(path: Path) -> bytes:
     content = _read(path)
     mode = path.stat().st_mode
     if mode & _OTHERS:
-        raise IdentityError(f"{path} can be read by others (mode {mode & 0o777:o}); say: chmod 600 {path}")
+        raise IdentityError(f"{path} can be read by others (mode {mode & 0o777:o}); run: chmod 600 {path}")
     return content
 
 
@@ -168,5 +168,5 @@ def _read(path: Path) -> bytes:
     except OSError as error:
         raise IdentityError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) > _LARGEST_BYTES:
-        raise IdentityError(f"{path} is no identity's file: it has more than {_LARGEST_BYTES} bytes")
+        raise IdentityError(f"{path} is not an identity file: it has more than {_LARGEST_BYTES} bytes")
     return content

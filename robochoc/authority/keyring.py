@@ -1,9 +1,9 @@
 """Key cards and key rings, by which robots authenticate each other's messages end to end.
 
 For each run a robot makes two fresh key pairs, which never leave its memory: Ed25519 (RFC 8032) to sign with, X25519
-(RFC 7748) to agree on secrets. It signs their public halves with the key of its certificate: its card. Whoever holds
-the Authority's certificate can check a card, whoever carried it. When the run is over the private halves are gone, so
-that nobody can read later what was recorded, not even with the key of a certificate.
+(RFC 7748) to agree on secrets. It signs their public halves with the key of its certificate: its card. Everyone with
+the Authority's certificate can check a card, regardless of its path. After the run the private halves are gone, so
+that recorded messages cannot be decrypted later, not even with the key of a certificate.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         try:
             return msgspec.msgpack.decode(content, type=cls)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise KeyCardError(f"that is no key card: {error}") from error
+            raise KeyCardError(f"not a valid key card: {error}") from error
 
     def signed_part(self) -> bytes:
         """Return the bytes that the signature is over."""
@@ -72,7 +72,7 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class KeyRing:
     """The robot `own`'s keys for `run`, and the cards of its peers.
 
-    It belongs to one process: a copy would count anew what must never be counted twice. So it cannot be copied, and
+    It belongs to one process: a copy would repeat numbers that must be unique. So it cannot be copied, and
     refuses to serve in a forked child.
     """
 
@@ -114,7 +114,7 @@ class KeyRing:
         try:
             self._sealing.exchange(X25519PublicKey.from_public_bytes(card.sealing))
         except ValueError as error:  # a point of small order: whatever is agreed on, everybody knows it
-            raise KeyCardError(f"the sealing key on the card of {who} is no key") from error
+            raise KeyCardError(f"the sealing key on the card of {who} is not a key") from error
         self._peers[card.name] = card
 
     def dismiss(self, name: str) -> None:

@@ -35,7 +35,9 @@ def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
     """Raise `InvalidNameError` if `name` cannot take part as `role`."""
     shown = on_one_line(shortened(name))
     if not is_name(name):
-        raise InvalidNameError(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
+        raise InvalidNameError(
+            f"'{shown}' is not a valid name of a robot: use a letter, then letters, digits, '_' and '.'"
+        )
     if len(name) > LONGEST_NAME:
         raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
     if name.upper() == MASTER or role == Role.MASTER:

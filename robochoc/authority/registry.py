@@ -137,7 +137,7 @@ class Registry:
         except OSError as error:
             raise AuthorityError(f"{path} cannot be read: {error.strerror}") from error
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-            raise AuthorityError(f"{path} is no registry of this version: {error}") from error
+            raise AuthorityError(f"{path} is not a registry of this version: {error}") from error
         return known[1]
 
     @contextmanager

@@ -18,7 +18,7 @@ FINGERPRINT_BYTES = 32
 
 
 class TokenError(ValueError):
-    """The text is no token, or not a whole one."""
+    """The text is not a complete token."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,16 +35,14 @@ class EnrolmentToken:
 
     @classmethod
     def parse(cls, text: str) -> EnrolmentToken:
-        """Return the token that `text` stands for; blanks around it and capitals do no harm. Raises `TokenError`."""
+        """Return the token in `text`; surrounding blanks and the case of letters are ignored. Raises `TokenError`."""
         secret, dot, fingerprint = text.strip().partition(".")
         try:
             token = cls(_decoded(secret), _decoded(fingerprint))
         except (ValueError, binascii.Error):
             token = cls(b"", b"")
         if not dot or (len(token.secret), len(token.fingerprint)) != (SECRET_BYTES, FINGERPRINT_BYTES):
-            raise TokenError(
-                "that is no token, or only a part of one: copy all that 'robochoc authority enrol' printed"
-            )
+            raise TokenError("this is not a complete token: copy everything that 'robochoc authority enrol' printed")
         return token
 
     def __str__(self) -> str:

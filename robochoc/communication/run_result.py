@@ -30,7 +30,7 @@ class RobotsLostError(TransferableError):
 class Progress(NamedTuple):
     """The progress of a run: messages sent so far, and seconds since its start.
 
-    `stage` names the present work if it is no search.
+    `stage` names the current work if it is not a search.
     """
 
     messages: int

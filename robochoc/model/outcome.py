@@ -123,7 +123,7 @@ class Optima(NamedTuple):
     """The list of optima, or of solutions, that a protocol has found.
 
     Attributes:
-        number: How many there are that robots can tell apart.
+        number: The number of optima that robots can distinguish.
         assignments: The first ones, each checked: the values of all variables of the robots that are not withdrawn.
     """
 
@@ -271,7 +271,7 @@ class Outcome(Answer):
         """Return a text on the robot that claims `no-solution`. Across machines the claim cannot be checked."""
         if self.witness is None or self.claimed_by is None:
             return self.witness and f"{self.witness} {RULED_OUT}"
-        return f"{self.witness} claims it; nobody could check"
+        return f"{self.witness} claims it; this could not be checked"
 
     @property
     def is_complete(self) -> bool:

@@ -89,7 +89,7 @@ def action_in(content: str) -> Action:
 
 
 def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
-    """Return what a search has found: the content of the INFORM that answers it, `((result <action> (set ...)))`.
+    """Return the result of a search: the content of the INFORM that answers it, `((result <action> (set ...)))`.
 
     Raises `SymbolicExpressionError`, and `RequestRefusedError` where a description has what no description has.
     """
@@ -221,7 +221,7 @@ def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expr
 
 
 def _members(expression: Expression | None, what: str) -> tuple[Expression, ...]:
-    """Return what is in a set; in a sequence as well, as JADE writes one where FIPA00023 has a set."""
+    """Return the elements of a set, or of a sequence, as JADE writes one where FIPA00023 has a set."""
     return () if expression is None else items_of(expression, ("set", "sequence"), what)
 
 

@@ -17,7 +17,7 @@ from robochoc.system.errors import TransferableError
 
 
 class SymbolicExpressionError(TransferableError, ValueError):
-    """A text that is no expression, or not the one expected; `at` is the character it is about, from 0."""
+    """A text that is not an expression, or not the expected one; `at` is the index of the character, from 0."""
 
     def __init__(self, message: str, at: int) -> None:
         super().__init__(message)
@@ -145,7 +145,7 @@ def head_of(expression: Expression, what: str) -> str:
 
 
 def items_of(expression: Expression, heads: tuple[str, ...], what: str) -> tuple[Expression, ...]:
-    """Return what follows in a list that begins with one of `heads`.
+    """Return the rest of a list that begins with one of `heads`.
 
     Raises `SymbolicExpressionError` for any other expression.
     """

@@ -1,6 +1,6 @@
-"""What compiled modules need (docs/explanation/design.md, "Compiled core"). It is not compiled itself.
+"""Attributes for compiled modules (docs/explanation/design.md, "Compiled core"). It is not compiled itself.
 
-mypyc knows `mypyc_attr` by its place in `mypy_extensions`. Whoever runs robochoc needs no such package.
+mypyc knows `mypyc_attr` by its place in `mypy_extensions`. Users of robochoc do not need that package.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class Loaded(NamedTuple):
 def installed_entry_points(group: str) -> Sequence[EntryPoint]:
     """Return all that is offered under `group`, in no order.
 
-    What every installed package offers takes as long to read as a small run takes. It is read anew where a package may
+    Reading the entry points of all packages takes as long as a small run. They are read again if a package may
     have come or gone, which changes the folder that holds it.
     """
     return _read(group, tuple((place, _changed_ns(place)) for place in sys.path))

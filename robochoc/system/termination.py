@@ -1,4 +1,4 @@
-"""What SIGTERM raises."""
+"""The exception raised on SIGTERM."""
 
 
 class Terminated(SystemExit):

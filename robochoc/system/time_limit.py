@@ -111,6 +111,6 @@ def _drop_pending_error() -> None:
 
 def _raise_in(thread: int, error: type[Exception]) -> None:
     """Raise an error in a thread."""
-    import ctypes  # noqa: PLC0415 - start-up: few runs come to the end of their time
+    import ctypes  # noqa: PLC0415 - start-up: few runs reach their time limit
 
     ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(error))

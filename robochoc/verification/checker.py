@@ -37,7 +37,7 @@ class RefutedError(Exception):
 
 
 def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
-    """Yield why `assignment` is no solution for the robots of `team` that are not withdrawn. Nothing: it is one.
+    """Yield the reasons why `assignment` is not a solution for the robots of `team` that are not withdrawn.
 
     Every variable of a flying robot has a value of its domain and every constraint that is in force holds.
     """
@@ -47,7 +47,7 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
             yield f"{name} has no value"
         elif assignment[name] not in variable.domain:
             yield f"{name} = {assignment[name]} is not in its domain"
-    yield from (f"{name} is no variable of a robot that flies" for name in assignment if name not in flying)
+    yield from (f"{name} is not a variable of a robot that flies" for name in assignment if name not in flying)
     for constraint in constraints_in_force(team, withdrawn):
         if (
             all(name in assignment for name in constraint.variables)
@@ -74,7 +74,7 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
     Args:
         team: The team as its files have it: its costs have not been normalised.
         assignment: The values of all robots that have not withdrawn.
-        cost: What they cost, it is said. None: there is no assignment.
+        cost: The claimed cost. None: there is no assignment.
         without: The robots that have withdrawn.
 
     Raises:
@@ -96,7 +96,7 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
     if Fraction(cost) != total:
         exact = Decimal(int(total * 10**places)).scaleb(-places)
         raise RefutedError(
-            f"the answer for {team.name} costs {cost_shown(exact)}, and it is said to cost {cost_shown(cost)}"
+            f"the answer for {team.name} costs {cost_shown(exact)}, but the protocol claims {cost_shown(cost)}"
         )
 
 

@@ -21,7 +21,7 @@ class Objective:
         team: The team, with normalised costs (`model/costs.py`).
         withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. None: no
             robot may withdraw, and the cost is infinite until all have values.
-        in_step: Whether decisions of the same time are made at once: what the team has in between is no assignment.
+        in_step: Whether decisions of the same time are made at once, so that states in between are not assignments.
 
     Attributes:
         interfaces: The interface variables of each robot. Runs that reorder the team replace them.
@@ -92,7 +92,7 @@ class Objective:
         self.change({robot: {} for robot in self._weights})
 
     def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]] | None:
-        """Return what `values`, as neighbours see them, say of each robot's variables; None if they cannot be those."""
+        """Return each robot's variables for `values`, as neighbours see them; None if that is impossible."""
         if any(len(self.interfaces.get(robot, (*value, ""))) != len(value) for robot, value in values.items()):
             return None
         return {

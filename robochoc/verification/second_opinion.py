@@ -1,4 +1,4 @@
-"""The second opinion: the central solver checks what robots have proven, that there is no solution or none cheaper."""
+"""The second opinion: the central solver checks the robots' proofs of `no-solution` or of a minimum cost."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def confirmed(
         withdrawal_cost: the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
 
     Returns:
-        Those that agree; a solver that has not come to an end does not.
+        The solvers that agree; a solver that did not finish does not count.
 
     Raises:
         RefutedError: when one has found something else.
@@ -50,7 +50,7 @@ def confirmed(
 
 
 def contradiction(opinion: CentralAnswer, total: float) -> str | None:
-    """Return what the central solver has found against a claim; None where it agrees, or has not come to an end.
+    """Return the central solver's objection to a claim; None if it agrees, or did not finish.
 
     `total` is the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
     """
@@ -66,6 +66,6 @@ def contradiction(opinion: CentralAnswer, total: float) -> str | None:
 
 
 def total_cost(team: Team, assignment: Mapping[str, int], withdrawal_cost: float | None) -> float:
-    """Return what `assignment` costs, and the robots without values, at a withdrawal cost for one of weight 1."""
+    """Return the cost of `assignment`, and the robots without values, at a withdrawal cost for one of weight 1."""
     withdrawn = (robot for robot in team.robots if robot.variables[0].name not in assignment)
     return assignment_cost(team, assignment) + (withdrawal_cost or 0) * sum(robot.weight for robot in withdrawn)

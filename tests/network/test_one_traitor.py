@@ -177,14 +177,14 @@ def test_who_contradicts_another_while_they_search_ends_the_run(liar: dict[str, 
 # What is said of that
 
 CHECKED = "checked against every constraint"
-WHOLE = "no solution for the whole team (RB claims it; nobody could check)"
+WHOLE = "no solution for the whole team (RB claims it; this could not be checked)"
 SAID = Outcome(Verdict.NO_SOLUTION, team="t", protocol="abt", runtime="network", seed=0, witness="RB")
 
 
 @looped(
     ("found", "claimed_by", "words"),
     [
-        ({}, "RB", "t: no solution (RB claims it; nobody could check)"),
+        ({}, "RB", "t: no solution (RB claims it; this could not be checked)"),
         (
             {"verdict": Verdict.SOLUTION, "verified": True, "assignment": VALUES},
             None,

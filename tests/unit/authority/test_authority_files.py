@@ -182,7 +182,7 @@ def test_tokens_survive_being_copied_by_people(authority: Authority) -> None:
 
 @given(st.text(string.printable, max_size=120))
 def test_no_text_makes_reading_a_token_fail_otherwise(text: str) -> None:
-    with pytest.raises(TokenError, match="copy all"):
+    with pytest.raises(TokenError, match="copy everything"):
         EnrolmentToken.parse(text)
 
 
@@ -225,4 +225,4 @@ def test_an_identity_that_cannot_be_used_says_why(authority: Authority, tmp_path
     (folder / "cert.pem").unlink()
     assert "enrol" in fault()
     (folder / "key.pem").write_bytes(b"rubbish")
-    assert "no private key" in fault()
+    assert "not a private key" in fault()

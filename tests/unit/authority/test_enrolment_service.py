@@ -59,7 +59,7 @@ def test_malformed_requests(desk: AuthorityService) -> None:
         for number, content in enumerate(MALFORMED, 1):
             with each(content[:80]):
                 assert isinstance(answered(desk, framed(content)), EnrolmentDenied)
-                assert "no question" in desk.refusal(number)
+                assert "not a valid question" in desk.refusal(number)
 
 
 @given(st.binary(max_size=200))

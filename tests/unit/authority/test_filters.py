@@ -224,11 +224,11 @@ def test_cards_that_prove_nothing(identities: dict[str, Identity], tmp_path: Pat
         (changed(card, sealing=own.sealing), "not signed", START),
         (changed(card, run="8"), "not signed", START),
         (changed(card, signature=b""), "not signed", START),
-        (changed(card, certificate=b"rubbish"), "no certificate", START),
+        (changed(card, certificate=b"rubbish"), "not a certificate", START),
         (KeyRing(a, "6").card, "another run", START),
         (resigned(changed(card, signing=b"short"), a), "32 bytes", START),
         (resigned(changed(card, sealing=bytes(33)), a), "32 bytes", START),
-        (resigned(changed(card, sealing=bytes(32)), a), "is no key", START),  # the point 0: of small order
+        (resigned(changed(card, sealing=bytes(32)), a), "is not a key", START),  # the point 0: of small order
     ]
     with cases() as each:
         for number, (one, why, now) in enumerate(bad):

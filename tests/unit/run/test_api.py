@@ -142,7 +142,7 @@ def test_containers_that_were_not_told_all(tmp_path: Path) -> None:
     container = robochoc.AgentsContainer()
     with pytest.raises(ValueError, match="set_agent_type"):
         container.run()
-    with pytest.raises(ValueError, match="'RobotABT' is no type of agent"):
+    with pytest.raises(ValueError, match="'RobotABT' is not a type of agent"):
         container.set_agent_type("RobotABT")
     with pytest.raises(UnknownProtocolError):
         container.set_agent_type("AgentXYZ")

@@ -164,7 +164,7 @@ def test_withdrawal_and_utilities_do_not_go_together() -> None:
 
 def test_a_wrong_cost_is_refuted() -> None:
     check_told_cost(tutored(), {"x": 1, "y": 2}, Decimal("1.95"))
-    with pytest.raises(RefutedError, match=r"costs 1\.95, and it is said to cost 2"):
+    with pytest.raises(RefutedError, match=r"costs 1\.95, but the protocol claims 2"):
         check_told_cost(tutored(), {"x": 1, "y": 2}, 2)
 
 

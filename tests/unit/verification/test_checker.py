@@ -51,7 +51,7 @@ def test_every_kind_of_fault_is_told() -> None:
     assert list(violations(team, {"V1.1": 1, "V1.2": 1, "V2.1": 3, "V9.9": 1}))[:4] == [
         "V2.1 = 3 is not in its domain",
         "V2.2 has no value",
-        "V9.9 is no variable of a robot that flies",
+        "V9.9 is not a variable of a robot that flies",
         "constraint C5 is broken by V1.1 = 1, V1.2 = 1",
     ]
 
@@ -60,7 +60,7 @@ def test_a_robot_that_stepped_aside_must_not_be_placed_and_need_not_be() -> None
     team = queens3d(2)
     rest = ("Robot1.2", "Robot2.1", "Robot2.2")
     assert not list(violations(team, {"V1.1": 1}, rest))
-    assert next(violations(team, {"V1.1": 1, "V1.2": 2}, rest)) == "V1.2 is no variable of a robot that flies"
+    assert next(violations(team, {"V1.1": 1, "V1.2": 2}, rest)) == "V1.2 is not a variable of a robot that flies"
 
 
 def test_whoever_could_join_is_named() -> None:
