@@ -94,7 +94,7 @@ def no_solver(monkeypatch: pytest.MonkeyPatch) -> None:
     def asked(*_: object, **__: object) -> NoReturn:
         raise AssertionError("a solver was asked")
 
-    monkeypatch.setattr("robochoc.solver.ace.AceProcess.begin", asked)
+    monkeypatch.setattr("robochoc.solver.ace.AceProcess.submit", asked)
 
 
 def answered(*words: object, status: int = 0) -> dict[str, Any]:

@@ -184,7 +184,7 @@ def test_filters_are_over_the_declared_domain_of_all_that_the_receiver_shows() -
 def test_a_domain_too_large_for_a_filter_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "MAX_FILTER_BITS", 2)
     Simulation(pkc_pair(pkc_part("AB"), None), DisFC, Concurrent(0))
-    with pytest.raises(UnsupportedError, match="RA shows its neighbours 3 combinations of values"):
+    with pytest.raises(UnsupportedError, match="RA has 3 combinations of interface values"):
         Simulation(triangle(), DisFC, Concurrent(0))
 
 

@@ -39,7 +39,7 @@ def test_without_the_guard_the_program_hears_what_is_missing(text: str, tmp_path
     message = done.stderr.splitlines()[-1]
     line = len(text.splitlines())
     assert f"UnsupportedError: {tmp_path / 'program.py'}:{line}: each robot's process imports this file" in message
-    assert 'write if __name__ == "__main__":' in message
+    assert 'below if __name__ == "__main__":' in message
     assert done.stderr.count("Traceback") == 1
     assert done.stdout.count("begun") <= 1
 

@@ -100,10 +100,10 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
 @looped(
     ("words", "told"),
     [
-        (["--arm"], "--arm is for robots that are commanded: add --ros mavlink:FILE, or crazyflie:FILE"),
+        (["--arm"], "--arm requires --ros mavlink:FILE or --ros crazyflie:FILE"),
         (
             ["--arm", "--ros", "mcap:run.mcap"],
-            "--arm is for --ros mavlink:FILE or crazyflie:FILE; mcap:run.mcap arms nothing",
+            "--arm requires --ros mavlink:FILE or --ros crazyflie:FILE; mcap:run.mcap cannot arm vehicles",
         ),
         (["--ros", "mavlink"], "mavlink: which vehicles is not said; name a fleet file, as in mavlink:fleet.yaml"),
         (["--ros", "mavlink:nowhere.yaml"], "nowhere.yaml: No such file or directory; name a fleet file"),
