@@ -130,7 +130,7 @@ def test_what_cannot_be_done_is_said(folder: Path) -> None:
     with cases() as each:
         for words, status, told in [
             (["enrol"], 2, "--team"),
-            (["enrol", "A/B"], 2, "'A/B' is no robot's name"),
+            (["enrol", "A/B"], 2, "'A/B' is not a valid name of a robot"),
             (["enrol", "A\x1b[2J"], 2, r"\x1b"),
             (["enrol", "Good", "MASTER"], 2, "MASTER"),
             (["enrol", "A", "--role", "master"], 2, "--role"),
@@ -154,7 +154,7 @@ def test_without_an_authority_the_next_step_is_said(tmp_path: Path) -> None:
     for words in [["enrol", "A"], ["list"], ["revoke", "A"]]:
         result = say(tmp_path / "nowhere", *words)
         assert result.exit_code == 1
-        assert result.stderr.endswith("say: robochoc authority init\n")
+        assert result.stderr.endswith("run: robochoc authority init\n")
         assert not (tmp_path / "nowhere").exists()
 
 
@@ -162,7 +162,7 @@ def test_a_damaged_authority(folder: Path) -> None:
     (folder / "registry.json").write_text("{")
     result = say(folder, "list")
     assert result.exit_code == 1
-    assert "no registry" in result.stderr
+    assert "not a registry" in result.stderr
 
 
 def test_without_the_extra_it_says_what_to_install(tmp_path: Path) -> None:

@@ -196,7 +196,7 @@ def test_what_cannot_be_is_said_in_a_line(
 def test_a_master_without_an_authority(tmp_path: Path) -> None:
     status, told = refusal(["master", "--authority", str(tmp_path / "nowhere"), "--listen", "127.0.0.1:7447"])
     assert status == 1
-    assert told.endswith("say: robochoc authority init")
+    assert told.endswith("run: robochoc authority init")
 
 
 WITHOUT_AN_EXTRA = """

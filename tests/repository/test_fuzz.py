@@ -93,7 +93,7 @@ def test_requests_and_certificates_of_other_versions_are_malformed() -> None:
         read_request(of_version(request, version, 1))
     version = b"\xa0\x03\x02\x01\x02"
     assert read_certificate(of_version(certificate, version, 2)).serial_number
-    with pytest.raises(CertificateError, match="no certificate"):
+    with pytest.raises(CertificateError, match="not a certificate"):
         read_certificate(of_version(certificate, version, 34))
 
 

@@ -196,7 +196,7 @@ def test_files_that_cannot_be_written(text: str, monkeypatch: pytest.MonkeyPatch
         (f"no/where/{place}", "make it first"),
         (".", "Is a directory"),
         ("", "needs the name of its file"),
-        ("/dev/null", "is no file"),
+        ("/dev/null", "is not a regular file"),
     ):
         with pytest.raises(SinkError, match=told):
             open_sink(f"{name}:{where}")
@@ -269,7 +269,7 @@ def test_systems_without_unnamed_files(text: str, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("text", FILES)
 def test_what_cannot_be_published_is_told_with_its_topic(text: str) -> None:
     with open_sink(text) as sink:
-        with pytest.raises(SinkError, match=r": /a: .*PoseStamped: pose\.x is no field"):
+        with pytest.raises(SinkError, match=r": /a: .*PoseStamped: pose\.x is not a field"):
             sink.publish("/a", POSE, {"pose": {"x": 1.0}}, NOW)
         with pytest.raises(SinkError, match="/a: a recording has no time -1"):
             sink.publish("/a", POSE, {}, -1)
