@@ -127,7 +127,11 @@ def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
-    for path, said in ((tmp_path / "nowhere", "No such file"), (tmp_path, "not a regular file"), (Path("/dev/null"), "no file")):
+    for path, said in (
+        (tmp_path / "nowhere", "No such file"),
+        (tmp_path, "not a regular file"),
+        (Path("/dev/null"), "not a regular file"),
+    ):
         done = robochoc_within("sniff", path)
         assert done.returncode == 1
         assert said in done.stderr
