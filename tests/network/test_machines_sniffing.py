@@ -69,7 +69,7 @@ def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment)
     granted = [entry["who"] for entry in told if entry["event"] == "Granted" and entry["what"] == "sniff"]
     assert granted == ["Early", "Late"]
     assert [entry["who"] for entry in told if entry["event"] == "Refused"] == ["Spy"]
-    assert "refused: Spy, sniff: it has no right to" in master.errors
+    assert "refused: Spy, sniff: it does not have the right" in master.errors
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     content = copy_of(site, "Sniffer").read_bytes()
     journal = read_journal(content)
     assert (journal.outcome, journal.damage) == (None, None)
-    assert f"{len(content):,} bytes of its journal are here" in sniffer.errors
+    assert f"{len(content):,} bytes of its journal received" in sniffer.errors
 
 
 @pytest.mark.more

@@ -395,7 +395,7 @@ def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> Non
     ("arguments", "said"),
     [
         (["HasFewFiles"], r"UnsupportedError: \S+ needs more open files .*ulimit -n"),
-        (["TalksToAll", "parent-has-few-files"], r"UnsupportedError: .* have a queue to .*ulimit -n"),
+        (["TalksToAll", "parent-has-few-files"], r"UnsupportedError: .* does not allow a queue from .*ulimit -n"),
     ],
 )
 def test_too_few_open_files_for_robots_that_talk(arguments: list[str], said: str, tmp_path: Path) -> None:
