@@ -385,7 +385,7 @@ def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> Non
     with running(solving(crowd), tmp_path / "run", open_files=open_files) as run:
         run.end()
         assert run.status() == 2
-        assert re.search(r"only \d+ of 64 robots .* Too many open files.*ulimit -n", run.errors())
+        assert re.search(r"only \d+ of 64 robots: Too many open files.*ulimit -n", run.errors())
         assert len(run.errors().splitlines()) == 1
         nothing_is_left(run)
 
