@@ -27,8 +27,8 @@ from robochoc.replay.steps import RecordedRun
 from robochoc.run.evaluation import Search, check_with_files, evaluate_search
 from robochoc.run.improvement import Rank
 from robochoc.run.options import CENTRAL
+from robochoc.run.phases import Phase
 from robochoc.run.registry import protocol_by_class
-from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError, assignment_cost, violations

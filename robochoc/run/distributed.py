@@ -17,7 +17,7 @@ from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
 from robochoc.run.options import Options
-from robochoc.run.withdrawal import Phase, first_phase, second_phase
+from robochoc.run.phases import Phase, first_phase, second_phase
 from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"

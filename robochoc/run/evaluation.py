@@ -18,7 +18,7 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.listed_optima import put_together
-from robochoc.run.withdrawal import Phase
+from robochoc.run.phases import Phase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
 from robochoc.verification.checker import (

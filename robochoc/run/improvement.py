@@ -19,7 +19,7 @@ from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search
 from robochoc.run.options import Options
-from robochoc.run.withdrawal import Phase
+from robochoc.run.phases import Phase
 from robochoc.verification.checker import RefutedError
 
 PERIOD_S = 0.1

@@ -19,8 +19,8 @@ from robochoc.model.problem import Domain, Robot, Team
 from robochoc.protocols.findings import Findings
 from robochoc.run.defaults import PREPROCESSING
 from robochoc.run.options import Options
+from robochoc.run.phases import Phase
 from robochoc.run.registry import protocol_or_stage
-from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 

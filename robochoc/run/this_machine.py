@@ -18,11 +18,11 @@ from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.options import Runtime
+from robochoc.run.phases import Phase
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.start_events import StartEvents
-from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam

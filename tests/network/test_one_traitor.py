@@ -27,8 +27,8 @@ from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
 from robochoc.run.networked.machines import Machines, claimed
 from robochoc.run.options import Options
+from robochoc.run.phases import Phase
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.verification.checker import RefutedError
 from tests.support import traitors

@@ -26,7 +26,7 @@ from robochoc.run.evaluation import PhaseAnswer, Search, is_proven
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
-from robochoc.run.withdrawal import Phase
+from robochoc.run.phases import Phase
 from robochoc.verification.checker import RefutedError
 
 

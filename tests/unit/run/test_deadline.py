@@ -18,8 +18,8 @@ from robochoc.model.problem import INFINITE, RemoveValue, ScenarioEvent, Team
 from robochoc.protocols.findings import Findings
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.evaluation import Search, check_with_files, evaluate_search
+from robochoc.run.phases import first_phase
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.run.withdrawal import first_phase
 from robochoc.solver.compiled_team import ensure_compiled
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import assignment_cost, violations

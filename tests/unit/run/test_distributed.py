@@ -18,7 +18,7 @@ from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Withdrawal
 from robochoc.run.distributed import Deployment, solve_distributed
 from robochoc.run.evaluation import PhaseAnswer, Search
-from robochoc.run.withdrawal import Phase
+from robochoc.run.phases import Phase
 from tests.support.random_outcomes import drawn
 
 HEADER = Outcome(Verdict.UNKNOWN, team="team", protocol="abt", runtime="simulator", seed=0)
