@@ -201,6 +201,11 @@ class Answer:
     improvements: tuple[Improvement, ...] = ()
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
+    def assignment_parts(self) -> dict[str, Any]:
+        """Return the fields that describe the assignment by name; they belong together."""
+        names = ("assignment", "cost", "withdrawn", "verified", "checked", "dropped_constraints")
+        return {name: getattr(self, name) for name in names}
+
     def parts(self) -> dict[str, Any]:
         """Return the fields of an answer by name, without those of a subclass."""
         return {one.name: getattr(self, one.name) for one in fields(Answer)}

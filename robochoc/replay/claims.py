@@ -8,7 +8,7 @@ while the search went on (`--improve`) may be older than these: it is checked wi
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
@@ -19,12 +19,12 @@ from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.costs import told_cost
-from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, Verdict
+from robochoc.model.outcome import Answer, Metrics, Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
-from robochoc.run.evaluation import Search, check_with_files, evaluate_search
+from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search
 from robochoc.run.improvement import Rank
 from robochoc.run.options import CENTRAL
 from robochoc.run.phases import Phase
@@ -54,7 +54,7 @@ class ReplayedRun:
 
     run: RecordedRun
     team: Team
-    answer: EpochOutcome | Outcome | None
+    answer: PhaseAnswer | None
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
@@ -147,7 +147,7 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
 
 
-def _answers(whose: str, recorded: EpochOutcome | Outcome, last: ReplayedRun) -> Iterator[Contradiction]:
+def _answers(whose: str, recorded: Answer, last: ReplayedRun) -> Iterator[Contradiction]:
     replayed = last.answer
     if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # limits are not in a journal
         return
@@ -155,17 +155,14 @@ def _answers(whose: str, recorded: EpochOutcome | Outcome, last: ReplayedRun) ->
         yield from _published(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
-    if isinstance(recorded, Outcome) and isinstance(replayed, Outcome):
-        left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
-        if left != right:
-            yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)
+    left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
+    if left != right:
+        yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)
 
 
-def _published(
-    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome, team: Team
-) -> Iterator[Contradiction]:
+def _published(whose: str, recorded: Answer, replayed: Answer, team: Team) -> Iterator[Contradiction]:
     """Yield what is wrong with an answer that was published while the search went on, or was better than its end."""
-    withdrawn = recorded.withdrawn if isinstance(recorded, Outcome) else ()
+    withdrawn = recorded.withdrawn
     faults = [*violations(team, recorded.assignment, withdrawn)]
     if faults:
         yield Contradiction(what=whose + "assignment", recorded=recorded.assignment, replayed=faults[0])
@@ -176,7 +173,7 @@ def _published(
     rank = Rank(team, partial(told_cost, team))
     of_recorded = rank.of(cost, withdrawn)
     found = replayed.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}
-    of_replayed = rank.of(replayed.cost or 0, replayed.withdrawn if isinstance(replayed, Outcome) else ())
+    of_replayed = rank.of(replayed.cost or 0, replayed.withdrawn)
     if found and of_replayed < of_recorded:
         yield Contradiction(what=whose + "cost", recorded=recorded.cost, replayed=replayed.cost)
     proven = replayed.verdict == Verdict.OPTIMAL and of_replayed == of_recorded
@@ -191,7 +188,7 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
+def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseAnswer | None:
     """Return the answer of `run`, computed as an orchestrator does; None: the journal does not hold enough."""
     given = run.given
     if given is None or given.why or len(robots.hosts) < len(robots.compiled.team.robots):
@@ -210,12 +207,9 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochO
     phase = Phase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
-        answer = evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team), ANY_DEADLINE)
+        return evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team), ANY_DEADLINE)
     except (RefutedError, TooManySolutionsError):
-        return EpochOutcome(Verdict.UNKNOWN, robots=team.order)
-    if not withdrawal:
-        return answer.as_epoch(team.order)
-    return answer.as_outcome(replace(outcome, verdict=Verdict.UNKNOWN), ())
+        return PhaseAnswer(Verdict.UNKNOWN)
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:

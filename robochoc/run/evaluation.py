@@ -115,15 +115,10 @@ def evaluate_search(
     return replace(
         answer,
         verdict=verdict,
-        assignment=found.assignment,
-        cost=found.cost,
-        withdrawn=found.withdrawn,
         bound=bound,
-        verified=found.verified,
-        checked=found.checked,
         reason=found.reason,
         optima=found.optima,
-        dropped_constraints=found.dropped_constraints,
+        **found.assignment_parts(),
     )
 
 
@@ -154,13 +149,8 @@ def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> PhaseA
     return replace(
         answer,
         verdict=Verdict.SOLUTION if sure else Verdict.UNKNOWN,
-        assignment=found.assignment,
-        cost=found.cost,
-        withdrawn=found.withdrawn,
-        verified=found.verified,
-        checked=found.checked,
         reason=unfinished if sure else found.reason,
-        dropped_constraints=found.dropped_constraints,
+        **found.assignment_parts(),
     )
 
 

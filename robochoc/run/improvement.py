@@ -207,16 +207,11 @@ class Improvements(SearchWatch):
         return replace(
             final,
             verdict=Verdict.OPTIMAL if proven else Verdict.SOLUTION,
-            assignment=best.assignment,
-            cost=best.cost,
-            withdrawn=best.withdrawn,
-            verified=best.verified,
-            checked=best.checked,
             bound=None if proven else self._bound if self._bounded and not _is_found(final) else final.bound,
             deadline=None if proven or final.ended else best.deadline,
             reason=final.reason if _is_found(final) else best.reason,
-            optima=final.optima,
             improvements=tuple(self.improvements),
+            **best.assignment_parts(),
         )
 
     def _refuse_false_claims(self, final: PhaseAnswer) -> None:

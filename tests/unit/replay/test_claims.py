@@ -69,6 +69,17 @@ def test_an_outcome_that_does_not_follow_is_found(three: Journal) -> None:
         assert not found.identical
 
 
+def test_a_robot_that_an_epoch_withdraws_falsely_is_found() -> None:
+    rescue = recorded(read_team(ROOT / "docs" / "examples" / "rescue"), ALL_FLY)
+    outcome = rescue.outcome
+    assert outcome is not None
+    assert replay(rescue).identical
+    first, *others = outcome.epochs
+    claimed = replace(outcome, epochs=(replace(first, withdrawn=("East",)), *others))
+    (found,) = replay(replace(rescue, outcome=claimed)).contradictions
+    assert (found.what, found.recorded, found.replayed) == ("epoch 0's withdrawn", ["East"], [])
+
+
 def test_a_solution_is_not_a_proof_that_there_is_none() -> None:
     solvable = recorded(read_team(ROOT / "docs" / "examples" / "scouts"), ALL_FLY)
     assert replay(solvable).identical

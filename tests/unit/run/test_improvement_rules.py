@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from robochoc.model.absence import DroppedConstraint
 from robochoc.model.outcome import Improvement, Verdict
 from robochoc.run.evaluation import PhaseAnswer
 from robochoc.run.improvement import Improvements, Rank
@@ -120,6 +121,14 @@ def test_after_a_loss_what_was_published_is_no_answer(bench: Bench) -> None:
     bench.tick(1.0, answer(5))
     final = bench.made.concluded(PhaseAnswer(Verdict.UNKNOWN), lost=True)
     assert (final.verdict, final.cost, len(final.improvements)) == (Verdict.UNKNOWN, None, 1)
+
+
+def test_dropped_constraints_belong_to_the_assignment(monkeypatch: pytest.MonkeyPatch) -> None:
+    dropped = (DroppedConstraint("C1", ("Robot1", "Robot2")),)
+    bench = Bench(monkeypatch)
+    bench.tick(1.0, answer(5, withdrawn=("Robot2",), dropped_constraints=dropped))
+    final = bench.made.concluded(PhaseAnswer(Verdict.UNKNOWN), lost=False)
+    assert (final.withdrawn, final.dropped_constraints) == (("Robot2",), dropped)
 
 
 def test_a_protocol_that_an_answer_refutes_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
