@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from numbers import Real
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -22,13 +24,41 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from robochoc.robots.sink import Fields
-from robochoc.ros.message_definitions import same_fields
 from robochoc.ros.waypoint_types import definition_of, short_kind
 from robochoc.system.errors import TransferableError
 
-Version = Literal[1, 2]
-"""ROS 1 or ROS 2."""
-
+DECIDE_REQUEST = """\
+string team
+string changes
+float64 timeout
+"""
+DECIDE_RESPONSE = """\
+bool success
+string message
+string verdict
+string cost
+string[] variables
+int64[] values
+string[] withdrawn
+string result
+"""
+SERVICE_TYPES: Mapping[str, str] = MappingProxyType(
+    {
+        "robochoc_msgs/Decide_Request": DECIDE_REQUEST,
+        "robochoc_msgs/Decide_Response": DECIDE_RESPONSE,
+        # ROS 2 gives a structure without fields this one.
+        "std_srvs/Trigger_Request": "uint8 structure_needs_at_least_one_member\n",
+        "std_srvs/Trigger_Response": "bool success\nstring message\n",
+    }
+)
+"""The two halves of each service, as the definitions of messages."""
+DEFINITION_MAX = 1 << 15
+"""Characters of a definition; those known here have some 5,000."""
+_LINE = re.compile(r"([A-Za-z][\w/]*)((?:<=\d+)?(?:\[[<=\d]*\])?)\s+([A-Za-z]\w*)\s*(=?)", re.ASCII)
+_SECTION = re.compile(r"MSG:\s*([\w/]+)\s*", re.ASCII)
+_OWN = re.compile(r"bool|byte|char|u?int(?:8|16|32|64)|float(?:32|64)|w?string|time|duration")
+_WELL_KNOWN = {"builtin_interfaces/Time", "builtin_interfaces/Duration"}
+"""Not every writer defines these."""
 _SECOND = 10**9
 _LARGEST_SINGLE = 3.4028235677973366e38
 _TIMES = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
@@ -41,6 +71,11 @@ _INTEGERS = {
 }
 _DAMAGE = (SerdeError, struct.error, ValueError, IndexError, OverflowError)
 
+
+Field = tuple[str, str]
+"""The type and the name of a field."""
+Version = Literal[1, 2]
+"""ROS 1 or ROS 2."""
 Make = Callable[[Any], Any]
 
 
@@ -156,7 +191,7 @@ class Types:
         short = short_kind(kind)
         name = short.replace("/", "/msg/", 1)
         if name not in self._store.fielddefs:
-            text = definition_of(kind)
+            text = SERVICE_TYPES.get(kind) or definition_of(kind)
             if not text:
                 problem = f"ROS {self.version} has no type {kind!r} that is known here"
                 raise UnknownTypeError(f"{problem}; its mapping can bring the definition (docs/guides/ros.md)")
@@ -341,3 +376,50 @@ def _whole(value: object) -> int:
         with suppress(TypeError):
             return operator.index(value)  # type: ignore[arg-type]  # that is the question
     raise _FieldError(f"must be a whole number, is {value!r}")
+
+
+def same_fields(kind: str, text: str, ours: str) -> bool:
+    """Return whether `text` gives `kind`, and the types of its fields, the same fields as `ours`."""
+    if len(text) > DEFINITION_MAX:
+        return False
+    theirs = _sections(kind, text)
+    expected = _sections(kind, ours)
+    return theirs.get(kind) is not None and all(
+        theirs.get(each, fields if each in _WELL_KNOWN else None) == fields for each, fields in expected.items()
+    )
+
+
+def _sections(kind: str, text: str) -> Mapping[str, list[Field] | None]:
+    """Return the fields of `kind`, and of each type that is defined behind it; None where a line is no field."""
+    found: dict[str, list[Field] | None] = {kind: []}
+    current = kind
+    for line in text.splitlines():
+        content = line.split("#", 1)[0].strip()
+        section = _SECTION.fullmatch(content)
+        if section:
+            current = _short(section[1])
+            found[current] = []
+        elif content and not content.startswith("=="):
+            _add(found, current, content)
+    return found
+
+
+def _add(found: dict[str, list[Field] | None], current: str, content: str) -> None:
+    fields, line = found[current], _LINE.match(content)
+    if fields is None or line is None:
+        found[current] = None
+    elif not line[4]:  # else it is a constant
+        fields.append((_qualified(line[1], current) + line[2], line[3]))
+
+
+def _qualified(kind: str, inside: str) -> str:
+    """Return a field's type with its package, which may be left out for those of its own, and for a header."""
+    if kind == "Header":
+        return "std_msgs/Header"
+    if "/" in kind or _OWN.fullmatch(kind):
+        return _short(kind)
+    return f"{inside.partition('/')[0]}/{kind}"
+
+
+def _short(kind: str) -> str:
+    return kind.replace("/msg/", "/")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import starmap
 
@@ -14,9 +15,12 @@ from robochoc.robots.closed_loop import TOGETHER_S, Feedback
 from robochoc.robots.inbox import MessageInbox, weight_of
 from robochoc.robots.source import REPORTS, ReceivedMessage, Source, SourceError
 from robochoc.ros.report_decoder import ReportDecoder
-from robochoc.ros.sim_clock import CLOCK, SimClock, with_clock
 from robochoc.ros.waypoint_types import short_kind
 
+CLOCK = "/clock"
+CLOCK_KIND = "rosgraph_msgs/Clock"
+_BILLION = 1_000_000_000
+_SECONDS = range(1 << 31)
 PATIENCE_S = 10.0
 """The default time to wait for reports of a live source after a decision, in seconds."""
 _NOTES_MAX = 12
@@ -175,3 +179,36 @@ class SourceFeedback(Feedback):
             report = self._decoder.report(received)
             if report is not None:
                 return report
+
+
+class SimClock:
+    """The time of a simulation: the last one that came on `/clock`."""
+
+    now_ns: int | None = None
+    """In nanoseconds; None before the first message."""
+
+    def takes(self, received: ReceivedMessage) -> bool:
+        """Return whether `received` came on `/clock`. What it says is the time now, unless it is no time."""
+        if received.topic != CLOCK:
+            return False
+        found = _nanoseconds(received.fields.get("clock"))
+        self.now_ns = self.now_ns if found is None else found
+        return True
+
+
+def _nanoseconds(value: object) -> int | None:
+    """Return a time in nanoseconds; None for what is none. A rosbridge sends seconds and nanoseconds apart."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value if value // _BILLION in _SECONDS else None
+    match value:
+        case {"secs": int(seconds), "nsecs": int(rest)} | {"sec": int(seconds), "nanosec": int(rest)} if (
+            seconds in _SECONDS and 0 <= rest < _BILLION
+        ):
+            return seconds * _BILLION + rest
+        case _:
+            return None
+
+
+def with_clock(topics: Mapping[str, str]) -> dict[str, str]:
+    """Return `topics` and that of the clock."""
+    return {**topics, CLOCK: CLOCK_KIND}

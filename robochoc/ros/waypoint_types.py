@@ -19,7 +19,6 @@ from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.sink import Fields
 from robochoc.robots.waypoint import Waypoint
-from robochoc.ros.service_types import SERVICE_TYPES
 from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
 
 GROUP = "robochoc.waypoints"
@@ -102,9 +101,7 @@ def _meant(kind: str) -> str:
 
 
 def definition_of(kind: str) -> str:
-    """Return the definition of `kind` that an installed package brings, or of a service; empty if there is none."""
-    if kind in SERVICE_TYPES:
-        return SERVICE_TYPES[kind]
+    """Return the definition of `kind` that an installed package brings; empty if there is none."""
     try:
         found = mapping_for(kind)
     except NoMappingError:

@@ -21,8 +21,7 @@ from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
 from robochoc.ros.live import rmw_zenoh_session
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX
 from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, sender
-from robochoc.ros.live.rmw_zenoh_service import RmwZenohServices
-from robochoc.ros.live.service_hashes import service_hash
+from robochoc.ros.live.rmw_zenoh_service import RmwZenohServices, service_hash
 from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.message_types import UnknownTypeError, types_of
 from tests.support.cases import looped

@@ -15,8 +15,7 @@ from click.testing import CliRunner
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from robochoc.cli.group import cli
-from robochoc.ros.message_types import types_of
-from robochoc.ros.service_types import DECIDE_REQUEST, DECIDE_RESPONSE
+from robochoc.ros.message_types import DECIDE_REQUEST, DECIDE_RESPONSE, types_of
 from tests.support.program import ROOT
 
 PACKAGES = ROOT / "docs" / "ros2"

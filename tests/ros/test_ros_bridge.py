@@ -21,8 +21,7 @@ from robochoc.robots.sink import SinkError
 from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.live import rosbridge_connection
 from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
-from robochoc.ros.live.rosbridge_connection import RosbridgeAddress
-from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
+from robochoc.ros.live.rosbridge_connection import MalformedMessageError, RosbridgeAddress, incoming, outgoing
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.fake_servers import fake_server

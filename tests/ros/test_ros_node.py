@@ -14,9 +14,9 @@ import pytest
 
 from robochoc.robots.sink import SinkError
 from robochoc.robots.source import SourceError
-from robochoc.ros.live import ros_master
-from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
-from robochoc.ros.live.rospy_node import RospySink, RospySource
+from robochoc.ros.live import rospy_node
+from robochoc.ros.live.rospy_node import RospySink, RospySource, fields_of, filled
+from robochoc.ros.live.transport import message_class
 from tests.support.cases import looped
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S
@@ -26,7 +26,7 @@ from tests.support.limits import HANG_S
 def _rospy(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that can be imported, and would fail if anybody used it."""
     monkeypatch.setitem(sys.modules, "rospy", ModuleType("rospy"))
-    monkeypatch.setattr(ros_master, "MASTER_S", HANG_S)
+    monkeypatch.setattr(rospy_node, "MASTER_S", HANG_S)
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_nobody_listens(listener: socket.socket) -> None:
 
 @pytest.mark.usefixtures("_rospy", "listener")
 def test_a_master_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ros_master, "MASTER_S", 0.1)
+    monkeypatch.setattr(rospy_node, "MASTER_S", 0.1)
     with pytest.raises(SourceError, match=r"no ROS master answers .* \(timed out\); start `roscore`"):
         RospySource("")
 

@@ -17,7 +17,7 @@ from robochoc.cli.group import cli
 from robochoc.robots.connections import open_source
 from robochoc.robots.source import ReceivedMessage
 from robochoc.ros.recordings.mcap_file import McapSink
-from robochoc.ros.sim_clock import CLOCK, CLOCK_KIND
+from robochoc.ros.source_feedback import CLOCK, CLOCK_KIND
 from tests.support import rclpy_stand_in
 from tests.support.dds import LOOPBACK_ALONE, free_domain
 from tests.support.program import ROOT

@@ -19,9 +19,8 @@ from click.testing import CliRunner
 from robochoc.cli.group import cli
 from robochoc.robots.sink import SinkError
 from robochoc.robots.source import ReceivedMessage, SourceError
-from robochoc.ros.live import rclpy_node, subscribers
-from robochoc.ros.live.rclpy_messages import fields_of, filled
-from robochoc.ros.live.rclpy_node import MESSAGE_BYTES_MAX, RclpyNode, RclpySink, RclpySource
+from robochoc.ros.live import rclpy_node, transport
+from robochoc.ros.live.rclpy_node import MESSAGE_BYTES_MAX, RclpyNode, RclpySink, RclpySource, fields_of, filled
 from tests.support import rclpy_stand_in
 from tests.support.cases import looped
 from tests.support.dds import LOOPBACK_ALONE
@@ -46,7 +45,7 @@ def pose(number: int) -> dict[str, Any]:
 def _rclpy(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     monkeypatch.setattr(rclpy_node, "LINGER_S", 0.0)
-    monkeypatch.setattr(subscribers, "SETTLE_S", 0.0)
+    monkeypatch.setattr(transport, "SETTLE_S", 0.0)
     monkeypatch.setattr(rclpy_node, "WAIT_S", HANG_S)
     rclpy_stand_in.install(monkeypatch)
     yield

@@ -14,7 +14,7 @@ import pytest
 from robochoc.robots.source import REPORTS
 from robochoc.ros.message_types import FieldType, types_of
 from robochoc.ros.names import TEAM_TOPICS
-from robochoc.ros.sim_clock import CLOCK_KIND
+from robochoc.ros.source_feedback import CLOCK_KIND
 from robochoc.ros.waypoint_types import kinds
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT

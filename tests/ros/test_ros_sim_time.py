@@ -14,8 +14,7 @@ from robochoc.robots.connections import open_source
 from robochoc.robots.source import ReceivedMessage, SourceError
 from robochoc.ros.recordings.mcap_file import McapSink
 from robochoc.ros.report_decoder import ReportDecoder
-from robochoc.ros.sim_clock import CLOCK, CLOCK_KIND, SimClock
-from robochoc.ros.source_feedback import SourceFeedback
+from robochoc.ros.source_feedback import CLOCK, CLOCK_KIND, SimClock, SourceFeedback
 from robochoc.run import Options, Runtime, solve
 from tests.support.cases import looped
 from tests.support.example_teams import hangar

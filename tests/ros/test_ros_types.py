@@ -11,8 +11,15 @@ from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
 from robochoc.robots.source import REPORTS
-from robochoc.ros.message_definitions import DEFINITION_MAX, same_fields
-from robochoc.ros.message_types import FieldsError, FieldType, UnknownTypeError, Version, types_of
+from robochoc.ros.message_types import (
+    DEFINITION_MAX,
+    FieldsError,
+    FieldType,
+    UnknownTypeError,
+    Version,
+    same_fields,
+    types_of,
+)
 from tests.support.cases import looped
 
 POSE = "geometry_msgs/PoseStamped"

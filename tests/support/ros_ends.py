@@ -8,7 +8,7 @@ from robochoc.model.problem import Team
 from robochoc.robots.closed_loop import drones_of
 from robochoc.robots.sink import Fields, Sink
 from robochoc.robots.source import ReceivedMessage, Source
-from robochoc.ros.sink_publisher import SinkPublisher
+from robochoc.ros.publisher import SinkPublisher
 
 SECOND = 1_000_000_000
 

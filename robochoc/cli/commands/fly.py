@@ -94,7 +94,7 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flight
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line
     from robochoc.robots.mission_publisher import publish_flight
-    from robochoc.ros.sink_publisher import SinkPublisher
+    from robochoc.ros.publisher import SinkPublisher
 
     conditions = conditions_of(given, mission)
     with ros_errors_as_failures(), ExitStack() as stack:

@@ -140,7 +140,7 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
     from robochoc.flight.mission import check_scale
     from robochoc.robots.closed_loop import ClosedLoop, drones_of
     from robochoc.robots.situation import BATTERY
-    from robochoc.ros.sink_publisher import SinkPublisher
+    from robochoc.ros.publisher import SinkPublisher
 
     with (
         flight_errors_as_failures() if ros.situation == FLIGHT else nullcontext(),
@@ -201,7 +201,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
     import time
 
     from robochoc.robots.single_robot import drones_of_robot, leg_of_robot
-    from robochoc.ros.sink_publisher import SinkPublisher
+    from robochoc.ros.publisher import SinkPublisher
 
     refuse_same_places({}, more_outputs=sink_places(texts))
     with ros_errors_as_failures(), ExitStack() as stack:

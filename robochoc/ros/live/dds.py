@@ -14,8 +14,7 @@ from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import SourceError
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.subscribers import await_subscribers
-from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource
+from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource, await_subscribers
 from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
 from robochoc.ros.names import is_for_waypoints
 

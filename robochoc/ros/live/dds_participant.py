@@ -1,4 +1,4 @@
-"""A participant of a DDS domain. This module, `dds_subscription` and `dds_types` alone know Cyclone DDS (cyclonedds).
+"""A participant of a DDS domain. This module and `dds_types` alone know Cyclone DDS (cyclonedds).
 
 A process has each domain once. A sink and a source of the same domain share it; the last that leaves closes it.
 """
@@ -9,11 +9,21 @@ import os
 import secrets
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from cyclonedds.core import DDSException, Policy, Qos
+from cyclonedds.core import (
+    DDSException,
+    GuardCondition,
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.internal import load_cyclonedds
 from cyclonedds.pub import DataWriter, Publisher
@@ -21,11 +31,16 @@ from cyclonedds.sub import DataReader, Subscriber
 from cyclonedds.topic import Topic
 
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.dds_subscription import Subscription
 from robochoc.ros.live.dds_types import raw_service_type, raw_type, topic_name
-from robochoc.ros.live.ros_master import Failed
+from robochoc.ros.live.transport import Failed
 from robochoc.ros.message_types import UnknownTypeError, types_of
 
+END_S = 5.0
+"""The longest wait for the thread, in seconds."""
+_TAKEN = 100
+"""Messages taken of a topic at a time."""
+_WAIT_NS = 1_000_000_000
+_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
 MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages are neither sent nor received: waypoints and reports are short."""
@@ -223,6 +238,61 @@ class ServiceEnd:
         """Take no more requests."""
         if self._subscription is not None:
             self._subscription.close()
+
+
+class Subscription:
+    """Takes messages from `readers`, each with its topic and its type, and hands over their bytes, until it is closed.
+
+    Raises:
+        DDSException: The participant cannot wait for messages.
+    """
+
+    def __init__(
+        self,
+        participant: DomainParticipant,
+        readers: Sequence[tuple[DataReader[Any], str, str]],
+        take: Callable[[str, str, bytes], None],
+    ) -> None:
+        self._take = take
+        self._over = threading.Event()
+        self._wakes: Any = GuardCondition(participant)
+        self._waits: Any = WaitSet(participant)
+        self._waits.attach(self._wakes)
+        self._readers = [*readers]
+        for reader, _, _ in readers:
+            self._waits.attach(ReadCondition(reader, _ANY))
+        self._thread = threading.Thread(target=self._run, daemon=True, name="DDS subscription")
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            with suppress(DDSException):
+                self._waits.wait(_WAIT_NS)
+            for reader, topic, kind in self._readers:
+                if self._over.is_set():
+                    return
+                self._take_from(reader, topic, kind)
+
+    def _take_from(self, reader: DataReader[Any], topic: str, kind: str) -> None:
+        while not self._over.is_set():
+            try:
+                found = reader.take(_TAKEN)
+            except DDSException:
+                return
+            for message in found:
+                if message.sample_info.valid_data:
+                    self._take(topic, kind, message.content)
+            if len(found) < _TAKEN:
+                return
+
+    def close(self) -> None:
+        """End the thread and the subscription."""
+        self._over.set()
+        with suppress(DDSException):
+            self._wakes.set(True)
+        self._thread.join(END_S)
+        self._waits = self._wakes = None
+        self._readers.clear()
 
 
 def _partitions(quality: Quality) -> Any:  # noqa: ANN401 - the library's

@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.ros2_names import DOMAIN_MAX, domain_id
-from robochoc.ros.live.ros_master import Failed
+from robochoc.ros.live.transport import Failed
 
 DEPTHS = range(1, 1001)
 WAIT_S_MAX = 600.0

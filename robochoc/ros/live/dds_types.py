@@ -1,4 +1,4 @@
-"""DDS types of ROS types. The bytes of messages are those of `recordings/types.py`: DDS only carries them.
+"""DDS types of ROS types. The bytes of messages are those of `message_types.py`: DDS only carries them.
 
 ROS 2 publishes `/a/b` on the DDS topic `rt/a/b`, and `geometry_msgs/PoseStamped` as the DDS type
 `geometry_msgs::msg::dds_::PoseStamped_`. The description of a type is for those that ask for it, such as

@@ -1,6 +1,6 @@
 """rclpy: a node of ROS 2 in this process, where rclpy can be imported: it comes with a ROS 2, for that ROS's Python.
 
-rclpy is untyped; this module, `rclpy_messages` and `rclpy_service` alone know it. Each sink and each source
+rclpy is untyped; this module and `rclpy_service` alone know it. Each sink and each source
 has a context and a node of its own, so that what else uses rclpy in this process is left alone. The domain, the
 middleware and its network are rclpy's own business: `ROS_DOMAIN_ID`, `RMW_IMPLEMENTATION` and the like.
 """
@@ -23,14 +23,23 @@ from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.robots.inbox import PER_TOPIC_MAX
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import SourceError
-from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.ros2_names import domain_id
-from robochoc.ros.live.ros_master import Failed
-from robochoc.ros.live.rospy_messages import message_class
-from robochoc.ros.live.subscribers import await_subscribers
-from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource
+from robochoc.ros.live.transport import (
+    LINGER_S,
+    STUCK_S,
+    Failed,
+    LiveSink,
+    LiveSource,
+    await_subscribers,
+    message_class,
+)
 from robochoc.ros.names import is_for_waypoints
 
+_NANO = 1_000_000_000
+_TIMES = ("builtin_interfaces/Time", "builtin_interfaces/Duration")
+_FLOATS = ("double", "float")
+_ELEMENT = re.compile(r"(?:sequence<)?([\w/]+(?:<\d+>)?)")
+"""The type of an element: of `sequence<double>`, `sequence<geometry_msgs/Pose, 3>`, `float[36]` or `string<10>`."""
 WAIT_S = 2.0
 """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
 BLOCKED_S = 0.2
@@ -41,10 +50,8 @@ MESSAGE_BYTES_MAX = 256 * 1024
 """A longer message is ignored: reports are short."""
 INSTALLED = Path("/opt/ros")
 """Where a ROS 2 is installed by its packages."""
-
 OLDEST_PYTHON = (3, 11)
 """robochoc runs on none that is older."""
-
 _WRONG_FIELDS = (ValueError, TypeError, AttributeError, AssertionError, OverflowError)
 _PYTHON = re.compile(r"python(\d+\.\d+)")
 
@@ -121,21 +128,6 @@ class RclpyNode:
             with suppress(Exception):  # it may be shut down already
                 node.destroy_node()
         self.context.try_shutdown()
-
-
-def _advice() -> str:
-    """Return what to do where rclpy cannot be imported."""
-    ours = f"{sys.version_info.major}.{sys.version_info.minor}"
-    for entry in sys.path:
-        found = _PYTHON.search(entry)
-        if found and found[1] != ours and Path(entry, "rclpy").is_dir():
-            problem = f"the ROS 2 that was sourced is for Python {found[1]}, and this is Python {ours}"
-            if tuple(map(int, found[1].split("."))) < OLDEST_PYTHON:
-                return f"{problem}; robochoc needs 3.11: use dds, which needs no ROS here"
-            return f"{problem}: install robochoc for Python {found[1]}, or use dds, which needs no ROS here"
-    there = sorted(INSTALLED.glob("*/setup.bash"))
-    setup = there[-1] if there else INSTALLED / "DISTRO" / "setup.bash"
-    return f"source {setup} first, or use dds, which needs no ROS here"
 
 
 class RclpySink(LiveSink):
@@ -276,6 +268,72 @@ class RclpySource(LiveSource):
         except Exception:  # noqa: BLE001 - bytes that are no message are ignored
             return
         self._put(topic, kind, fields)
+
+
+def _advice() -> str:
+    """Return what to do where rclpy cannot be imported."""
+    ours = f"{sys.version_info.major}.{sys.version_info.minor}"
+    for entry in sys.path:
+        found = _PYTHON.search(entry)
+        if found and found[1] != ours and Path(entry, "rclpy").is_dir():
+            problem = f"the ROS 2 that was sourced is for Python {found[1]}, and this is Python {ours}"
+            if tuple(map(int, found[1].split("."))) < OLDEST_PYTHON:
+                return f"{problem}; robochoc needs 3.11: use dds, which needs no ROS here"
+            return f"{problem}: install robochoc for Python {found[1]}, or use dds, which needs no ROS here"
+    there = sorted(INSTALLED.glob("*/setup.bash"))
+    setup = there[-1] if there else INSTALLED / "DISTRO" / "setup.bash"
+    return f"source {setup} first, or use dds, which needs no ROS here"
+
+
+def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are untyped
+    """Return `message` with these fields. Raises `ValueError` for a field that it does not have."""
+    kinds = message.get_fields_and_field_types()
+    for name, value in fields.items():
+        if name not in kinds:
+            raise ValueError(f"{type(message).__name__} has no field {name!r}, only: {', '.join(kinds)}")
+        kind = kinds[name]
+        if isinstance(value, Mapping):
+            filled(getattr(message, name), value)
+        elif isinstance(value, list | tuple):
+            setattr(message, name, [_converted(_element(kind), one) for one in value])
+        else:
+            setattr(message, name, _converted(kind, value))
+    return message
+
+
+def _converted(kind: str, value: Any) -> Any:  # noqa: ANN401 - a field is anything
+    if kind in _TIMES:
+        made = message_class(kind, SinkError, "rclpy")()
+        made.sec, made.nanosec = divmod(value, _NANO)
+        return made
+    if isinstance(value, Mapping):
+        return filled(message_class(kind, SinkError, "rclpy")(), value)
+    if kind in _FLOATS:
+        return float(value)
+    return bytes([value & 0xFF]) if kind == "octet" else value
+
+
+def _element(kind: str) -> str:
+    found = _ELEMENT.match(kind)
+    return found[1] if found else kind
+
+
+def fields_of(message: Any) -> dict[str, Any]:  # noqa: ANN401 - messages are untyped
+    """Return the fields of a message of rclpy."""
+    kinds = message.get_fields_and_field_types()
+    return {name: _plain(getattr(message, name), _element(kind)) for name, kind in kinds.items()}
+
+
+def _plain(value: Any, kind: str) -> Any:  # noqa: ANN401 - a field is anything
+    if kind == "octet" and isinstance(value, bytes):
+        return int.from_bytes(value, "big", signed=True)
+    if kind in _TIMES:
+        return int(value.sec) * _NANO + int(value.nanosec)
+    if hasattr(value, "get_fields_and_field_types"):
+        return fields_of(value)
+    if hasattr(value, "tolist"):  # numpy's and Python's arrays
+        return value.tolist()
+    return [_plain(one, kind) for one in value] if isinstance(value, list | tuple) else value
 
 
 def _said(error: Exception) -> str:

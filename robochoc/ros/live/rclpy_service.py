@@ -11,10 +11,9 @@ from functools import partial
 from typing import Any
 
 from robochoc.robots.sink import Fields, SinkError
-from robochoc.ros.live.rclpy_messages import fields_of, filled
-from robochoc.ros.live.rclpy_node import BLOCKED_S, END_S, RclpyNode
-from robochoc.ros.live.rospy_messages import message_class
+from robochoc.ros.live.rclpy_node import BLOCKED_S, END_S, RclpyNode, fields_of, filled
 from robochoc.ros.live.services import ENDED, AtOnce, Refuse, Request, Services
+from robochoc.ros.live.transport import message_class
 
 
 class RclpyServices(Services):

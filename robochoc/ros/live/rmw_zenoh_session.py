@@ -22,10 +22,9 @@ import zenoh.ext
 
 from robochoc.communication.network.zenoh_config import config
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.in_time import succeeds_in_time
 from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, gid_of, sender
 from robochoc.ros.live.ros2_names import domain_id
-from robochoc.ros.live.ros_master import Failed
+from robochoc.ros.live.transport import Failed, succeeds_in_time
 
 PORT = 7447
 """The default port of a zenoh router."""

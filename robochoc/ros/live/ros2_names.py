@@ -6,7 +6,7 @@ import os
 import re
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.ros_master import Failed
+from robochoc.ros.live.transport import Failed
 from robochoc.ros.waypoint_types import short_kind
 
 DOMAIN_MAX = 232

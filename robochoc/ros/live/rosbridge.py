@@ -8,8 +8,7 @@ from typing import Any
 
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import SourceError
-from robochoc.ros.live.rosbridge_connection import Connection
-from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
+from robochoc.ros.live.rosbridge_connection import Connection, MalformedMessageError, incoming, outgoing
 from robochoc.ros.live.transport import LiveSink, LiveSource
 
 _LOOK_EVERY = 100

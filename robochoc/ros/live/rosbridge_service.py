@@ -8,8 +8,7 @@ from functools import partial
 from typing import Any
 
 from robochoc.robots.sink import Fields, SinkError
-from robochoc.ros.live.rosbridge_connection import Connection
-from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
+from robochoc.ros.live.rosbridge_connection import Connection, MalformedMessageError, incoming, outgoing
 from robochoc.ros.live.services import AtOnce, Refuse, Request, Services, known_fields
 
 

@@ -1,37 +1,42 @@
 """rospy: a node of ROS 1 in this process, where rospy can be imported. It is on no package index.
 
-rospy is untyped; this module and `rospy_messages` alone know it. A process has one node and keeps it: rospy can make no
+rospy is untyped; this module alone knows it. A process has one node and keeps it: rospy can make no
 other. rospy waits forever where there is no master, so a sink or a source asks for the master first.
 """
 
 from __future__ import annotations
 
 import contextlib
+import http.client
 import importlib
 import logging
+import os
 import queue
 import threading
 import time
 import warnings
+import xmlrpc.client
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any
+from xml.parsers.expat import ExpatError
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import SourceError
-from robochoc.ros.live.in_time import succeeds_in_time
-from robochoc.ros.live.ros_master import Failed, RosMaster
-from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
-from robochoc.ros.live.transport import LINGER_S, STUCK_S, LiveSink, LiveSource
+from robochoc.ros.live.transport import LINGER_S, STUCK_S, Failed, LiveSink, LiveSource, message_class, succeeds_in_time
 
+_NANO = 1_000_000_000
+MASTER_S = 3.0
+"""The longest wait for an answer of the master, in seconds."""
+_DEFAULT_MASTER = "http://localhost:11311"
+_CALLER = "/robochoc"
 NODE_S = 15.0
 """The longest wait for the registration of our node or its topics, in seconds."""
 GATHER_S = 5.0
 """The longest wait for subscribers that the master lists, in seconds. It may list some that no longer exist."""
 _WAITING = 10_000
 """Messages that wait to be sent before `publish` waits, too."""
-
 _lock = threading.Lock()
 
 
@@ -222,3 +227,85 @@ class RospySource(LiveSource):
 
     def _receive(self, topic: str, kind: str, message: Any) -> None:  # noqa: ANN401 - messages are untyped
         self._put(topic, kind, fields_of(message))
+
+
+class RosMaster:
+    """The ROS master that `ROS_MASTER_URI` names. Methods raise `failed` if it does not answer."""
+
+    def __init__(self, failed: Failed) -> None:
+        self._failed = failed
+        self.uri = os.environ.get("ROS_MASTER_URI", _DEFAULT_MASTER)
+
+    def check(self) -> None:
+        """Raise `failed` if no master answers."""
+        self._ask("getPid")
+
+    def subscribers(self) -> dict[str, set[str]]:
+        """Return the nodes that have subscribed to each topic."""
+        match self._ask("getSystemState"):
+            case [_, list(subscribed), _]:
+                return {topic: set(nodes) for topic, nodes in subscribed}
+            case answer:
+                raise self._failed(
+                    f"what answers at {self.uri} is not a ROS master: {shortened(on_one_line(str(answer)))}"
+                )
+
+    def _ask(self, what: str) -> object:
+        try:
+            with xmlrpc.client.ServerProxy(self.uri, transport=_TransportWithTimeout()) as server:
+                match getattr(server, what)(_CALLER):
+                    case [1, _, answer]:
+                        return answer
+                    case answer:
+                        said = shortened(on_one_line(str(answer)))
+                        raise self._failed(f"the ROS master at {self.uri} refuses, it says: {said}; see its log")
+        except (OSError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:
+            why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            message = f"no ROS master answers at {self.uri} ({shortened(on_one_line(why))})"
+            raise self._failed(f"{message}; start `roscore`, or set ROS_MASTER_URI") from error
+
+
+class _TransportWithTimeout(xmlrpc.client.Transport):
+    """A transport that does not wait forever."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:  # noqa: ANN401 - typeshed's is private
+        connection = super().make_connection(host)
+        connection.timeout = MASTER_S
+        return connection
+
+
+def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are untyped
+    """Return `message` with these fields. Raises `ValueError` for a field that it does not have."""
+    for name, value in fields.items():
+        if name not in message.__slots__:
+            raise ValueError(f"{message._type} has no field {name!r}, only: {', '.join(message.__slots__)}")  # noqa: SLF001
+        now = getattr(message, name)
+        match value:
+            case Mapping():
+                filled(now, value)
+            case int() if hasattr(now, "nsecs"):
+                now.secs, now.nsecs = divmod(value, _NANO)
+            case list() | tuple() if value and isinstance(value[0], Mapping):
+                setattr(message, name, [filled(_element(message, name), one) for one in value])
+            case _:
+                setattr(message, name, value)
+    return message
+
+
+def _element(message: Any, name: str) -> Any:  # noqa: ANN401 - messages are untyped
+    """Return a new element of an array field."""
+    kind = message._slot_types[message.__slots__.index(name)]  # noqa: SLF001 - genpy's way to say it
+    return message_class(kind.partition("[")[0], SinkError)()
+
+
+def fields_of(message: Any) -> dict[str, Any]:  # noqa: ANN401 - messages are untyped
+    """Return the fields of a rospy message, without `seq`: ROS 1 counts it by itself, ROS 2 has none."""
+    return {name: _plain(getattr(message, name)) for name in message.__slots__ if name != "seq"}
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - a field is anything
+    if hasattr(value, "nsecs"):
+        return value.to_nsec()
+    if hasattr(value, "_slot_types"):
+        return fields_of(value)
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value

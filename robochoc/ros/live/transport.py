@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import importlib
+import re
 import threading
 import time
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from types import ModuleType
+from typing import Any
 
+from robochoc.formats.diagnostics import shortened
 from robochoc.robots.inbox import MessageInbox, weight_of
-from robochoc.robots.sink import Fields, Sink
-from robochoc.robots.source import ReceivedMessage, Source
+from robochoc.robots.sink import Fields, Sink, SinkError
+from robochoc.robots.source import ReceivedMessage, Source, SourceError
 
 STUCK_S = 10.0
 """The longest time for which a subscriber may leave messages unread or unacknowledged, in seconds."""
 LINGER_S = 0.3
 """Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
+SETTLE_S = 0.3
+"""No new subscriber has come for so many seconds: then all are there."""
+_TYPE = re.compile(r"([a-z][a-z0-9_]*)/([A-Za-z][A-Za-z0-9_]*)")
+
+Failed = type[SinkError] | type[SourceError]
 
 
 class LiveSink(Sink):
@@ -69,3 +79,50 @@ class LiveSource(Source):
         """Store a message that has just arrived."""
         received = ReceivedMessage(topic, kind, fields, time.time_ns())
         self._inbox.put(received, weight_of(fields) if weight is None else weight)
+
+
+def await_subscribers(counts: Callable[[], Sequence[int]], wait_s: float) -> None:
+    """Wait until each topic has a subscriber and no more come.
+
+    Args:
+        counts: Returns the number of subscribers of each topic.
+        wait_s: The longest wait, in seconds.
+    """
+    until = time.monotonic() + wait_s
+    before, since, pause_s = 0, time.monotonic(), 0.01
+    while time.monotonic() < until:
+        found = counts()
+        now = time.monotonic()
+        if sum(found) != before:
+            before, since = sum(found), now
+        if all(found) and now - since >= SETTLE_S:
+            return
+        time.sleep(pause_s)
+        pause_s = min(2 * pause_s, 0.1)
+
+
+def succeeds_in_time(work: Callable[[], object], limit_s: float) -> bool:
+    """Return whether `work` succeeds within `limit_s` seconds. Its thread may be left behind; signals are heard."""
+    problems: list[Exception] = []
+
+    def watched() -> None:
+        try:
+            work()
+        except Exception as problem:  # noqa: BLE001 - the caller learns that it failed
+            problems.append(problem)
+
+    doing = threading.Thread(target=watched, daemon=True, name="asks a library")
+    doing.start()
+    doing.join(limit_s)
+    return not doing.is_alive() and not problems
+
+
+def message_class(kind: str, failed: Failed, library: str = "rospy") -> Any:  # noqa: ANN401 - messages are untyped
+    """Return `library`'s class of the ROS type `kind`, also in ROS 2's spelling with `/msg/`. Raises `failed`."""
+    found = _TYPE.fullmatch(kind.replace("/msg/", "/"))
+    try:
+        package: ModuleType = importlib.import_module(f"{found[1]}.msg" if found else "")
+        return getattr(package, found[2] if found else "")
+    except (ImportError, AttributeError, ValueError) as missing:
+        where = f"install the package {found[1]!r} for Python" if found else "expected PACKAGE/TYPE"
+        raise failed(f"{library} knows no message type {shortened(kind)!r}; {where}") from missing

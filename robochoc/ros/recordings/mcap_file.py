@@ -29,11 +29,11 @@ from robochoc.ros.recordings.recording import (
     ChunkedRecording,
     RecordedChannel,
     RecordingDamagedError,
+    RecordingSink,
     as_it_is,
     from_lz4,
     inside,
 )
-from robochoc.ros.recordings.recording_sink import RecordingSink
 from robochoc.ros.waypoint_types import short_kind
 
 NAMES = "robochoc:names"

@@ -24,10 +24,10 @@ from robochoc.ros.recordings.recording import (
     ChunkedRecording,
     RecordedChannel,
     RecordingDamagedError,
+    RecordingSink,
     as_it_is,
     from_lz4,
 )
-from robochoc.ros.recordings.recording_sink import RecordingSink
 from robochoc.ros.waypoint_types import short_kind
 
 _CALLER = "/robochoc"
