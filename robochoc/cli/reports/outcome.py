@@ -26,7 +26,7 @@ _MOST_DROPPED = 3
 """The maximum number of dropped constraints in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 _ONLY, _NONE = "task", "none"
-"""A robot with at most one task has one variable, whose first value is none (`formats/dialects/task_list`)."""
+"""A robot with at most one task has one variable, whose first value is none (`formats/dialects/tasks`)."""
 
 
 def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None) -> str:

@@ -1,14 +1,30 @@
-"""toulbar2's `.cfn`."""
+"""toulbar2's `.cfn`: JSON with fewer signs (toulbar2's documentation, "CFN format").
+
+Quotes, commas and colons only separate; braces and brackets are the same; without tags the order says what is what.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
-from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
-from robochoc.formats.dialects.toulbar2.cfn_reader import read as read_text
-from robochoc.formats.dialects.toulbar2.text import has_suffix, read_with
-from robochoc.formats.dialects.toulbar2.writer import cfn
+from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
+from robochoc.formats.diagnostics import shortened, suggestion
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
+from robochoc.formats.dialects.tables import Amount, CostTable
+from robochoc.formats.dialects.tabulation import decimal, maximises
+from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, TeamCosts, imported, team_costs
+from robochoc.formats.dialects.toulbar2.text import Reader, Words, has_suffix, read_with, read_words
+from robochoc.model.constraint import INFINITE, Domain
+from robochoc.model.problem import Team
+from robochoc.system.plain_text import counted
+
+_TOKEN = re.compile(r'[{}\[\]]|[^{}\[\]\s":,]+')
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
@@ -18,7 +34,316 @@ def recognises(path: Path, beginning: bytes) -> bool:
 
 def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     """Return the problem in a file. Raises `InvalidInputError`."""
-    return read_with(paths, options, read_text)
+    return read_with(paths, options, _read_text)
 
 
-DIALECT = Dialect("cfn", "toulbar2's cfn", recognises, read, cfn)
+def _read_text(text: str, stem: str, options: ImportOptions) -> Imported:
+    """Return the problem in the `text` of a file. Raises `MistakeError`."""
+    network = read_words(_words(text), lambda source: _CfnReader(source, stem).network())
+    return imported(network, options, "cfn")
+
+
+def _words(text: str) -> Words:
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.startswith("#"):
+            for match in _TOKEN.finditer(line.split("//", 1)[0]):
+                yield number, match[0]
+
+
+class _CfnReader:
+    def __init__(self, reader: Reader, stem: str) -> None:
+        self._in = reader
+        self._stem = stem
+        self._tagged = False
+        self._variables: dict[str, int | tuple[str, ...]] = {}
+        self._names: list[str] = []
+        self._known: dict[str, int] = {}
+        self._tables: dict[str, CostTable] = {}
+        self._functions: list[CostFunction] = []
+        self._shared: list[tuple[int, str]] = []
+        self._places = 0
+        self._truncated = False
+
+    def network(self) -> Network:
+        """Return the network in the file. Raises `MistakeError`."""
+        name, bound, maximize = self._header()
+        self._read_variables()
+        self._tag("functions")
+        self._open("the functions")
+        while not _closes(word := self._in.word("a function, or '}'")):
+            self._read_function(word)
+        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 may omit it
+            self._in.refuse(f"'{shortened(last)}' where the problem should end", "write } or ]")
+        for place, wanted in self._shared:
+            self._functions[place] = self._sharing(self._functions[place], wanted)
+        notes: tuple[Note, ...] = ()
+        if self._truncated:
+            text = f"costs are cut to {counted(self._places, 'decimal place')} as mustbe has, which toulbar2 does too"
+            notes = (Note("truncated", text),)
+        return Network(_title(name, self._stem), self._variables, self._functions, bound, maximize, notes)
+
+    def _header(self) -> tuple[str, Amount, bool]:
+        self._open("the problem")
+        word = self._in.word("'problem'")
+        if word == "problem":
+            self._tagged = True
+            word = self._in.word("'{'")
+        if not _opens(word):
+            self._in.refuse(f"'{shortened(word)}' where '{{' should stand", 'write { "problem": { "name": ...')
+        self._tag("name")
+        name = self._in.word("the problem's name")
+        self._tag("mustbe")
+        word = self._in.word("the bound")
+        if word[0] not in "<>" or word[1:] == "inf":
+            self._in.refuse(f"the bound '{shortened(word)}'", "write <100.00 to minimise, or >-100.00 to maximise")
+        self._places = len(word.partition(".")[2])
+        bound = self._in.amount(word[1:])
+        self._close("the problem")
+        return name, bound, word[0] == ">"
+
+    def _read_variables(self) -> None:
+        self._tag("variables")
+        self._open("the variables")
+        while not _closes(word := self._in.word("a variable")):
+            if _opens(word) or word[0].isdigit() or word[0] == "-":
+                name = f"x{len(self._names)}"
+            else:
+                name, word = word, self._in.word("a domain")
+            if name in self._variables:
+                self._in.refuse(f"a second variable '{shortened(name)}'", "names are unique: rename one of them")
+            self._variables[name] = self._domain(word)
+            self._known[name] = len(self._names)
+            self._names.append(name)
+        if not self._names:
+            self._in.refuse("there are no variables", 'write "variables": {"x": 2}')
+
+    def _domain(self, word: str) -> int | tuple[str, ...]:
+        if not _opens(word):
+            size = abs(self._in.as_integer(word, "a domain or its size"))
+            if not 0 < size <= MAX_VALUES:
+                self._in.refuse(f"a domain of {size} values", f"from 1 to {MAX_VALUES}")
+            return size
+        values: dict[str, None] = {}
+        while not _closes(one := self._in.word("a value")):
+            if one in values or _opens(one):
+                self._in.refuse(f"'{shortened(one)}' where another value should stand", "name each value once")
+            values[one] = None
+        if not values:
+            self._in.refuse("a domain without values", "write [a b c], or how many there are")
+        return tuple(values)
+
+    def _read_function(self, word: str) -> None:
+        name = f"f{len(self._functions)}"
+        if not _opens(word):
+            name = word
+            self._open(f"the function {shortened(name)}")
+        line = self._in.line
+        self._tag("scope")
+        scope = self._scope()
+        default, word = self._default()
+        sized = math.prod(self._size(place) for place in scope)
+        if self._tagged and word == "type":
+            self._refuse_type(self._in.word("a type"))
+        if self._tagged:
+            if word != "costs":
+                self._in.refuse(f"'{shortened(word)}' where 'costs' should stand", 'write "costs": [...]')
+            word = self._in.word("costs")
+        if _opens(word):
+            rows = self._dense(scope, sized) if default is None else self._sparse(scope)
+            table = CostTable(name, rows, default or 0, sized)
+        else:
+            self._shared.append((len(self._functions), word))
+            table = CostTable(name, {}, 0, sized)
+        self._functions.append(CostFunction(scope, table, line))
+        self._tables.setdefault(name, table)
+        closing = self._in.word("'}'")
+        if _opens(closing) and not self._tagged:
+            self._refuse_type(word)
+        if not _closes(closing):
+            self._in.refuse(f"'{shortened(closing)}' where the function should end", "close it")
+
+    def _default(self) -> tuple[Amount | None, str]:
+        """Return the default cost, if there is one, and the word behind it."""
+        word = self._in.word("costs")
+        if self._tagged and word == "defaultcost":
+            return self._cost(self._in.word("a cost")), self._in.word("'costs'")
+        if not self._tagged and (word[0] in "0123456789-+." or word == "inf"):
+            return self._cost(word), self._in.word("costs")
+        return None, word
+
+    def _scope(self) -> tuple[int, ...]:
+        self._open("the scope")
+        scope: list[int] = []
+        while not _closes(word := self._in.word("a variable")):
+            counted = word[0].isdigit()
+            place = self._in.as_integer(word, "a variable") if counted else self._known.get(word, -1)
+            if not 0 <= place < len(self._names):
+                self._in.refuse(
+                    f"the scope has '{shortened(word)}', which is no variable",
+                    suggestion(word, self._names, "variables"),
+                )
+            if place in scope:
+                self._in.refuse(f"the scope has '{shortened(word)}' twice", "name each variable once")
+            scope.append(place)
+        return tuple(scope)
+
+    def _dense(self, scope: Sequence[int], size: int) -> dict[tuple[int, ...], Amount]:
+        """Return the costs of all tuples, which stand in lexicographic order."""
+        if size > MAX_TUPLES:
+            self._in.refuse(f"a function of {size} tuples", f"at most {MAX_TUPLES} are read")
+        rows: dict[tuple[int, ...], Amount] = {}
+        for values in itertools.product(*[range(self._size(place)) for place in scope]):
+            word = self._in.word("a cost")
+            if _closes(word):
+                self._in.refuse(f"{len(rows)} costs instead of {size}", "write one for each tuple")
+            rows[values] = self._cost(word)
+        if not _closes(self._in.word("']'")):
+            self._in.refuse(f"more than {size} costs", "write one for each tuple")
+        return rows
+
+    def _sparse(self, scope: Sequence[int]) -> dict[tuple[int, ...], Amount]:
+        rows: dict[tuple[int, ...], Amount] = {}
+        while not _closes(word := self._in.word("a tuple")):
+            if not scope:
+                self._in.refuse("a default cost and another one", "a constant has one cost")
+            values = [self._value(scope[0], word)]
+            values += [self._value(place, self._in.word("a value")) for place in scope[1:]]
+            cost = self._cost(self._in.word("a cost"))
+            if rows.setdefault(tuple(values), cost) != cost:
+                self._in.refuse("a tuple with two costs", "delete one of them")
+            if len(rows) > MAX_TUPLES:
+                self._in.refuse(f"a function of more than {MAX_TUPLES} tuples", "make it smaller")
+        return rows
+
+    def _value(self, place: int, word: str) -> int:
+        domain = self._variables[self._names[place]]
+        if word[0].isdigit():
+            number = self._in.as_integer(word, "a value")
+        elif isinstance(domain, int):
+            number = int(word[1:]) if re.fullmatch(r"v[0-9]{1,9}", word) else -1
+        else:
+            number = domain.index(word) if word in domain else -1
+        if not 0 <= number < self._size(place):
+            what = f"the value '{shortened(word)}', which {shortened(self._names[place])} has not"
+            self._in.refuse(what, "values are named, or counted from 0 on")
+        return number
+
+    def _size(self, place: int) -> int:
+        domain = self._variables[self._names[place]]
+        return domain if isinstance(domain, int) else len(domain)
+
+    def _cost(self, word: str) -> Amount:
+        """Return a cost, cut to the places of `mustbe`."""
+        amount = self._in.amount(word)
+        if not isinstance(amount, Fraction) or amount == INFINITE:
+            return amount
+        cut = Fraction(math.trunc(amount * 10**self._places), 10**self._places)
+        self._truncated |= cut != amount
+        return cut
+
+    def _sharing(self, function: CostFunction, wanted: str) -> CostFunction:
+        self._in.line = function.line
+        table = self._tables.get(wanted)
+        if table is None:
+            self._in.refuse(f"the costs of '{shortened(wanted)}', which is no function", "write costs: [...]")
+        if table.size != function.table.size or {len(values) for values in table.rows} - {len(function.scope)}:
+            self._in.refuse(f"the costs of '{shortened(wanted)}', which has other domains", "write costs: [...]")
+        return replace(function, table=replace(table, name=function.table.name))
+
+    def _refuse_type(self, name: str) -> Iterator[None]:
+        self._in.refuse(f"the global cost function '{shortened(name)}'", "only tables of costs are read")
+
+    def _tag(self, wanted: str) -> None:
+        if self._tagged and (word := self._in.word(f"'{wanted}'")) != wanted:
+            self._in.refuse(f"'{shortened(word)}' where '{wanted}' should stand", "tags stand in their order")
+
+    def _open(self, what: str) -> None:
+        if not _opens(word := self._in.word("'{'")):
+            self._in.refuse(f"'{shortened(word)}' where {what} should begin", "write { or [")
+
+    def _close(self, what: str) -> None:
+        if not _closes(word := self._in.word("'}'")):
+            self._in.refuse(f"'{shortened(word)}' where {what} should end", "write } or ]")
+
+
+def _title(name: str, stem: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name)[:100].strip("._-") or stem
+
+
+def _opens(word: str) -> bool:
+    return word in ("{", "[")
+
+
+def _closes(word: str) -> bool:
+    return word in ("}", "]")
+
+
+def write(team: Team, options: ExportOptions) -> Written:
+    """Return the `.cfn` of `team`. Its bound is one that no finite sum reaches.
+
+    Forbidden tuples cost three times the bound, since toulbar2 1.1 does not read `inf`: even with the least cost of all
+    other functions, such a sum reaches the bound.
+
+    Raises:
+        UnsupportedError: if costs or a constraint's table are too large, or the team changes over time.
+    """
+    del options
+    return Written({f"{team.name}.cfn": ("\n".join(_cfn(team, team_costs(team))) + "\n").encode()})
+
+
+def _cfn(team: Team, network: TeamCosts) -> Iterator[str]:
+    tables, constant, places, bound = network
+    sign = -1 if maximises(team) else 1
+    mustbe = f"{'>' if sign < 0 else '<'}{decimal(sign * bound, places)}"
+    forbidding = decimal(sign * 3 * bound, places)
+    names = {name: _names(variable.domain) for name, variable in team.variables.items()}
+    yield "{"
+    yield f'  "problem": {{"name": "{team.name}", "mustbe": "{mustbe}"}},'
+    yield '  "variables": {'
+    yield ",\n".join(f'    "{name}": {_cfn_domain(team.variables[name].domain, names[name])}' for name in names)
+    yield "  },"
+    yield '  "functions": {'
+    functions = [f'    "constant": {{"scope": [], "costs": [{decimal(constant, places)}]}}'] if constant else []
+    for number, one in enumerate(tables):
+        scope = ", ".join(f'"{name}"' for name in one.scope)
+        costs = ", ".join(
+            ", ".join([*(f'"{names[name][value]}"' for name, value in zip(one.scope, values, strict=True)), told])
+            for values, told in ((values, _cost(cost, places, forbidding)) for values, cost in one.table.rows.items())
+        )
+        default = _cost(one.table.default, places, forbidding)
+        functions.append(f'    "f{number}": {{"scope": [{scope}], "defaultcost": {default}, "costs": [{costs}]}}')
+    yield ",\n".join(functions)
+    yield "  }"
+    yield "}"
+
+
+def _cost(cost: Amount, places: int, forbidding: str) -> str:
+    return forbidding if cost == INFINITE else decimal(cost, places)
+
+
+def _counted(domain: Domain) -> bool:
+    """Return whether the values are 0, 1, ..., which need no names."""
+    return not domain.symbols and len(domain.ranges) == 1 and domain.ranges[0].start == 0
+
+
+def _names(domain: Domain) -> dict[int, str]:
+    """Return what the values are called: names begin with no digit and no sign."""
+    if _counted(domain):
+        return {value: str(value) for value in domain}
+    names = {}
+    for value in domain:
+        label = str(domain.label(value)) if domain.symbols else f"{'m' if value < 0 else 'v'}{abs(value)}"
+        plain = "".join(sign if sign.isalnum() or sign in "_.-" else "_" for sign in label)
+        names[value] = plain if plain[0].isalpha() or plain[0] == "_" else f"v{plain}"
+    if len(set(names.values())) < len(names):
+        names = {value: f"{name}_{number}" for number, (value, name) in enumerate(names.items())}
+    return names
+
+
+def _cfn_domain(domain: Domain, names: Mapping[int, str]) -> str:
+    if _counted(domain):
+        return str(len(domain))
+    return f"[{', '.join(f'{chr(34)}{name}{chr(34)}' for name in names.values())}]"
+
+
+DIALECT = Dialect("cfn", "toulbar2's cfn", recognises, read, write)

@@ -18,9 +18,9 @@ from lxml import etree
 
 from robochoc.formats.dialects import xdiscsp
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Note, Written
-from robochoc.formats.dialects.exported import Exported, amounts, exported, held_constraints, magnitude, maximises
 from robochoc.formats.dialects.tables import Amount
-from robochoc.formats.dialects.xcsp21.xdiscsp_file import FORMAT
+from robochoc.formats.dialects.tabulation import Exported, amounts, exported, held_constraints, magnitude, maximises
+from robochoc.formats.dialects.xdiscsp import FORMAT
 from robochoc.model.constraint import INFINITE
 from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError

@@ -6,21 +6,45 @@ Facts: FRODO's manual, Appendix A, and its schemas; Roussel and Lecoutre, arXiv 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
-from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
-from robochoc.formats.dialects.xcsp21.frodo_file import frodo_file
-from robochoc.formats.dialects.xcsp21.instance import Instance
-from robochoc.formats.dialects.xcsp21.merging import merged
-from robochoc.formats.dialects.xcsp21.reader import PUBLIC, read_instance
-from robochoc.formats.dialects.xcsp21.recognition import Beginning
+from lxml import etree
+
+from robochoc.formats.diagnostics import shortened
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
+from robochoc.formats.dialects.tables import Amount, Scale
+from robochoc.formats.dialects.tabulation import Exported, HeldConstraint, amounts, constant_table, decimal, magnitude
+from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, plain
+from robochoc.formats.dialects.xcsp21.instance import UNIT, ForeignConstraint, Formula, Instance, Sides, Table, refuse
+from robochoc.formats.dialects.xcsp21.reader import PUBLIC, Beginning, read_instance
 from robochoc.formats.dialects.xcsp21.team import as_team
 from robochoc.formats.element_view import ElementView
+from robochoc.formats.global_constraints import PREFIX, write_global
+from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
+from robochoc.model.expression import Apply, Constant, Expression
+from robochoc.model.problem import Team
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.plain_text import counted
 
 NAME = "frodo"
+FORMAT = "XCSP 2.1_FRODO"
+TITLE = "FRODO's XCSP 2.1"
+KEEPS_FORMULAS = "--intension keeps predicates and functions, for FRODO's JaCoP parser"
+LIMIT = 2**31 - 1
+"""The integer that counts as infinity in FRODO's 32 bits."""
 
 _SELF = re.compile(rb"<agents\s[^>]*\bself\s*=")
+_TERM = r"(?:X\d+|-?\d+)"
+_FORMS = {
+    "allDifferent": re.compile(rf"\[ (?:{_TERM} )+\]"),
+    "weightedSum": re.compile(rf"\[ (?:{{ -?\d+ {_TERM} }} )+\] <[a-z]+/> -?\d+"),
+    "element": re.compile(rf"X\d+ \[ (?:{_TERM} )+\] {_TERM}"),
+    "cumulative": re.compile(rf"\[ (?:{{ {_TERM} {_TERM} {_TERM} }} )+\] <le/> {_TERM}"),
+}
+"""How FRODO reads the parameters of each."""
 
 
 def _recognises(_path: Path, beginning: bytes) -> bool:
@@ -46,4 +70,233 @@ def _knower(element: ElementView, _instance: Instance) -> str:
     return "" if agent == PUBLIC else agent
 
 
-DIALECT = Dialect(NAME, "FRODO's XCSP 2.1", _recognises, _read, frodo_file, is_part=_is_part)
+def merged(instances: Sequence[Instance]) -> Instance:
+    """Return the problem of all files of a team of agents.
+
+    Constraints of the same name, scope and contents in several files are one. Variables that several files hold are
+    one, too, and must have the same domain and owner.
+
+    Raises:
+        InvalidInputError: if the files do not belong together, or one is missing.
+    """
+    whole = replace(instances[0], self_agent="", agents=[], variables={}, constraints=[], notes=[])
+    if len(instances) > 1:
+        _check_members(instances)
+    _check_complete(instances)
+    known: dict[tuple[str, frozenset[str]], ForeignConstraint] = {}
+    for one in instances:
+        whole.agents += [name for name in one.agents if name not in whole.agents]
+        whole.notes += [note for note in one.notes if note not in whole.notes]
+        _add_variables(whole, one)
+        for constraint in one.constraints:
+            if len(instances) == 1:
+                whole.constraints.append(constraint)
+                continue
+            key = constraint.name, frozenset(constraint.scope)
+            first = known.setdefault(key, constraint)
+            if first is constraint:
+                whole.constraints.append(constraint)
+            elif not _same(first, constraint):
+                if not (is_hard(first) and is_hard(constraint)):
+                    hint = f"constraints of one name are copies; it also stands in {first.file}:{first.line}"
+                    refuse(
+                        one.file, constraint.line, f"constraint '{shortened(constraint.name)}' costs otherwise", hint
+                    )
+                whole.constraints.append(constraint)
+    return whole
+
+
+def is_hard(constraint: ForeignConstraint) -> bool:
+    """Return whether a constraint only allows and forbids."""
+    match constraint.content:
+        case Table(costs=costs, default=default):
+            return {default, *costs.values()} <= {0, INFINITE}
+        case Formula(definition=Predicate(), cost=cost):
+            return cost is None
+        case _:
+            return False
+
+
+def _check_members(instances: Sequence[Instance]) -> None:
+    selves = {one.self_agent: one for one in instances}
+    for one in instances:
+        if not one.self_agent:
+            refuse(one.file, 0, "is a whole problem by itself", "import one such file at a time, or their folder")
+        if selves[one.self_agent] is not one:
+            other = selves[one.self_agent].file
+            refuse(one.file, 0, f"is the file of agent {shortened(one.self_agent)}, and so is {other}", "leave one out")
+        if one.maximize != instances[0].maximize:
+            refuse(one.file, 0, f"does not maximize or minimize as {instances[0].file} does", "let them agree")
+
+
+def _check_complete(instances: Sequence[Instance]) -> None:
+    """Raise `InvalidInputError` when an agent has variables, and its file is not there."""
+    selves = {one.self_agent for one in instances if one.self_agent}
+    if not selves:
+        return
+    for one in instances:
+        for variable in one.variables.values():
+            if variable.owner and variable.owner not in selves:
+                what = f"is what agent {shortened(one.self_agent)} knows, and the file of {shortened(variable.owner)}"
+                refuse(one.file, variable.line, f"{what} is not here", "give all agents' files, or their folder")
+
+
+def _add_variables(whole: Instance, one: Instance) -> None:
+    for variable in one.variables.values():
+        first = whole.variables.setdefault(variable.name, variable)
+        if (first.ranges, first.owner) != (variable.ranges, variable.owner):
+            what = f"variable '{shortened(variable.name)}' has another domain or agent than in another file"
+            refuse(one.file, variable.line, what, "let the files agree")
+
+
+def _same(one: ForeignConstraint, other: ForeignConstraint) -> bool:
+    match one.content, other.content:
+        case Table() as left, Table() as right:
+            return (one.scope, left.costs, left.default) == (other.scope, right.costs, right.default)
+        case Sides() as left, Sides() as right:
+            return (one.scope, left.first.costs, left.second.costs) == (
+                other.scope,
+                right.first.costs,
+                right.second.costs,
+            )
+        case Formula() as left, Formula() as right:
+            named = replace(left.definition, name=""), replace(right.definition, name="")
+            return named[0] == named[1] and left.terms == right.terms
+        case _:
+            return False
+
+
+def frodo_file(team: Team, options: ExportOptions) -> Written:
+    """Return the file, in which all agents of a constraint's variables know it.
+
+    Raises:
+        UnsupportedError: if the team has what FRODO has not.
+    """
+    writer = _Writer(FlatTeam(team, TITLE), intension=options.intension)
+    return Written({f"{team.name}.xml": writer.content()}, tuple(writer.notes()))
+
+
+class _Writer:
+    def __init__(self, flat: FlatTeam, *, intension: bool) -> None:
+        self._flat = flat
+        hint = "" if intension else f" ({KEEPS_FORMULAS})"
+        self._contents = [(intension and self._in_intension(one)) or flat.table(one, hint) for one in flat.held]
+        tables = [content for content in self._contents if isinstance(content, Exported)]
+        if flat.constant:
+            tables.append(constant_table(flat.team, flat.constant))
+        self._places = Scale(amounts(tables)).places
+        self._check_sizes(magnitude(tables, Fraction(0)) * 10**self._places)
+        self._forbidden = "-infinity" if flat.maximize else "infinity"
+        presentation = {
+            "name": flat.team.name,
+            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),
+            "maximize": "true" if flat.maximize else "false",
+            "format": FORMAT,
+        }
+        self._document = Document(flat, presentation)
+        self._references: dict[int, str] = {}
+
+    def content(self) -> bytes:
+        flat, document = self._flat, self._document
+        if self._places:
+            etree.SubElement(document.presentation, "stats", name=UNIT).text = self._unit
+        for robot in flat.team.robots:
+            etree.SubElement(document.agents, "agent", name=robot.name)
+            for variable in robot.variables:
+                domain = flat.domain_of[variable.name]
+                etree.SubElement(document.variables, "variable", name=variable.name, domain=domain, agent=robot.name)
+        for one, content in zip(flat.held, self._contents, strict=True):
+            if isinstance(content, Exported):
+                self._add(content)
+            else:
+                self._add_formula(one, content)
+        if flat.constant:
+            self._add(constant_table(flat.team, flat.constant))
+        return document.content()
+
+    def notes(self) -> Iterator[Note]:
+        """Yield the differences from the team."""
+        if self._places:
+            yield Note("scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits")
+        if any(one.private_part for one in self._flat.held):
+            text = "all agents of a constraint know it: FRODO cannot keep partially known (PKC) constraints apart"
+            yield Note("known to more", text)
+        if kept := sum(not isinstance(content, Exported) for content in self._contents):
+            text = f"{counted(kept, 'constraint')} in intension, which only FRODO's JaCoP parser reads"
+            yield Note("intension", text)
+
+    @property
+    def _unit(self) -> str:
+        return decimal(Fraction(1, 10**self._places))
+
+    def _check_sizes(self, most: int) -> None:
+        if most >= LIMIT:
+            unit = f" in units of {self._unit}" if self._places else ""
+            what = f"costs may add up to {most:,}{unit}"
+            raise UnsupportedError(f"{TITLE}: {what}, but FRODO's integers end at {LIMIT:,}: use smaller costs")
+        for name, variable in self._flat.team.variables.items():
+            far = max(variable.domain, key=abs)
+            if abs(far) >= LIMIT:
+                what = f"the value {far:,} of {name} is beyond FRODO's integers, which end at {LIMIT:,}"
+                raise UnsupportedError(f"{TITLE}: {what}")
+
+    def _in_intension(self, one: HeldConstraint) -> Predicate | Function | None:
+        """Return the definition of a constraint by FRODO's operators. None: it should be a relation."""
+        definition, cost = one.constraint.definition, one.constraint.cost
+        if isinstance(definition, Relation):
+            return None
+        if isinstance(definition, GlobalPredicate) and cost == INFINITE and _is_known_form(definition):
+            return definition
+        body = plain(definition.body)
+        if body is None:
+            return None
+        if isinstance(definition, Predicate) and cost == INFINITE:
+            return Predicate(definition.name, definition.parameters, body)
+        return self._as_function(one, definition, body)
+
+    def _as_function(self, one: HeldConstraint, definition: Predicate | Function, body: Expression) -> Function | None:
+        """Return a definition whose costs are finite as a function. None: it should be a relation."""
+        if any(robot.costs.places for robot in self._flat.team.robots):  # the costs of a function have no unit
+            return None
+        if isinstance(definition, Predicate):
+            if self._flat.small_table(one) is not None:
+                return None
+            body = Apply("if", (body, Constant(0), Constant(int(one.constraint.cost))))
+        return Function(definition.name, definition.parameters, body)
+
+    def _add_formula(self, one: HeldConstraint, definition: Predicate | Function) -> None:
+        constraint = one.constraint
+        if isinstance(definition, GlobalPredicate):
+            element = self._document.constraint(constraint.name, constraint.variables, definition.name)
+            write_global(etree.SubElement(element, "parameters"), definition, constraint.parameters)
+            return
+        reference = self._document.formula(definition, definition.body)
+        element = self._document.constraint(constraint.name, constraint.variables, reference)
+        etree.SubElement(element, "parameters").text = " ".join(map(str, constraint.parameters))
+
+    def _add(self, table: Exported) -> None:
+        """Write a soft relation, the only kind that all of FRODO reads."""
+        key = id(table.table)
+        if key not in self._references:
+            self._references[key] = self._relation(table)
+        self._document.constraint(table.name, table.scope, self._references[key])
+
+    def _relation(self, table: Exported) -> str:
+        by_cost: dict[Amount, list[str]] = {}
+        for values, cost in table.table.rows.items():
+            by_cost.setdefault(cost, []).append(" ".join(map(str, values)))
+        tuples = " | ".join(f"{self._number(cost)}: {' | '.join(listed)}" for cost, listed in by_cost.items())
+        attributes = {"semantics": "soft", "defaultCost": self._number(table.table.default)}
+        return self._document.relation(table, attributes, tuples)
+
+    def _number(self, cost: Amount) -> str:
+        whole = cost if cost == INFINITE else cost * 10**self._places
+        return cost_text(whole, forbidden=self._forbidden)
+
+
+def _is_known_form(predicate: GlobalPredicate) -> bool:
+    """Return whether FRODO reads the parameters of a global constraint."""
+    return _FORMS[predicate.name.removeprefix(PREFIX)].fullmatch(predicate.form) is not None
+
+
+DIALECT = Dialect(NAME, TITLE, _recognises, _read, frodo_file, is_part=_is_part)

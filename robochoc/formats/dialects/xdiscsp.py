@@ -6,22 +6,31 @@ is this platform's own format.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
+from lxml import etree
+
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions, Note
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
+from robochoc.formats.dialects.tables import Amount, CostTable
+from robochoc.formats.dialects.tabulation import Exported, HeldConstraint
+from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, plain
 from robochoc.formats.dialects.xcsp21.instance import ForeignConstraint, Formula, Instance, Table, refuse
-from robochoc.formats.dialects.xcsp21.reader import read_instance
-from robochoc.formats.dialects.xcsp21.recognition import Beginning
+from robochoc.formats.dialects.xcsp21.reader import Beginning, read_instance
 from robochoc.formats.dialects.xcsp21.team import as_team
-from robochoc.formats.dialects.xcsp21.xdiscsp_file import xdiscsp_file
 from robochoc.formats.element_view import ElementView
-from robochoc.model.constraint import INFINITE, Predicate
+from robochoc.model.constraint import INFINITE, Predicate, Semantics
+from robochoc.model.problem import Team
+from robochoc.solver.encoding import UnsupportedError
 
 NAME = "xdiscsp"
+FORMAT = "XDisCSP 1.0"
 MAX_DISCSP = "MaxDisCSP"
 
 _ONE = Decimal(1)
@@ -74,6 +83,125 @@ def _cost_one(instance: Instance) -> None:
 def _with_ones(table: Table) -> Table:
     costs = {values: _ONE if cost == INFINITE else cost for values, cost in table.costs.items()}
     return replace(table, costs=costs, default=_ONE if table.default == INFINITE else table.default)
+
+
+def xdiscsp_file(team: Team, options: ExportOptions) -> Written:
+    """Return the file: a DisCSP, a DCOP, or an ADCOP where two robots have costs of their own for one constraint.
+
+    Raises:
+        UnsupportedError: if the team has what XDisCSP has not: utilities, decimal or negative costs, a scenario.
+    """
+    del options
+    return Written({f"{team.name}.xml": _Writer(FlatTeam(team, FORMAT)).content()})
+
+
+class _Writer:
+    def __init__(self, flat: FlatTeam) -> None:
+        self._flat = flat
+        if flat.maximize:
+            raise UnsupportedError(f"{FORMAT} has no utilities: costs are minimised")
+        self._asymmetric = flat.weighted and any(one.private_part for one in flat.held)
+        kind = "ADCOP" if self._asymmetric else "DCOP" if flat.weighted else "DisCSP"
+        partly = any(one.private_part for one in flat.held)
+        presentation = {
+            "name": flat.team.name,
+            "type": kind,
+            "benchmark": "RandomDCOP",  # DCOPSolver fails without a name here, and takes this one for any problem
+            "model": "Complex" if any(len(robot.variables) > 1 for robot in flat.team.robots) else "Simple",
+            "constraintModel": "PKC" if partly else "TKC",
+            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),
+            "format": FORMAT,
+        }
+        self._document = Document(flat, presentation)
+        self._ids = {robot.name: str(place) for place, robot in enumerate(flat.team.robots, 1)}
+
+    def content(self) -> bytes:
+        flat, document = self._flat, self._document
+        for robot in flat.team.robots:
+            number_of = self._ids[robot.name]
+            etree.SubElement(document.agents, "agent", name=robot.name, id=number_of, description=robot.name)
+            for place, variable in enumerate(robot.variables, 1):
+                domain = flat.domain_of[variable.name]
+                element = etree.SubElement(document.variables, "variable", agent=robot.name, name=variable.name)
+                element.attrib.update({"id": str(place), "domain": domain, "description": variable.name})
+        for one in flat.held:
+            if not self._is_side(one):
+                self._add(one)
+        if self._asymmetric:
+            self._add_sides()
+        if flat.constant:
+            constant = self._cost(flat.constant, "the constant")
+            document.constraints.set("initialCost", constant)
+        return document.content()
+
+    def _add(self, one: HeldConstraint) -> None:
+        constraint, definition = one.constraint, one.constraint.definition
+        model = {"model": "TKC"}
+        if one.private_part:
+            model = {"model": "PKC", "ownerId": self._ids[one.robot.name]}
+        hard = isinstance(definition, Predicate) and constraint.cost == INFINITE
+        body = plain(definition.body) if hard and isinstance(definition, Predicate) else None
+        if body is not None and isinstance(definition, Predicate):
+            reference = self._document.formula(definition, body)
+            element = self._document.constraint(constraint.name, constraint.variables, reference, **model)
+            etree.SubElement(element, "parameters").text = " ".join(map(str, constraint.parameters))
+            return
+        table = self._flat.table(one)
+        self._document.constraint(constraint.name, table.scope, self._relation(table, one), **model)
+
+    def _relation(self, exported: Exported, one: HeldConstraint) -> str:
+        table, name = exported.table, one.constraint.name
+        listed = {" ".join(map(str, values)): cost for values, cost in table.rows.items()}
+        if not self._flat.weighted:
+            semantics = Semantics.CONFLICTS if table.default == 0 else Semantics.SUPPORTS
+            return self._document.relation(exported, {"semantics": semantics}, "|".join(listed))
+        attributes = {"semantics": "soft", "defaultCost": self._cost(table.default, name)}
+        tuples = "|".join(f"{self._cost(cost, name)}:{values}" for values, cost in listed.items())
+        return self._document.relation(exported, attributes, tuples)
+
+    def _is_side(self, one: HeldConstraint) -> bool:
+        """Return whether a constraint becomes one side of an asymmetric one. Raises `UnsupportedError`."""
+        scope = one.constraint.variables
+        if not self._asymmetric or not one.private_part or len({self._flat.team.owner[name] for name in scope}) == 1:
+            return False
+        if len(scope) != 2:  # noqa: PLR2004 - a cost for each of two variables
+            what = f"the partially known constraint {one.constraint.name} has {len(scope)} variables"
+            raise UnsupportedError(f"{FORMAT} allows asymmetric costs of two variables only, but {what}")
+        return True
+
+    def _add_sides(self) -> None:
+        """Write both sides of each pair of variables as one relation with two costs a tuple."""
+        sides: dict[tuple[str, ...], dict[str, list[Exported]]] = defaultdict(lambda: defaultdict(list))
+        for one in self._flat.held:
+            if self._is_side(one):
+                table = self._flat.table(one)
+                sides[tuple(sorted(table.scope))][one.robot.name].append(table)
+        for pair, by_robot in sides.items():
+            owners = [self._flat.team.owner[name] for name in pair]
+            domains = [self._flat.team.variables[name].domain for name in pair]
+            costs: dict[tuple[int, ...], Amount] = {}
+            written = []
+            for values in itertools.product(*domains):
+                both = [_total(by_robot[owner], dict(zip(pair, values, strict=True))) for owner in owners]
+                costs[values] = INFINITE
+                words = " ".join(self._cost(cost, " ".join(pair)) for cost in both)
+                written.append(f"{words}:{' '.join(map(str, values))}")
+            table = Exported("_".join(pair), pair, CostTable("_".join(pair), costs, INFINITE, len(costs)))
+            attributes = {"semantics": "soft", "defaultCost": "infinity"}
+            reference = self._document.relation(table, attributes, "|".join(written))
+            self._document.constraint("_".join(pair), pair, reference, model="TKC")
+
+    def _cost(self, cost: Amount, name: str) -> str:
+        if cost < 0 or (cost != INFINITE and Fraction(cost) % 1):
+            raise UnsupportedError(f"{FORMAT} requires integer costs of 0 or more, but {name} has {cost_text(cost)}")
+        return cost_text(cost)
+
+
+def _total(parts: list[Exported], assignment: Mapping[str, int]) -> Amount:
+    total: Amount = 0
+    for part in parts:
+        total += part.table.rows.get(tuple(assignment[name] for name in part.scope), part.table.default)
+    return total
 
 
 DIALECT = Dialect(NAME, "XDisCSP 1.0", _recognises, _read, xdiscsp_file)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from robochoc.formats.dialects.dialect import Dialect
-from robochoc.formats.dialects.pydcop.parts import sections
+from robochoc.formats.dialects.pydcop.files import sections
 from robochoc.formats.dialects.pydcop.reader import read
 from robochoc.formats.dialects.pydcop.writer import written
 

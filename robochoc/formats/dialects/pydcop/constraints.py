@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -12,9 +13,8 @@ from pathlib import Path
 from robochoc.formats.definitions import MAX_TUPLES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.pydcop.domains import Values
-from robochoc.formats.dialects.pydcop.outside import functions_of
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
-from robochoc.formats.dialects.pydcop.python_values import Value
+from robochoc.formats.dialects.pydcop.python_values import NoValueError, Value
 from robochoc.formats.dialects.pydcop.translation import Known, Violated, translated
 from robochoc.formats.dialects.tables import Amount, CostTable, forbidding
 from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
@@ -212,3 +212,38 @@ def _tuple_words(scope: Sequence[str], node: Node) -> Iterator[tuple[int, list[s
             yield from ((one.line, part.split()) for part in one.scalar.split("|"))
         else:
             yield one.line, [shown(one.scalar)]
+
+
+def functions_of(path: Path) -> dict[str, Callable[..., Value]]:
+    """Execute the Python file at `path`, and return its functions.
+
+    Raises:
+        MistakeError: if that fails.
+    """
+    spec = importlib.util.spec_from_file_location("source", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise MistakeError(f"the source {shortened(str(path))} is no Python file", "it stands beside the first file")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # noqa: BLE001 - whatever the user's code raises
+        what = f"the source {shortened(str(path))} fails: {type(error).__name__}: {shortened(str(error))}"
+        raise MistakeError(what, "mend the Python file") from None
+    return {name: _guarded(thing) for name, thing in vars(module).items() if callable(thing)}
+
+
+def _guarded(function: Callable[..., object]) -> Callable[..., Value]:
+    """Return `function` of Python's own numbers as one of exact ones."""
+
+    def call(*arguments: Value) -> Value:
+        try:
+            result = function(*[float(one) if isinstance(one, Fraction) else one for one in arguments])
+        except Exception as error:  # noqa: BLE001 - whatever the user's code raises
+            raise NoValueError(f"{type(error).__name__}: {error}") from None
+        if isinstance(result, float) and result not in (float("inf"), float("-inf")):
+            return Fraction(repr(result)) if result == result else result  # noqa: PLR0124 - only NaN differs from itself
+        if result is None or isinstance(result, (int, float, str)):
+            return result
+        raise NoValueError(f"a {type(result).__name__} is no number")
+
+    return call

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from heapq import heapify, heapreplace
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.dialect import Note
-from robochoc.formats.dialects.owners import owners_by
+from robochoc.formats.dialects.dialect import Note, owners_by
 from robochoc.formats.dialects.yaml_tree import Node, Scalar
 
 

@@ -14,9 +14,9 @@ from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
 from robochoc.formats.dialects.pydcop.constraints import ConstraintReader, Costs
 from robochoc.formats.dialects.pydcop.domains import Domains, Values
-from robochoc.formats.dialects.pydcop.events import read_scenario
+from robochoc.formats.dialects.pydcop.files import Part, Parts, read_parts
 from robochoc.formats.dialects.pydcop.hosting import Hosting, agent_names, text_of
-from robochoc.formats.dialects.pydcop.parts import Part, Parts, read_parts
+from robochoc.formats.dialects.pydcop.scenario import read_scenario
 from robochoc.formats.dialects.pydcop.translation import Violated
 from robochoc.formats.dialects.tables import CostTable, Scale, definition_name, relation, word
 from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown

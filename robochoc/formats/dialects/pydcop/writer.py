@@ -15,7 +15,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
 from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
-from robochoc.formats.dialects.exported import (
+from robochoc.formats.dialects.tables import Amount
+from robochoc.formats.dialects.tabulation import (
     Exported,
     amounts,
     constant_table,
@@ -24,7 +25,6 @@ from robochoc.formats.dialects.exported import (
     magnitude,
     maximises,
 )
-from robochoc.formats.dialects.tables import Amount
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import RemoveAgent, Team
 from robochoc.solver.encoding import UnsupportedError

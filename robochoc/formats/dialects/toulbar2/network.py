@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 from robochoc.formats.definitions import check_domain
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
-from robochoc.formats.dialects.owners import owners_by
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names, owners_by
 from robochoc.formats.dialects.tables import Amount, CostTable, Scale, forbidding, relation, word
+from robochoc.formats.dialects.tabulation import Exported, amounts, decimal, exported, magnitude
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.problem import ProblemKind
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.solver.encoding import UnsupportedError
+
+LIMIT = 2**53
+"""The limit of costs in their unit: toulbar2 1.1 reads costs in a cfn as floating-point numbers."""
 
 
 @dataclass(frozen=True)
@@ -177,3 +182,29 @@ def _notes(network: Network, scale: Scale, *, reaches: bool) -> Iterator[Note]:
         side = "above" if network.maximize else "below"
         text = f"toulbar2 accepts only sums {side} {float(network.bound):g}; here what reaches it is a solution, too"
         yield Note("bound", f"{text}, and its cost tells")
+
+
+class TeamCosts(NamedTuple):
+    """A team's costs with their constant and decimal places, and a bound that no finite sum reaches."""
+
+    tables: list[Exported]
+    constant: Fraction
+    places: int
+    bound: int
+
+
+def team_costs(team: Team) -> TeamCosts:
+    """Return the costs of `team` as a network of toulbar2.
+
+    Raises:
+        UnsupportedError: if costs or a constraint's table are too large, or the team changes over time.
+    """
+    if team.scenario:
+        raise UnsupportedError("toulbar2's formats have no scenario")
+    tables, constant = exported(team)
+    places, bound = Scale([constant, *amounts(tables)]).places, magnitude(tables, constant)
+    if bound * 10**places >= LIMIT:
+        unit = f" in units of {decimal(Fraction(1, 10**places))}" if places else ""
+        what = f"costs may add up to {bound * 10**places:,}{unit}"
+        raise UnsupportedError(f"{what}: toulbar2 1.1 reads only costs below {LIMIT:,} exactly; use smaller costs")
+    return TeamCosts(tables, constant, places, bound)

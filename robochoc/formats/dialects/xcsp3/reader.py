@@ -11,8 +11,8 @@ from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, invalid_input
 from robochoc.formats.dialects.dialect import MAX_FILE, Imported, ImportOptions, Names, Note
 from robochoc.formats.dialects.xcsp3 import kinds, scheduling, tables
-from robochoc.formats.dialects.xcsp3.circuit import circuit
 from robochoc.formats.dialects.xcsp3.document import check_root, ignore_remarks
+from robochoc.formats.dialects.xcsp3.kinds import circuit
 from robochoc.formats.dialects.xcsp3.objective import post_objective
 from robochoc.formats.dialects.xcsp3.posting import Posting, in_words
 from robochoc.formats.dialects.xcsp3.template import Element, slide_scopes

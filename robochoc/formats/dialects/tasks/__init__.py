@@ -1,12 +1,12 @@
-"""Robots, and tasks that are to be shared out among them, as YAML (docs/guides/tasks.md)."""
+"""Lists of robots and of tasks to be allocated to them, as YAML (docs/guides/tasks.md)."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from robochoc.formats.dialects.dialect import Dialect
-from robochoc.formats.dialects.pydcop.parts import sections
-from robochoc.formats.dialects.task_list.reader import read
+from robochoc.formats.dialects.pydcop.files import sections
+from robochoc.formats.dialects.tasks.reader import read
 
 _SECTIONS = {"robots", "tasks"}
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
 from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
-from robochoc.formats.dialects.pydcop.parts import file_text
+from robochoc.formats.dialects.pydcop.files import file_text
 from robochoc.formats.dialects.tables import Scale
-from robochoc.formats.dialects.task_list.entries import (
+from robochoc.formats.dialects.tasks.entries import (
     MAX_PLACES,
     Entry,
     Point,
@@ -25,7 +25,7 @@ from robochoc.formats.dialects.task_list.entries import (
     read_tasks,
     word_of,
 )
-from robochoc.formats.dialects.task_list.tours import Tasks, Trip, rounded
+from robochoc.formats.dialects.tasks.tours import Tasks, Trip, rounded
 from robochoc.formats.dialects.yaml_tree import Node, read_yaml, unread_parts
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way

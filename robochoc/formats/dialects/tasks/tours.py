@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.task_list.entries import MAX_PLACES, Point, RobotEntry, TaskEntry
+from robochoc.formats.dialects.tasks.entries import MAX_PLACES, Point, RobotEntry, TaskEntry
 
 MAX_SETS = 4096
 """The maximum number of sets of tasks that a robot may have time and room for."""
