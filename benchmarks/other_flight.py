@@ -20,7 +20,7 @@ from robochoc.flight.quadrotor.control import Controller
 from robochoc.flight.quadrotor.rigid_bodies import RigidBodies
 from robochoc.flight.quadrotor.simulation import DT
 from robochoc.flight.routes.timetable import plan_routes
-from robochoc.formats.team import read_team
+from robochoc.formats.team_reader import read_team
 from robochoc.model.outcome import Outcome, Verdict
 
 HERE = Path(__file__).parent

@@ -14,7 +14,7 @@ from robochoc.experiments.digests import digest_of_files
 from robochoc.experiments.study_file import HINT, Place
 from robochoc.experiments.task import ProblemSpec
 from robochoc.formats.diagnostics import shortened
-from robochoc.formats.team import find_teams
+from robochoc.formats.team_reader import find_teams
 from robochoc.generators.families import FAMILIES, parameters_of, required_of
 
 PROBLEM_KEYS = ("family", "path", "name", "scenario", "infinity", "owner")

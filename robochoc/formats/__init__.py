@@ -5,11 +5,11 @@ docs/reference/format.md; the paper, Figure 2.
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, on_one_line
-from robochoc.formats.folder import write_team
-from robochoc.formats.robot import read_robot, read_robot_again, robot_in
-from robochoc.formats.team import find_teams, read_team, robot_names
+from robochoc.formats.robot_reader import read_robot, read_robot_again, robot_in
+from robochoc.formats.robot_writer import robot_xml
+from robochoc.formats.team_reader import find_teams, read_team, robot_names
+from robochoc.formats.team_writer import write_team
 from robochoc.formats.validation import check_event, check_robot, check_team, with_checked_events
-from robochoc.formats.writer import robot_xml
 from robochoc.system.files import write_atomically
 
 __all__ = [

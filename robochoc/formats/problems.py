@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.team import read_team
+from robochoc.formats.team_reader import read_team
 from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
 
@@ -56,8 +56,8 @@ def read_problem(
         InvalidInputError: with the mistakes of the files, and for options of a file where there is a folder.
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
-    from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
     from robochoc.formats.dialects.registry import read_foreign, recognise, recognised  # noqa: PLC0415 - as above
+    from robochoc.formats.names_file import original_names  # noqa: PLC0415 - as above
 
     if place.is_file() and (dialect or more or recognised(place)):
         options = ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code)

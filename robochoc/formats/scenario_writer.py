@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from lxml import etree
 
-from robochoc.formats.scenario import SCENARIO
-from robochoc.formats.writer import robot_xml
+from robochoc.formats.robot_writer import robot_xml
+from robochoc.formats.scenario_reader import SCENARIO
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,

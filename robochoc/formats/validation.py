@@ -14,30 +14,32 @@ from dataclasses import replace
 from itertools import islice
 from typing import TypeVar
 
-from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
 from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_types
 from robochoc.formats.locations import Location, ObjectLocations
-from robochoc.formats.magnitudes import excessive_numbers
 from robochoc.formats.names import check_integer
-from robochoc.formats.neighbours import (
+from robochoc.formats.robot_rules import (
+    NOBODY_LEFT,
+    check_added_constraint,
+    check_constraint_of_added_robot,
+)
+from robochoc.formats.robot_validation import RobotValidator, repeated_robots
+from robochoc.formats.symbols import check_kinds, different_tables, kinds_of, mistyped_constraints
+from robochoc.formats.team_consistency import (
     cycles,
     disagreements,
+    excessive_numbers,
+    misplaced_constraints,
+    misplaced_parts,
     missing_robots,
+    missing_shown_variables,
     mixed_costs,
     mixed_kinds,
     out_of_order,
     shared_variables,
 )
-from robochoc.formats.objects import Objects, repeated_robots
-from robochoc.formats.rules import (
-    NOBODY_LEFT,
-    check_added_constraint,
-    check_constraint_of_added_robot,
-)
-from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
-from robochoc.formats.symbols import check_kinds, different_tables, kinds_of, mistyped_constraints
 from robochoc.formats.team_members import TeamMember, TeamMembers
+from robochoc.formats.tkc_copies import differing_copies
 from robochoc.model.change import ExcessiveChangeError, apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
@@ -92,7 +94,7 @@ def check_writable(team: Team) -> None:
 
 def check_robot(robot: Robot) -> None:
     """Raise `InvalidInputError` with every mistake of `robot` that can be found without its neighbours."""
-    found = Objects().mistakes(robot)
+    found = RobotValidator().mistakes(robot)
     if found:
         raise InvalidInputError(_numbered(found))
 
@@ -210,7 +212,7 @@ def _of_the_shape(value: object, kind: type, place: Location) -> Iterator[Diagno
 
 
 def _mistakes(team: Team) -> list[Diagnostic]:
-    objects = Objects()
+    objects = RobotValidator()
     found: list[Diagnostic] = []
     right: dict[str, TeamMember] = {}
     broken: set[str] = set()
@@ -292,7 +294,7 @@ def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location)
     try:
         match change:
             case AddAgent(robot):
-                yield from Objects().mistakes(robot)
+                yield from RobotValidator().mistakes(robot)
                 _check_same_places(robot, robots)
                 for constraint in robot.shared:
                     check_constraint_of_added_robot(constraint)
@@ -300,7 +302,7 @@ def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location)
                 check_added_constraint(constraint)
                 check_kinds(constraint, kinds_of(robots.values()))
                 if agent in robots:
-                    yield from Objects().mistakes_of_constraint(constraint, robots[agent])
+                    yield from RobotValidator().mistakes_of_constraint(constraint, robots[agent])
             case AddValue(variable, value) | RemoveValue(variable, value):
                 check_integer(value)
                 _check_symbol(variable, value, robots)

@@ -15,7 +15,7 @@ import msgspec
 
 from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
-from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
+from robochoc.formats.yaml_tree import Node, read_yaml, shown
 from robochoc.vehicles.frames import FAR_M, LATITUDE_MAX, GpsPlace
 from robochoc.vehicles.kinds import Kind, address_of, shared_port
 

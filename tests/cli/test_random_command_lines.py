@@ -18,8 +18,8 @@ from typing import Any
 
 import pytest
 
-from robochoc.formats.folder import write_team
 from robochoc.formats.problems import read_problem
+from robochoc.formats.team_writer import write_team
 from robochoc.model.costs import normalized
 from robochoc.model.problem import Team
 from robochoc.run.registry import protocol_named, protocol_names

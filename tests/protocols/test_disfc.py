@@ -13,7 +13,7 @@ import pytest
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.formats.team import read_team
+from robochoc.formats.team_reader import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, ConstraintModel, Team

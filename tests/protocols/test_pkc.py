@@ -11,8 +11,8 @@ from random import Random
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.formats.folder import write_team
-from robochoc.formats.team import read_team
+from robochoc.formats.team_reader import read_team
+from robochoc.formats.team_writer import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel, Team

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from robochoc.app.foreign.sentences import sentence
-from robochoc.formats.robot import read_robot
+from robochoc.formats.robot_reader import read_robot
 
 MOST_SENTENCES = 60
 MOST_SHOWN = 40_000

@@ -22,8 +22,8 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import Diagnostic, InvalidInputError, encodable, write_team
 from robochoc.formats.diagnostics import invalid_input
-from robochoc.formats.folder import SKETCH_FILE
 from robochoc.formats.scenario_writer import team_files
+from robochoc.formats.team_writer import SKETCH_FILE
 from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 

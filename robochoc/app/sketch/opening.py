@@ -17,7 +17,7 @@ from robochoc.formats import Diagnostic, InvalidInputError, read_team, write_tea
 from robochoc.formats.diagnostics import invalid_input
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import beginning_of, read_foreign, recognise, unknown_format
-from robochoc.formats.folder import SKETCH_FILE
+from robochoc.formats.team_writer import SKETCH_FILE
 from robochoc.model.problem import Team
 from robochoc.system.temporary_files import PrivateFolder
 

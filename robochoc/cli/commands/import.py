@@ -162,15 +162,17 @@ def _import(
 ) -> dict[str, Any]:
     """Write the team of one problem, and return the entry of the report."""
     from robochoc.formats import InvalidInputError, encodable, write_team
-    from robochoc.formats.dialects.names_file import NAMES_FILE, names_json
     from robochoc.formats.dialects.registry import read_foreign
+    from robochoc.formats.names_file import NAMES_FILE, names_json
     from robochoc.model.orders import OrderError, with_order
 
     entry: dict[str, Any] = {"files": [encodable(str(path)) for path in source.files], "imported": False}
     try:
         imported = read_foreign(source.files, options, dialect)
         team = with_order(imported.team, order_for(imported.team, order))
-        write_team(team, source.folder, replace=force, beside={NAMES_FILE: names_json(imported)})
+        write_team(
+            team, source.folder, replace=force, beside={NAMES_FILE: names_json(imported.dialect, imported.names)}
+        )
     except InvalidInputError as invalid:
         return entry | {"errors": [str(diagnostic) for diagnostic in invalid.diagnostics]}
     except OrderError as error:

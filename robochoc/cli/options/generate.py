@@ -84,7 +84,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     A `ValueError` of `make`, for numbers that are inconsistent, is wrong usage.
     """
     from robochoc.formats import InvalidInputError, write_team
-    from robochoc.formats.folder import GROUND_FILE
+    from robochoc.formats.team_writer import GROUND_FILE
 
     try:
         with elapsed_time("generate", "drawing the problem"):

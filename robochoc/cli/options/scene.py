@@ -42,7 +42,7 @@ map_option = click.option(
 def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
     """Return the map in `file`, or else in the `folder` of the team; None if there is none. Raises `Failure`."""
     from robochoc.formats import on_one_line
-    from robochoc.formats.folder import GROUND_FILE
+    from robochoc.formats.team_writer import GROUND_FILE
     from robochoc.maps.ground_map import MAX_BYTES, read_ground_map
 
     if file is None and folder and (folder / GROUND_FILE).is_file():

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import msgspec
 
+from robochoc.formats.definition_reader import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.absence import broken, restated

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.formats.diagnostics import InvalidInputError, MistakeError, shortened
-from robochoc.formats.dialects.yaml_tree import Node, Scalar, read_yaml
+from robochoc.formats.yaml_tree import Node, Scalar, read_yaml
 from robochoc.maps.occupancy.content import beginning_of, content_of, told
 from robochoc.maps.occupancy.images import Image, is_image, read_image
 from robochoc.maps.occupancy.pgm import MAX_BYTES

@@ -11,7 +11,7 @@ import pytest
 from robochoc.experiments.digests import digest_of_files
 from robochoc.experiments.execute import TaskRunner, team_of
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
-from robochoc.formats.folder import write_team
+from robochoc.formats.team_writer import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Improved, Sent
 from robochoc.journal.journal import Header, JournalRecorder, read_journal

@@ -10,7 +10,7 @@ from robochoc.experiments.plan import TooManyRunsError, plan_of
 from robochoc.experiments.study import read_study, study_of_tables
 from robochoc.experiments.study_file import range_of
 from robochoc.formats.diagnostics import InvalidInputError
-from robochoc.formats.folder import write_team
+from robochoc.formats.team_writer import write_team
 from robochoc.generators.queens3d import queens3d
 from tests.support.cases import cases
 from tests.support.studies import COSTS, SMALL, study

@@ -26,8 +26,8 @@ from robochoc.experiments.study import read_study
 from robochoc.formats import InvalidInputError, read_robot, read_team
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.names_file import original_names
 from robochoc.formats.dialects.registry import read_foreign
+from robochoc.formats.names_file import original_names
 from robochoc.formats.order_file import read_order
 from robochoc.maps.ground_map import read_ground_map
 from robochoc.maps.occupancy.grid import read_occupancy_grid

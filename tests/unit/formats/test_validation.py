@@ -25,7 +25,7 @@ from robochoc.formats import (
     write_team,
 )
 from robochoc.formats import validation as validating
-from robochoc.formats.objects import Objects
+from robochoc.formats.robot_validation import RobotValidator
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.change import apply_changes
 from robochoc.model.orders import with_priorities
@@ -212,13 +212,13 @@ def test_what_a_field_says_is_held_against_the_rules(change: Change, message: st
 
 def test_a_team_that_was_read_is_not_looked_at_again(team: Team, monkeypatch: pytest.MonkeyPatch) -> None:
     looked_at: list[str] = []
-    whole = Objects.mistakes
+    mistakes = RobotValidator.mistakes
 
-    def watched(objects: Objects, robot: Robot) -> list[Diagnostic]:
+    def watched(validator: RobotValidator, robot: Robot) -> list[Diagnostic]:
         looked_at.append(robot.name)
-        return whole(objects, robot)
+        return mistakes(validator, robot)
 
-    monkeypatch.setattr(Objects, "mistakes", watched)
+    monkeypatch.setattr(RobotValidator, "mistakes", watched)
     check_team(team)
     robochoc.Problem(team)
     assert looked_at == []

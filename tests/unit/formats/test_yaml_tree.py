@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.yaml_tree import Node, read_yaml, root_keys
+from robochoc.formats.yaml_tree import Node, read_yaml, root_keys
 from tests.support.cases import looped
 
 TEXT = """name: n

@@ -13,7 +13,7 @@ import pytest
 
 from robochoc.formats import read_team, write_team
 from robochoc.formats.global_constraints import read_form
-from robochoc.formats.labels import with_names_apart
+from robochoc.formats.robot_writer import with_names_apart
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import Order, OrderError, compute_order, constraint_graph, with_order, with_priorities

@@ -20,7 +20,7 @@ import pytest
 from lxml import etree
 
 from robochoc.formats import PREDEFINED, write_team
-from robochoc.formats.xcsp3 import xcsp3
+from robochoc.formats.dialects.xcsp3.writer import xcsp3
 from robochoc.generators.queens3d import QueensModel, QueensRobots, queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics

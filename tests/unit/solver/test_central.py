@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 from robochoc.formats import PREDEFINED
-from robochoc.formats.xcsp3 import xcsp3
+from robochoc.formats.dialects.xcsp3.writer import xcsp3
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict

@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 from robochoc.formats import PREDEFINED, write_team
-from robochoc.formats.xcsp3 import xcsp3
+from robochoc.formats.dialects.xcsp3.writer import xcsp3
 from robochoc.generators.coloring import coloring
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess

@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from robochoc.formats.xcsp3 import xcsp3
+from robochoc.formats.dialects.xcsp3.writer import xcsp3
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Expression, Name, text
 from robochoc.model.outcome import Verdict

@@ -17,7 +17,7 @@ from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.pydcop.python_values import NoValueError, Value
 from robochoc.formats.dialects.pydcop.translation import Known, Violated, translated
 from robochoc.formats.dialects.tables import Amount, CostTable, forbidding
-from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, shown
 from robochoc.model.expression import Expression
 from robochoc.model.expression.bounds import Interval, bounds
 

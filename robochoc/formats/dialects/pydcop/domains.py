@@ -10,8 +10,8 @@ from robochoc.formats.definitions import MAX_VALUES, check_domain
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.dialect import Names
 from robochoc.formats.dialects.tables import word
-from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
 from robochoc.formats.names import check_integer
+from robochoc.formats.yaml_tree import Node, Scalar, shown
 from robochoc.model.constraint import Domain
 
 _HINT = "write values: [R, G] or [0..4]"

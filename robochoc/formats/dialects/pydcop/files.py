@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable
-from robochoc.formats.dialects.yaml_tree import MAX_BYTES, Node, Read, Repeated, read_yaml, root_keys
+from robochoc.formats.yaml_tree import MAX_BYTES, Node, Read, Repeated, read_yaml, root_keys
 
 _SECTION = re.compile(r"""^["']?([a-z_]+)["']?[ \t]*:""", re.MULTILINE)
 _PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "external_variables", "distribution_hints"}

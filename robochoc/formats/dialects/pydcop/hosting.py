@@ -8,7 +8,7 @@ from heapq import heapify, heapreplace
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Note, owners_by
-from robochoc.formats.dialects.yaml_tree import Node, Scalar
+from robochoc.formats.yaml_tree import Node, Scalar
 
 
 @dataclass

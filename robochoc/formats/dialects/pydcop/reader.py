@@ -19,7 +19,7 @@ from robochoc.formats.dialects.pydcop.hosting import Hosting, agent_names, text_
 from robochoc.formats.dialects.pydcop.scenario import read_scenario
 from robochoc.formats.dialects.pydcop.translation import Violated
 from robochoc.formats.dialects.tables import CostTable, Scale, definition_name, relation, word
-from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, shown
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import (
     INFINITE,

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Names, Note
 from robochoc.formats.dialects.pydcop.hosting import text_of
-from robochoc.formats.dialects.yaml_tree import Node
+from robochoc.formats.yaml_tree import Node
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.system.plain_text import counted
 

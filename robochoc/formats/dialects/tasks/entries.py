@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import TypeVar
 
 from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, shortened, suggestion
-from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, shown
 
 Point = tuple[Fraction, ...]
 

@@ -26,8 +26,8 @@ from robochoc.formats.dialects.tasks.entries import (
     word_of,
 )
 from robochoc.formats.dialects.tasks.tours import Tasks, Trip, rounded
-from robochoc.formats.dialects.yaml_tree import Node, read_yaml, unread_parts
 from robochoc.formats.symbols import check_symbol
+from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
 from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits

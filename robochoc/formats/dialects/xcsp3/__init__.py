@@ -9,9 +9,9 @@ from robochoc.model.problem import Team
 
 
 def write(team: Team, options: ExportOptions) -> Written:
-    """Return the team's problem as one XCSP3 file. See `robochoc.formats.xcsp3`."""
+    """Return the team's problem as one XCSP3 file. See `robochoc.formats.dialects.xcsp3.writer`."""
     del options
-    from robochoc.formats.xcsp3 import xcsp3  # noqa: PLC0415 - start-up: the solver's process writes it
+    from robochoc.formats.dialects.xcsp3.writer import xcsp3  # noqa: PLC0415 - start-up: the solver's process writes it
 
     return Written({f"{team.name}.xml": xcsp3(team)})
 

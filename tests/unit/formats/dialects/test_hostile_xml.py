@@ -9,8 +9,8 @@ import pytest
 
 from robochoc.formats import InvalidInputError
 from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.names_file import NAMES_FILE, original_names
 from robochoc.formats.dialects.registry import NAMES, dialect_called, dialects, read_foreign, recognise
+from robochoc.formats.names_file import NAMES_FILE, original_names
 from tests.support.cases import looped
 
 FRODO = '<presentation format="XCSP 2.1_FRODO"/><agents><agent name="a"/></agents>'

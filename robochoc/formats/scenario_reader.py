@@ -10,12 +10,12 @@ from pathlib import Path
 
 from lxml import etree
 
-from robochoc.formats.constraints import Context, read_shared
+from robochoc.formats.constraint_reader import ConstraintContext, read_shared
 from robochoc.formats.costs import places_used
+from robochoc.formats.definition_reader import integer
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
-from robochoc.formats.extension import integer
-from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.rules import (
+from robochoc.formats.robot_reader import RobotFile, read_robot_file
+from robochoc.formats.robot_rules import (
     NOBODY_LEFT,
     check_added_constraint,
     check_constraint_of_added_robot,
@@ -55,7 +55,7 @@ def read_scenario(
     `team` is None when the robots' `files` have mistakes: then only the scenario's own mistakes are looked for. Files
     of added robots lie in the folder or below. Symbols go into the `table`. Raises `InvalidInputError`.
     """
-    return _Reader(folder, team, files, table).events()
+    return _ScenarioReader(folder, team, files, table).events()
 
 
 def places_of_scenario(folder: Path) -> int:
@@ -72,7 +72,7 @@ def places_of_scenario(folder: Path) -> int:
     return places
 
 
-class _Reader:
+class _ScenarioReader:
     """Walks through the events, and changes the team on the way.
 
     A change that the team cannot take is reported and left out. Names that it would have added are no mistakes after
@@ -84,7 +84,7 @@ class _Reader:
         self._table = table
         self._path = folder / SCENARIO
         self._team = team
-        self._contexts: dict[str, Context] = {name: file.context for name, file in files.items()}
+        self._contexts: dict[str, ConstraintContext] = {name: file.context for name, file in files.items()}
         self._places = max((file.robot.costs.places for file in files.values()), default=0)
         self._report = DiagnosticCollector(str(self._path))
         self._elsewhere: list[Diagnostic] = []

@@ -21,7 +21,7 @@ from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_t
 from robochoc.formats.global_constraints import check_global
 from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
-from robochoc.formats.rules import (
+from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
     check_constraint,
     check_private,
@@ -54,7 +54,7 @@ from robochoc.model.problem import (
 Defined = Domain | Definition
 
 
-class Objects:
+class RobotValidator:
     """Checks robots one after the other. What they share, domains and definitions, is looked at once."""
 
     def __init__(self) -> None:

@@ -9,8 +9,16 @@ from pathlib import Path
 
 from lxml import etree
 
-from robochoc.formats.constraints import Context, read_private, read_shared
+from robochoc.formats.constraint_reader import ConstraintContext, read_private, read_shared
 from robochoc.formats.costs import Rescaled, places_used, read_units
+from robochoc.formats.definition_reader import (
+    check_count,
+    read_domain,
+    read_function,
+    read_predicate,
+    read_relation,
+    read_topic,
+)
 from robochoc.formats.definitions import check_semantics, refuse_function, refuse_predefined
 from robochoc.formats.diagnostics import (
     MAX_PER_FILE,
@@ -21,13 +29,15 @@ from robochoc.formats.diagnostics import (
     shortened,
     suggestion,
 )
-from robochoc.formats.extension import check_count, read_domain, read_relation
-from robochoc.formats.intension import read_function, read_predicate, read_topic
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
-from robochoc.formats.repair import without_schema_errors
-from robochoc.formats.rules import NEIGHBOURS_ONCE, check_shown_variables, refuse_nothing_to_decide, repeated_neighbours
-from robochoc.formats.schema import SchemaError, schema_for
+from robochoc.formats.robot_rules import (
+    NEIGHBOURS_ONCE,
+    check_shown_variables,
+    refuse_nothing_to_decide,
+    repeated_neighbours,
+)
+from robochoc.formats.schema import SchemaError, schema_for, without_schema_errors
 from robochoc.formats.symbols import SymbolTable
 from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
@@ -52,7 +62,7 @@ from robochoc.model.symbols import with_table
 class RobotFile(TeamMember):
     """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
 
-    context: Context
+    context: ConstraintContext
     """The names that constraints of a scenario can refer to."""
 
     def with_table(self, names: tuple[str, ...]) -> RobotFile:
@@ -128,7 +138,7 @@ def read_robot_file(path: Path, table: SymbolTable) -> RobotFile:
     """
     _check_name(path.stem, path)
     try:
-        return _Reader(path, read_xml(path, "instance"), table).whole()
+        return _RobotReader(path, read_xml(path, "instance"), table).robot_file()
     except SchemaError as refused:
         raise InvalidInputError([*refused.diagnostics, *_other_mistakes(path, refused)]) from None
 
@@ -144,7 +154,7 @@ def robot_in(content: bytes, name: str) -> Robot:
     path = Path(f"{name}.xml")
     _check_name(name, path)
     table = SymbolTable()
-    return with_table(_Reader(path, parsed_xml(content, path, "instance"), table).whole().robot, table.names)
+    return with_table(_RobotReader(path, parsed_xml(content, path, "instance"), table).robot_file().robot, table.names)
 
 
 def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
@@ -156,7 +166,7 @@ def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
         return []
     lines = {mistake.line for mistake in refused.diagnostics}
     try:
-        _Reader(path, tree, SymbolTable()).whole()
+        _RobotReader(path, tree, SymbolTable()).robot_file()
     except InvalidInputError as invalid:
         return [mistake for mistake in invalid.diagnostics if mistake.line not in lines]
     return []
@@ -170,7 +180,7 @@ def _check_name(name: str, path: Path) -> None:
         raise InvalidInputError([Diagnostic(str(path), 0, mistake.message, mistake.hint)]) from None
 
 
-class _Reader:
+class _RobotReader:
     """Walks through one `instance`, which the schema has found valid; every mistake goes into one report."""
 
     def __init__(self, path: Path, instance: etree._Element, table: SymbolTable) -> None:
@@ -180,7 +190,7 @@ class _Reader:
         self._report = DiagnosticCollector(str(path))
         self._own: dict[str, int] = {}
 
-    def whole(self) -> RobotFile:
+    def robot_file(self) -> RobotFile:
         presentation = next(self._instance.iterchildren("presentation"))
         kind = ProblemKind(attribute(presentation, "type"))
         variables = self._variables(self._domains())
@@ -188,7 +198,7 @@ class _Reader:
         topics = self._topics([name for name, is_symbol in symbolic.items() if is_symbol])
         model = ConstraintModel(attribute(presentation, "constraintModel") or ConstraintModel.TKC)
         units = self._units(presentation, kind)
-        context = Context(kind, units, model, self._own, self._definitions(kind, units), symbolic)
+        context = ConstraintContext(kind, units, model, self._own, self._definitions(kind, units), symbolic)
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         parents = tuple(self._parents(context))
@@ -285,8 +295,8 @@ class _Reader:
     def _constraints(
         self,
         holder: etree._Element,
-        context: Context,
-        read: Callable[[etree._Element, Context], Constraint | None],
+        context: ConstraintContext,
+        read: Callable[[etree._Element, ConstraintContext], Constraint | None],
     ) -> tuple[Constraint, ...]:
         constraints = []
         for container in holder.iterchildren("constraints"):
@@ -302,11 +312,11 @@ class _Reader:
     def _agents(self, side: str) -> Iterator[etree._Element]:
         return self._instance.iterfind(f"agents_neighbours/{side}/agent")
 
-    def _parents(self, context: Context) -> Iterator[Parent]:
+    def _parents(self, context: ConstraintContext) -> Iterator[Parent]:
         for agent in self._agents("agents_parent"):
             yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
 
-    def _children(self, context: Context, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
+    def _children(self, context: ConstraintContext, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
         """Yield the children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.scenario import SCENARIO, has_scenario, places_of_scenario, read_scenario
+from robochoc.formats.robot_reader import RobotFile, read_robot_file
+from robochoc.formats.scenario_reader import SCENARIO, has_scenario, places_of_scenario, read_scenario
 from robochoc.formats.symbols import SymbolTable
 from robochoc.formats.team_members import TeamMembers
 from robochoc.formats.validation import check_between_robots, note_valid

@@ -7,18 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.dialects.dialect import Imported
 
 NAMES_FILE = "names.json"
 MAX_BYTES = 64 * 1024 * 1024
 
 
-def names_json(imported: Imported) -> bytes:
+def names_json(dialect: str, names: Mapping[str, str]) -> bytes:
     """Return the content of the file: the dialect, and original names by the team's where they differ."""
     import msgspec  # noqa: PLC0415 - start-up
 
-    told = {"dialect": imported.dialect, "names": dict(imported.names)}
-    return msgspec.json.format(msgspec.json.encode(told)) + b"\n"
+    content = {"dialect": dialect, "names": dict(names)}
+    return msgspec.json.format(msgspec.json.encode(content)) + b"\n"
 
 
 def original_names(folder: Path) -> Mapping[str, str]:
@@ -36,11 +35,11 @@ def original_names(folder: Path) -> Mapping[str, str]:
     form: Any = msgspec.defstruct("NamesFile", fields, forbid_unknown_fields=True)
     try:
         with path.open("rb") as file:
-            told = msgspec.json.decode(file.read(MAX_BYTES), type=form)
+            found = msgspec.json.decode(file.read(MAX_BYTES), type=form)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         hint = "import the problem again, or delete the file"
         raise InvalidInputError(
             [Diagnostic(encodable(str(path)), 0, "does not hold the original names of a team", hint)]
         ) from None
-    names: Mapping[str, str] = told.names
+    names: Mapping[str, str] = found.names
     return names

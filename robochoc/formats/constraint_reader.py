@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from lxml import etree
 
 from robochoc.formats.costs import read_cost
+from robochoc.formats.definition_reader import integer
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.extension import integer
 from robochoc.formats.global_constraints import is_global, read_global, variables_of
 from robochoc.formats.names import is_name
-from robochoc.formats.rules import (
+from robochoc.formats.robot_rules import (
     check_constraint,
     check_private,
     check_shared,
@@ -34,7 +34,7 @@ from robochoc.model.problem import (
 
 
 @dataclass(frozen=True)
-class Context:
+class ConstraintContext:
     """The names that a file's constraints can refer to.
 
     `definitions` holds None, and `own` the name nevertheless, for what is defined but has a mistake of its own:
@@ -52,7 +52,7 @@ class Context:
     """For each own variable, whether its values are symbols."""
 
 
-def read_private(element: etree._Element, context: Context) -> Constraint | None:
+def read_private(element: etree._Element, context: ConstraintContext) -> Constraint | None:
     """Return an intra-agent constraint: over own variables only. See `_read` for the rest."""
     model = attribute(element, "model")
     refuse_private_part(ConstraintModel(model) if model else None)
@@ -62,7 +62,7 @@ def read_private(element: etree._Element, context: Context) -> Constraint | None
     return constraint
 
 
-def read_shared(element: etree._Element, context: Context) -> Constraint | None:
+def read_shared(element: etree._Element, context: ConstraintContext) -> Constraint | None:
     """Return a constraint with a neighbour: over own variables and others'. See `_read` for the rest."""
     model = attribute(element, "model")
     constraint = _read(element, context, ConstraintModel(model) if model else context.model)
@@ -71,7 +71,7 @@ def read_shared(element: etree._Element, context: Context) -> Constraint | None:
     return constraint
 
 
-def _read(element: etree._Element, context: Context, model: ConstraintModel | None) -> Constraint | None:
+def _read(element: etree._Element, context: ConstraintContext, model: ConstraintModel | None) -> Constraint | None:
     """Return the constraint, or None where its definition has a mistake of its own. Raises `MistakeError`."""
     scope = _terms(element.get("scope") or "")
     given = element.find("parameters")
@@ -124,7 +124,7 @@ def _constant(word: str) -> int:
         raise MistakeError(f"'{shortened(word)}' is neither a variable's name nor an integer", hint) from None
 
 
-def _definition(reference: str, context: Context) -> Definition | None:
+def _definition(reference: str, context: ConstraintContext) -> Definition | None:
     if reference in context.definitions:
         return context.definitions[reference]
     if reference in PREDEFINED:

@@ -8,9 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
-from robochoc.formats.dialects.names_file import NAMES_FILE
-from robochoc.formats.robot import robot_in
-from robochoc.formats.scenario import SCENARIO
+from robochoc.formats.names_file import NAMES_FILE
+from robochoc.formats.robot_reader import robot_in
+from robochoc.formats.scenario_reader import SCENARIO
 from robochoc.formats.scenario_writer import team_files
 from robochoc.formats.validation import check_writable
 from robochoc.model.problem import Team
