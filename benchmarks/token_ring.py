@@ -13,7 +13,7 @@ from robochoc.model.problem import Child, Domain, Parent, Robot, Team, Variable
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 OFFSETS = (-4, -3, -2, -1, 1, 2, 3, 4)
 CARGO = bytes(30)

@@ -26,8 +26,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import equip
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 _MOST_SHARED = 1 << 22

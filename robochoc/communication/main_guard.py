@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 
 def require_main_guard() -> None:

@@ -6,7 +6,7 @@ import os
 import resource
 from pathlib import Path
 
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 _MOST_TOLD = 1 << 16
 """More bytes than the system reports of one process."""

@@ -28,7 +28,7 @@ from robochoc.run.options import CENTRAL, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
 KEPT = 4

@@ -12,7 +12,7 @@ import msgspec
 from robochoc.experiments import summary
 from robochoc.experiments.results import Results
 from robochoc.experiments.study import report_settings
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import on_one_line
 
 _NESTED = ("settings", "messages_by_type", "cost_over_time", "loads")

@@ -17,7 +17,7 @@ from robochoc.run.defaults import AUTO
 from robochoc.run.options import CENTRAL, Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 RUN_KEYS = (
     "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw",

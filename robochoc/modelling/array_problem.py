@@ -29,7 +29,7 @@ from robochoc.run.option_values import texts_by_name
 from robochoc.run.options import Options
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError
 

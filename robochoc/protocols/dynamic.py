@@ -9,8 +9,8 @@ from abc import abstractmethod
 
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.solver.local_problem import LocalProblem
 
 
 class DynamicProtocol(Protocol):

@@ -18,7 +18,7 @@ from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

@@ -1,4 +1,4 @@
-"""Requirements of a problem on a protocol: the kinds of constraints that a robot has.
+"""Requirements of a problem on a protocol: costs, and the kinds of constraints that a robot has.
 
 A run checks all robots before it begins (`run/compatibility`). Across machines only the robot itself knows its
 constraints, so each robot checks its own. Both import this module.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.model.absence import may_count_when_absent
-from robochoc.model.problem import ConstraintModel, Robot, WhenAbsent
+from robochoc.model.problem import ConstraintModel, ProblemKind, Robot, WhenAbsent
 from robochoc.protocols.traits import Traits
 from robochoc.solver.encoding import is_soft
 
@@ -39,4 +39,6 @@ def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -
         for constraint in (*private, *robot.shared, *held_for_children):
             if may_count_when_absent(constraint):
                 return f"{robot.name} holds {constraint.name}, {BREAKABLE}"
+    if robot.kind == ProblemKind.DISWCSP and not traits.costs:
+        return f"{robot.name} has costs to minimise (DCOP)"
     return ""

@@ -21,7 +21,7 @@ from robochoc.protocols.satisfaction.nogood import NogoodStore
 from robochoc.replay.safe_repr import safe_repr
 from robochoc.replay.value_text import NumberedValueText, ValueText, as_value, cut
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiled_core import attributes_of
 
 MOST_VALUES = 60

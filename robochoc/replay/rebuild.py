@@ -28,8 +28,7 @@ from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileError, Compiler, CompileTimeoutError, Limits
 from robochoc.solver.compiled_domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
+from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError, UnsupportedError
 from robochoc.system.errors import TransferableError
 from robochoc.verification.objective import withdrawal_cost
 

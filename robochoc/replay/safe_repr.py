@@ -10,7 +10,7 @@ from itertools import islice
 from robochoc.protocols.order import PriorityOrder
 from robochoc.replay.value_text import cut
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiled_core import attributes_of
 
 MAX_DEPTH = 3

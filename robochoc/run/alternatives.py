@@ -14,7 +14,7 @@ from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, max_total, ref
 from robochoc.run.facts import Facts
 from robochoc.run.options import CENTRAL, Options, Runtime
 from robochoc.run.registry import InstalledProtocol, installed_protocols
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
 

@@ -24,8 +24,7 @@ from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import UnknownProtocolError, installed_protocols, protocol_named
 from robochoc.solver.compile import CompileError, CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
-from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.errors import SolverLostError, SolverMissingError
+from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.system.plain_text import counted
 
 SOMEBODY = "it accepts the team with these options, and what suits the team better does not"

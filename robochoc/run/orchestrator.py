@@ -27,7 +27,7 @@ from robochoc.run.scenario import Environment
 from robochoc.run.this_machine import ThisMachine
 from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.time_limit import TimeLimitError, computed_by
 from robochoc.verification.checker import check_told_cost
 

@@ -9,7 +9,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 
 def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, str]) -> None:

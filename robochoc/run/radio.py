@@ -8,7 +8,7 @@ from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import Robot, Team
 from robochoc.run.options import Options
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 
 def refuse_channel(team: Team, options: Options) -> None:

@@ -22,7 +22,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 if TYPE_CHECKING:
     from robochoc.communication.simulator.losses import Losses

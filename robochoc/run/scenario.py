@@ -89,7 +89,7 @@ class ScenarioRun:
 
     Attributes:
         team: the team as it is now, in the order of its files.
-        withdrawn: the robots that were lost, and have not come back.
+        lost_for_good: the robots that were lost and have not come back.
         failed_returns: why lost robots could not come back, a sentence each.
         found: the result of the epoch that begins, if what the robots do before the search has settled it.
     """
@@ -122,7 +122,7 @@ class ScenarioRun:
             with_files: whether the constraints that lost robots hold are lost with them.
         """
         self.team = self._full = team_after_events(team, events=0)
-        self.withdrawn: list[str] = []
+        self.lost_for_good: list[str] = []
         self.failed_returns: list[str] = []
         self._files = team
         self._happened = 0
@@ -222,12 +222,12 @@ class ScenarioRun:
 
     def remove(self, lost: Collection[str]) -> None:
         """Remove the robots `lost` for good."""
-        self.withdrawn += lost
+        self.lost_for_good += lost
         self._update_team(())
 
     def _describe(self, event: ScenarioEvent) -> str:
         """Return in a few words what of `event` can still happen."""
-        out = set(self.withdrawn)
+        out = set(self.lost_for_good)
         changes = apply_possible_changes(self._full, event.changes)[1] if self._has_added_events else event.changes
         words = [
             describe_change(change, self._full)
@@ -249,7 +249,7 @@ class ScenarioRun:
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _lose(self, lost: Mapping[str, str]) -> Collection[str]:
-        """Return those of `lost` that come back; the others are withdrawn."""
+        """Return those of `lost` that come back; the others are lost for good."""
         self._after_losses = True
         back: list[str] = []
         for name in lost:
@@ -260,7 +260,7 @@ class ScenarioRun:
                     back.append(name)
                 except (InvalidInputError, ChangeError, UnboundedCostError, OSError) as why:
                     self.failed_returns.append(f"{name} could not come back: {why}")
-        self.withdrawn += [name for name in lost if name not in back]
+        self.lost_for_good += [name for name in lost if name not in back]
         if back:
             self._full = team_after_events(self._files, self._happened)
             self._order = self._order or self.team.order
@@ -268,7 +268,7 @@ class ScenarioRun:
 
     def _update_team(self, joining: Collection[str]) -> None:
         """Update the team and its order: the robots that are `joining` come last."""
-        self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in joining]
+        self.lost_for_good = [name for name in self.lost_for_good if name in self._full and name not in joining]
         self.team = self._remaining()
         if self._order is not None:
             new = {*joining}
@@ -276,14 +276,14 @@ class ScenarioRun:
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
     def _remaining(self) -> Team:
-        """Return the team without the withdrawn robots.
+        """Return the team without the robots that are lost for good.
 
         If the constraints that they hold are lost too, the initial order of the run determines which ones they hold.
         """
         order = self._held_in
-        if order is None or not self.withdrawn:
-            return without_robots(self._full, self.withdrawn, with_files=self._with_files)
-        left = without_robots(with_priorities(self._full, order), self.withdrawn, with_files=True)
+        if order is None or not self.lost_for_good:
+            return without_robots(self._full, self.lost_for_good, with_files=self._with_files)
+        left = without_robots(with_priorities(self._full, order), self.lost_for_good, with_files=True)
         return with_priorities(left, [name for name in self._full.order if name in left])
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:

@@ -80,7 +80,7 @@ class ThisMachine(Deployment):
     @property
     def lost(self) -> tuple[str, ...]:
         """See `Deployment.lost`."""
-        return tuple(self._scenario.withdrawn)
+        return tuple(self._scenario.lost_for_good)
 
     @property
     def is_empty(self) -> bool:

@@ -14,8 +14,8 @@ from robochoc.model.problem import Robot, Team
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compiled_domain import MAX_SOLUTIONS, CompiledDomain, TooManySolutionsError, compile_domain
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import Codes, Network, UnsupportedError
-from robochoc.solver.errors import SolverLostError, SolverTimeoutError
+from robochoc.solver.encoding import Codes, Network
+from robochoc.solver.errors import SolverLostError, SolverTimeoutError, UnsupportedError
 from robochoc.system.errors import TransferableError
 from robochoc.system.time_limit import TimeLimitError, computed_by
 

@@ -13,16 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from robochoc.model.problem import Constraint, Robot, Value
-from robochoc.solver.encoding import (
-    Codes,
-    Component,
-    Cost,
-    Network,
-    UnsupportedError,
-    components,
-    cost_function,
-    is_soft,
-)
+from robochoc.solver.encoding import Codes, Component, Cost, Network, components, cost_function, is_soft
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import TransferableError
 
 MAX_SOLUTIONS = 100_000

@@ -31,8 +31,8 @@ from robochoc.solver.cp_sat_messages import (
     CpSatTask,
     FromCpSat,
 )
-from robochoc.solver.encoding import Costs, Network, UnsupportedError
-from robochoc.solver.errors import SolverLostError, SolverMissingError
+from robochoc.solver.encoding import Costs, Network
+from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.solver.linear import Formula, Junction
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.signals import signals_held

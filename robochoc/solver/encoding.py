@@ -20,6 +20,7 @@ from robochoc.model.expression import UndefinedValueError
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
 from robochoc.model.expression.closures import Closure, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.linear import FALSE, Formula, Operand, is_small, linear, operands, renamed
 from robochoc.solver.splitting import MAX_TRIED, split
 
@@ -35,14 +36,6 @@ MAX_ALLOWED_ROWS = 100_000
 Codes = tuple[int, ...]
 Costs = tuple[tuple[int, int], ...]
 """The positions of variables whose codes are costs, each with the unit of its codes."""
-
-
-class UnsupportedError(Exception):
-    """The problem is valid, but not supported by this version or protocol. The message says what to do instead."""
-
-
-class TooLargeError(UnsupportedError):
-    """The problem is too large for this protocol, which was only detectable during the search."""
 
 
 @dataclass(frozen=True)

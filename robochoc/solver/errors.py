@@ -1,9 +1,16 @@
-"""Errors of the constraint solvers. In a file of their own, so that catching them does not import a solver."""
+"""Errors of local problems and of constraint solvers. In a separate file, so that catching them imports no solver."""
 
 from __future__ import annotations
 
-from robochoc.solver.encoding import Codes
 from robochoc.system.errors import TransferableError
+
+
+class UnsupportedError(Exception):
+    """The problem is valid, but not supported by this version or protocol. The message says what to do instead."""
+
+
+class TooLargeError(UnsupportedError):
+    """The problem is too large for this protocol, which was only detectable during the search."""
 
 
 class SolverMissingError(Exception):
@@ -17,6 +24,6 @@ class SolverLostError(Exception):
 class SolverTimeoutError(TransferableError):
     """The deadline passed before the solver's answer. `best`: the cheapest solution so far, if costs are minimised."""
 
-    def __init__(self, best: Codes | None = None) -> None:
+    def __init__(self, best: tuple[int, ...] | None = None) -> None:
         super().__init__()
         self.best = best

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 
 EXACT = 1 << 53
 """Floats represent all integers below this exactly."""

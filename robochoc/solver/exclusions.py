@@ -23,7 +23,8 @@ from typing import NamedTuple
 from robochoc.model.constraint import Definition
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Team
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.encoding import MAX_TUPLES, Cost, UnsupportedError, cost_function
+from robochoc.solver.encoding import MAX_TUPLES, Cost, cost_function
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.explanation import constraints_above
 
 Choice = tuple[int, int]

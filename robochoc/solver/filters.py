@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from robochoc.model.problem import Value
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.shared_constraint import SharedConstraint
 
 MAX_FILTER_BITS = 65_536

@@ -10,15 +10,8 @@ from typing import NamedTuple
 from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.problem import INFINITE, Constraint, Domain, Value
 from robochoc.solver.agent_problem import TeamKnowledge
-from robochoc.solver.encoding import (
-    MAX_TUPLES,
-    Cost,
-    UnsupportedError,
-    allows_function,
-    cost_function,
-    is_soft,
-    max_cost,
-)
+from robochoc.solver.encoding import MAX_TUPLES, Cost, allows_function, cost_function, is_soft, max_cost
+from robochoc.solver.errors import UnsupportedError
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that exclude an own value: the left side of a nogood."""

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from robochoc.model.problem import Constraint, ProblemKind, Team
 from robochoc.solver.cliques import with_cliques
-from robochoc.solver.encoding import Codes, Component, Network, Table, UnsupportedError, components, is_soft
+from robochoc.solver.encoding import Codes, Component, Network, Table, components, is_soft
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.propagation import propagate
 from robochoc.solver.weighted import MAX_CODE, constant_costs, costs_by_scope
 

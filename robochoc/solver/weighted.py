@@ -15,18 +15,8 @@ from dataclasses import dataclass, replace
 from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable, WhenAbsent
-from robochoc.solver.encoding import (
-    Codes,
-    Component,
-    Cost,
-    Costs,
-    Network,
-    Table,
-    UnsupportedError,
-    components,
-    cost_function,
-    is_soft,
-)
+from robochoc.solver.encoding import Codes, Component, Cost, Costs, Network, Table, components, cost_function, is_soft
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.propagation import propagate
 
 MAX_COST_ROWS = 1_000_000

@@ -27,7 +27,7 @@ from robochoc.run.registry import UnknownProtocolError, protocol_named, protocol
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support import golden
 from tests.support.limits import HANG_S
 from tests.support.problems import team_of

@@ -8,7 +8,7 @@ import pytest
 
 import robochoc
 from robochoc.communication.kill_schedule import Kill
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.absence_models import AbsenceModel
 from tests.support.examples import are_the_same, count, drawn
 

@@ -19,7 +19,7 @@ from robochoc.model.problem import Robot, Team
 from robochoc.model.team_edits import constraints_in_force
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named
-from robochoc.solver import compiled
+from robochoc.solver import local_problem
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
@@ -152,7 +152,7 @@ def test_many_values_are_looked_up_as_few_are(teams: int, monkeypatch: pytest.Mo
         seed = chance.getrandbits(32)
         results = []
         for large in (1, 10**9):
-            monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", large)
+            monkeypatch.setattr(local_problem, "MIN_TABLE_VALUES", large)
             results.append(Simulation(by_itself, protocol_named("abt"), Concurrent(seed, 20)).run(60))
         walked, tables = (replace(result, metrics=replace(result.metrics, wall_s=0)) for result in results)
         assert walked == tables, number

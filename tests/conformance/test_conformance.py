@@ -20,7 +20,7 @@ from robochoc.model.team_edits import constraints_in_force
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import violations
 from tests.support.allocation_problems import ANY_TEAM, simple_allocation_team
 from tests.support.brute_force import solutions

@@ -14,7 +14,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, ScheduleName, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team

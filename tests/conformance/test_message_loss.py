@@ -18,7 +18,7 @@ from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import ScheduleName, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import least_cost
 from tests.support.cases import cases, looped
 from tests.support.cost_problems import random_cost_team

@@ -18,7 +18,7 @@ from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.allocation_problems import simple_allocation_team
 from tests.support.cases import looped

@@ -14,7 +14,7 @@ from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, 
 from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
 from robochoc.formats.names_file import NAMES_FILE, names_json, original_names
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.fuzz.file_targets import folder
 from tests.fuzz.harness import Target, assert_clear
 from tests.fuzz.mutations import (

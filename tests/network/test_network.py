@@ -19,7 +19,7 @@ from robochoc.protocols.findings import NO_FINDINGS
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.brute_force import least_cost, solutions
 from tests.support.cases import looped

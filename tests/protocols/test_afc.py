@@ -13,7 +13,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.afc import AFC, FilteredDomain
 from robochoc.protocols.satisfaction.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import robot_of
 from tests.support.brute_force import solutions
 from tests.support.cases import cases

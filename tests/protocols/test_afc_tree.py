@@ -19,7 +19,7 @@ from robochoc.protocols.satisfaction.afc_tree import AFCTree
 from robochoc.protocols.satisfaction.afc_tree_messages import Accept
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.verification.checker import violations
 from tests.support.agents import replies, robot_of, started, started_robot, value
 from tests.support.problems import random_team

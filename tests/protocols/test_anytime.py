@@ -27,7 +27,7 @@ from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.objective import Objective, withdrawal_cost
 from tests.support.agents import assert_refused, robot_of, sent, started
 from tests.support.cases import cases, looped

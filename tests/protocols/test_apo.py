@@ -20,7 +20,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.compapo import Assign, Changes, CompAPO, Evaluate, Evaluation, Ok, Release
 from robochoc.protocols.satisfaction.mediation import Mediation, allows, sizes_in
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.verification.checker import violations
 from tests.support.examples import count
 

@@ -17,7 +17,7 @@ from robochoc.protocols.local_search.mgm import Gain
 from robochoc.protocols.message import Message
 from robochoc.protocols.shared.cycles import NO_GAIN, Value
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.compiled import LexicographicCost
+from robochoc.solver.local_problem import LexicographicCost
 from tests.support.agents import after, assert_refused, replies, started_robot, value
 from tests.support.asymmetric_problems import divided_pair as pair
 from tests.support.cases import looped

@@ -26,7 +26,7 @@ from robochoc.protocols.message import Message
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.agents import started_robot
 from tests.support.allocation_problems import Allocation, greedy, idle, optimum, random_allocation
 from tests.support.brute_force import least_cost

@@ -21,8 +21,8 @@ from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import exact_costs
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import assert_refused, replies, started_robot
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team, random_tree, with_costs

@@ -11,7 +11,7 @@ from robochoc.protocols.optimization.forward_bounding import CostsAbove
 from robochoc.protocols.optimization.ncbb import NCBB, Greedy, Search
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import after, assert_refused, replies
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team

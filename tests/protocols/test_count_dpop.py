@@ -20,7 +20,7 @@ from robochoc.protocols.settings import equip
 from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import Withdrawal
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from tests.support.agents import after, assert_refused, replies
 from tests.support.brute_force import priced_solutions
 from tests.support.cases import looped

@@ -27,7 +27,7 @@ from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import Back, Token, TreeMessage, Wave
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.examples import examples
 from tests.support.limits import HANG_S

@@ -22,7 +22,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compile import TeamCompiler, TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.cases import looped
 from tests.support.examples import count

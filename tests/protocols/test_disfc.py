@@ -21,7 +21,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.disfc import DisFC
 from robochoc.protocols.satisfaction.disfc_messages import AddLink, Nogood, Ok
 from robochoc.solver import filters
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.filters import allows
 from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.complex_problems import complex_team, random_complex_team

@@ -17,7 +17,7 @@ from robochoc.protocols.inference.dpop_tables import Extent, bytes_of
 from robochoc.protocols.message import Message, encode
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies
 from tests.support.cases import looped

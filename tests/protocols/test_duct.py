@@ -24,7 +24,7 @@ from robochoc.protocols.local_search.duct import (
 from robochoc.protocols.message import Message
 from robochoc.protocols.settings import read_settings
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LexicographicCost
+from robochoc.solver.local_problem import LexicographicCost
 from tests.support.agents import replies, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team

@@ -28,8 +28,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.dynabt import DynABT, Nogood
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies, value
 from tests.support.cases import looped
 from tests.support.dynabt_robots import after, agent, change

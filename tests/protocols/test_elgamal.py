@@ -9,7 +9,7 @@ import pytest
 from robochoc.protocols.key_stream import KeyStream
 from robochoc.protocols.private.ed25519 import Ed25519, Group
 from robochoc.protocols.private.elgamal import TeamKey
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.toy_group import ToyGroup
 

@@ -19,7 +19,7 @@ from robochoc.protocols.private.p2_dpop import P2DPOP, Bisection, EncryptedTable
 from robochoc.protocols.private.rerooting import Next
 from robochoc.protocols.private.ring import Ring
 from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.cases import looped
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of

@@ -19,7 +19,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.auctions.grape import GRAPE, Partition
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.agents import replies, robot_of, started
 from tests.support.allocation_problems import Congestion, plain, random_congestion, simple_allocation_team
 from tests.support.cases import looped

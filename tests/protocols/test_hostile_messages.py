@@ -26,7 +26,7 @@ from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import AgentProblem, agent_problems
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from tests.support.allocation_problems import random_allocation
 from tests.support.cases import cases, looped
 from tests.support.problems import team_of

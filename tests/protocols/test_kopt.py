@@ -25,7 +25,7 @@ from robochoc.protocols.local_search.kopt import (
     Values,
 )
 from robochoc.protocols.shared.cycles import Domain
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team

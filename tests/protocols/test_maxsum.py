@@ -20,7 +20,7 @@ from robochoc.protocols.shared.cycles import Domain
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import shared_constraint
 from robochoc.solver.cost_table import CostTable
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped

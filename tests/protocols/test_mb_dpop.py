@@ -18,7 +18,7 @@ from robochoc.protocols.inference.dpop import UTIL, VALUE, Proceed
 from robochoc.protocols.inference.mb_dpop import MBDPOP, Axis, Context, DomainAtDepth, Label
 from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped

@@ -26,7 +26,7 @@ from robochoc.protocols.private.linear_order import CostSum
 from robochoc.protocols.private.p2_dpop import P2DPOP
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from tests.support.cases import looped
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, random_hard_team, with_costs
 from tests.support.encrypted_problems import affordable

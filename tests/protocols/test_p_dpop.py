@@ -21,7 +21,7 @@ from robochoc.protocols.private.p_dpop import BROKEN, KEY_BITS, PDPOP, WIDTH, nu
 from robochoc.replay import CannotReplayError, replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from tests.support.cost_problems import with_costs
 from tests.support.examples import examples
 from tests.support.pkc_bytes import nothing_hidden, run

@@ -23,8 +23,8 @@ from robochoc.protocols.satisfaction.disfc import DisFC
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies, robot_of, started, started_robot
 from tests.support.brute_force import solutions
 from tests.support.cases import looped

@@ -18,7 +18,7 @@ from robochoc.protocols.message import Message, encode
 from robochoc.protocols.optimization.run_lengths import expanded
 from robochoc.protocols.optimization.sfb import LARGEST, SFB, Above, Below, CPAs, Explored, SFBSettings, Solution
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost

@@ -19,7 +19,7 @@ from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.optimization.sfb_bounds import VALUES, ForwardBounds
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.brute_force import solutions
 from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team

@@ -19,7 +19,7 @@ from robochoc.protocols.optimization.sfb import SFB, Explored, Solution
 from robochoc.protocols.optimization.sfb_bounds import BOUND, COST, VALUES
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import cost_of, random_cost_team

@@ -13,7 +13,7 @@ from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.cases import cases
 
 P = TypeVar("P", bound=Protocol)

@@ -8,8 +8,8 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.dynabt import DynABT
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import invalidated_by
+from robochoc.solver.local_problem import LocalProblem
 
 
 def agent(team: Team, name: str) -> DynABT:

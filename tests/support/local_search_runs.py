@@ -13,7 +13,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Assignment, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 
 
 def any_schedule(chance: Random) -> Schedule:

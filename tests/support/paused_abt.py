@@ -15,8 +15,8 @@ from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.settings import Settings
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.problems import PREDICATES, team_of
 
 PAUSE_S = 0.005

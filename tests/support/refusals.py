@@ -7,7 +7,7 @@ import pytest
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.run import solve
 from robochoc.run.options import Options
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
 

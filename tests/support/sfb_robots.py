@@ -9,7 +9,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.sfb import SFB, CPAs, SFBSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies
 from tests.support.pseudo_trees import Costs, priced
 

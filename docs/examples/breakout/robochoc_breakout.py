@@ -33,7 +33,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 Nogood = tuple[int, str, tuple[tuple[str, Value], ...]]

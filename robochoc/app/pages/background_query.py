@@ -11,7 +11,7 @@ from robochoc.app.log import log_error
 from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import InvalidInputError
 from robochoc.modelling.errors import ModelError
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 T = TypeVar("T")
 

@@ -233,7 +233,7 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
         Failure: for a channel that cannot be read.
     """
     from robochoc.run.compatibility.option_rules import refuse_options
-    from robochoc.solver.encoding import UnsupportedError
+    from robochoc.solver.errors import UnsupportedError
 
     for name in ("timeout", "deadline"):
         if arguments[name] is not None and not arguments[name] > 0:

@@ -75,8 +75,7 @@ def _status(error: Exception) -> int | None:
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError
     from robochoc.solver.compiled_domain import TooManySolutionsError
-    from robochoc.solver.encoding import UnsupportedError
-    from robochoc.solver.errors import SolverLostError, SolverMissingError
+    from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
     from robochoc.verification.checker import RefutedError
 
     statuses: dict[int, tuple[type[Exception], ...]] = {

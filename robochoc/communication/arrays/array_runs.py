@@ -14,7 +14,7 @@ from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.protocol import Protocol
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 _ARRAY_RUNS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType(
     {DSA: ArrayDSA, MGM: ArrayMGM, MGM2: ArrayMGM2, MaxSum: ArrayMaxSum}

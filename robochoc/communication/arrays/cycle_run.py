@@ -20,7 +20,7 @@ from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.chance import FIRST_FACTOR, SECOND_FACTOR, UNIT, key_and_step
 from robochoc.protocols.shared.cycles import CycleCount, CycleSettings, Value
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 
 WITHOUT_ANYTIME = "remove it, as arrays always return the best cycle"

@@ -12,7 +12,7 @@ from robochoc.protocols.message import Value, encode
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 from robochoc.communication.arrays.array_types import Flags, Floats, Index, Integers
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.jagged import columns, narrowest, segments
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import check_exact
 
 _SIGNED_BITS = 63

@@ -20,7 +20,7 @@ from robochoc.protocols.inference.maxsum import MaxSumSettings, Q, R
 from robochoc.protocols.inference.maxsum_factor import MOST
 from robochoc.protocols.message import encode
 from robochoc.protocols.shared.cycles import CycleCount, Domain
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 _REST = len(encode(R([]))) - 1
 """Bytes of a message without its list of rows."""

@@ -23,7 +23,7 @@ from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.stopping import stop_requested
 
 

@@ -25,7 +25,7 @@ from robochoc.communication.network.control_messages import (
     ToRobot,
     Welcome,
 )
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 MASTER = "MASTER"
 """The master's name, as in Figure 3. No robot can have it."""

@@ -40,7 +40,7 @@ from robochoc.model.team_edits import keep_interfaces
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.signals import signals_held
 
 LOOPBACK = "127.0.0.1"

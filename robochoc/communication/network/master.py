@@ -55,7 +55,7 @@ from robochoc.communication.session import is_past
 from robochoc.journal.events import Observer
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 REGISTRY_S = 0.5

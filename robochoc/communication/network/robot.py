@@ -58,7 +58,7 @@ from robochoc.communication.robot_loop import IDLE_S
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 CHECK_S = 0.25

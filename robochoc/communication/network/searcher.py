@@ -36,7 +36,7 @@ from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
 from robochoc.model.outcome import Metrics
-from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
+from robochoc.model.problem import Constraint, ConstraintModel
 from robochoc.protocols.findings import NO_FINDINGS, Findings, Trail
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
@@ -44,7 +44,7 @@ from robochoc.protocols.requirements import unmet_requirement
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, TeamKnowledge
 from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, constraints_above
 
 _Values = dict[str, int]
@@ -142,11 +142,7 @@ class Searcher(RobotLoop):
 
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
         """Raise `UnsupportedError` if this robot's file requires more than the protocol supports."""
-        robot, traits = self._robot, self._protocol.traits
-        unmet = unmet_requirement(robot, traits, owners)
-        if robot.kind == ProblemKind.DISWCSP and not traits.costs:
-            unmet = f"{robot.name} is part of a DisWCSP"
-        if unmet:
+        if unmet := unmet_requirement(self._robot, self._protocol.traits, owners):
             raise UnsupportedError(f"{unmet}, which {self._task.protocol} does not support")
 
     def learn(self, sender: str, content: bytes) -> None:

@@ -15,7 +15,7 @@ from robochoc.authority.keyring import KeyCard, KeyCardError, KeyRing, UnknownPe
 from robochoc.communication.filters import FilterStack, UnknownFilterError, filter_named
 from robochoc.communication.network.control_messages import Copies, ProtocolMessage, ToMaster, ToPeer
 from robochoc.communication.network.framing import MASTER, Framing, Opened
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 
 class SecureChannel:

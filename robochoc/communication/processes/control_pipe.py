@@ -11,7 +11,7 @@ import msgspec
 
 from robochoc.communication.control import QUEUES_AT_ONCE, FromParent, FromRobot
 from robochoc.communication.processes.queues import READ_BYTES, QueueWriter, unpack
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 _DECODER = msgspec.msgpack.Decoder(FromParent)
 _ENCODER = msgspec.msgpack.Encoder()

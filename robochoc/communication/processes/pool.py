@@ -18,7 +18,7 @@ from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, robot_process, served_robot_process
 from robochoc.communication.resources import allow_descriptors
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.signals import signals_held
 
 StartMethod = Literal["fork", "forkserver"]

@@ -42,7 +42,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.garbage import garbage_frozen
 
 CHECK_S = 0.001

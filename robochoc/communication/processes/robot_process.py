@@ -23,8 +23,8 @@ from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queue_robot import QueueRobot
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem
-from robochoc.solver.compiled import MIN_TABLE_VALUES
-from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
+from robochoc.solver.local_problem import MIN_TABLE_VALUES
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 LOWEST_NICE = 19

@@ -23,7 +23,7 @@ from robochoc.formats.dialects.tabulation import Exported, amounts, exported, he
 from robochoc.formats.dialects.xdiscsp import FORMAT
 from robochoc.model.constraint import INFINITE
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 NAME = "dcopsolver"
 TITLE = "DCOPSolver's XDisCSP"

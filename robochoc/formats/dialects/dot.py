@@ -9,7 +9,7 @@ from pathlib import Path
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Written
 from robochoc.formats.dialects.graph import pseudo_tree, shared_constraints
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 NAME = "dot"
 

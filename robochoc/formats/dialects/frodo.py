@@ -26,7 +26,7 @@ from robochoc.formats.global_constraints import PREFIX, write_global
 from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
 from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import counted
 
 NAME = "frodo"

@@ -10,7 +10,7 @@ from lxml import etree
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Written
 from robochoc.formats.dialects.graph import shared_constraints
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 NAME = "graphml"
 

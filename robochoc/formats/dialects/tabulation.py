@@ -22,7 +22,7 @@ from robochoc.model.constraint import (
     Relation,
 )
 from robochoc.model.problem import Robot, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 CONSTANT = "constant"
 """The name of a constraint for the constant cost."""

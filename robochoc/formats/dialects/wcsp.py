@@ -18,7 +18,7 @@ from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, Te
 from robochoc.formats.dialects.toulbar2.text import Reader, Words, has_suffix, read_with, read_words
 from robochoc.model.constraint import INFINITE
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 MAX_VARIABLES = 1_000_000
 """The maximum number of variables and of cost functions."""

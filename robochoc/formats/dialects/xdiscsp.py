@@ -27,7 +27,7 @@ from robochoc.formats.dialects.xcsp21.team import as_team
 from robochoc.formats.element_view import ElementView
 from robochoc.model.constraint import INFINITE, Predicate, Semantics
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 NAME = "xdiscsp"
 FORMAT = "XDisCSP 1.0"

@@ -43,7 +43,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, CycleProtocol, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 
 
 class ACLSSettings(CycleCount, frozen=True):

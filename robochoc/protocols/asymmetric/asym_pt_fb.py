@@ -50,7 +50,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, costs_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 

@@ -53,7 +53,7 @@ from robochoc.protocols.optimization.afb_bounds import Cost, CostLookup, stamp_o
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class SideRequest(Message, frozen=True):

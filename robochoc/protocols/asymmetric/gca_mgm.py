@@ -27,7 +27,7 @@ from dataclasses import replace
 
 from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM
 from robochoc.protocols.shared.cycles import NO_GAIN
-from robochoc.solver.compiled import LexicographicCost
+from robochoc.solver.local_problem import LexicographicCost
 
 
 class GCAMGM(MCSMGM):

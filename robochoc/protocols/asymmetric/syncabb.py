@@ -55,7 +55,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text, incumbent_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class SyncABBSettings(Settings, frozen=True):

@@ -46,7 +46,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import listed
 
 WinningBid = tuple[Lot, str, int]

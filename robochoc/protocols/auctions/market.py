@@ -21,8 +21,9 @@ from robochoc.protocols.disclosure import Hearing, Pays, Proof, SomeValuePays, c
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import Cost, UnsupportedError
+from robochoc.solver.encoding import Cost
+from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import listed
 
 Lot = tuple[int, int]

@@ -50,7 +50,7 @@ from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class AsyncMaxSumSettings(Settings, frozen=True):

@@ -54,8 +54,8 @@ from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text, costs_text
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import check_exact
+from robochoc.solver.local_problem import LocalProblem
 
 if TYPE_CHECKING:
     from robochoc.solver.cost_table import Array

@@ -82,9 +82,9 @@ from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 GIB = 1 << 30

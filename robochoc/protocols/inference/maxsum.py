@@ -69,7 +69,7 @@ from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, costs_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 MAX_SPLIT = 0.5
 """With this share both halves of a function are alike."""

@@ -56,7 +56,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class MaxSumADSettings(CycleSettings, frozen=True):

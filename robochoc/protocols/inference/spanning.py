@@ -22,7 +22,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 Ends = tuple[str, str]
 """The two robots of a function, the higher first."""

@@ -48,7 +48,7 @@ from robochoc.protocols.local_search.dsa import DSA, DSASettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class ADSASettings(DSASettings, frozen=True):

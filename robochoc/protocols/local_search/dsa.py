@@ -50,7 +50,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LexicographicCost
+from robochoc.solver.local_problem import LexicographicCost
 
 
 class DSASettings(CycleSettings, frozen=True):

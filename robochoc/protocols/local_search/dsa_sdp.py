@@ -45,7 +45,7 @@ from robochoc.protocols.local_search.dsa import StochasticSearch
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LexicographicCost
+from robochoc.solver.local_problem import LexicographicCost
 
 
 class DSASDPSettings(CycleSettings, frozen=True):

@@ -71,7 +71,7 @@ from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 

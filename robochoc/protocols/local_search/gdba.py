@@ -55,8 +55,8 @@ from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.encoding import Cost
+from robochoc.solver.local_problem import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.shared_constraint import OtherValues
 
 

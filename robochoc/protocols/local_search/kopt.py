@@ -66,9 +66,9 @@ from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, CycleSettings, Domain, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 MOST = 8

@@ -57,7 +57,7 @@ from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Domain, Then, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 from robochoc.system.plain_text import counted
 
 

@@ -43,7 +43,7 @@ from robochoc.protocols.local_search.dsa import StochasticSearch
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LexicographicCost
+from robochoc.solver.local_problem import LexicographicCost
 
 
 class MixedDSASettings(CycleSettings, frozen=True):

@@ -53,7 +53,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 
 
 class RegretMatchingSettings(CycleSettings, frozen=True):

@@ -84,7 +84,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text, costs_text, incumbent_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 Cost = int | float
 """Costs are integers, and `inf` where a hard constraint is broken."""

@@ -65,7 +65,7 @@ from robochoc.protocols.optimization.depth_first import DepthFirstProtocol
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

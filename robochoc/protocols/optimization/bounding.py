@@ -20,7 +20,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context, Entry, Number, Terminate
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

@@ -39,7 +39,7 @@ from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import listed
 

@@ -16,7 +16,7 @@ from robochoc.protocols.optimization.bnb_adopt_messages import Cost, Value
 from robochoc.protocols.optimization.bounding import BoundingProtocol
 from robochoc.protocols.optimization.bounding_messages import Context, Number, Terminate
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

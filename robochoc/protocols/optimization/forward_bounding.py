@@ -21,7 +21,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.branching import BranchingProtocol, Members, Number, Report, Request, Result
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

@@ -57,8 +57,8 @@ from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import listed
 
 MOST_CELLS = 1 << 17

@@ -64,8 +64,8 @@ from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
+from robochoc.solver.local_problem import LocalProblem
 
 if TYPE_CHECKING:
     from robochoc.protocols.optimization.sfb_bounds import ForwardBounds

@@ -19,7 +19,7 @@ from itertools import accumulate
 
 from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 Row = tuple[bytes, int]
 Places = tuple[int, ...]

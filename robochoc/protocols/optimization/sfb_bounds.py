@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 Rows = NDArray[np.integer[Any]]
 

@@ -26,9 +26,9 @@ from robochoc.protocols.private.rerooting import Next, RerootingProtocol
 from robochoc.protocols.private.ring import Ring
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_CIPHERS = 1_000_000

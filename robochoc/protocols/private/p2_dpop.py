@@ -95,7 +95,7 @@ from robochoc.protocols.private.p_dpop import cells_of
 from robochoc.protocols.private.rerooting import Join, Next, RerootingMessage, Setup, Vector
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class EncryptedTable(Message, frozen=True):

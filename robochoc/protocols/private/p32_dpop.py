@@ -64,7 +64,7 @@ from robochoc.protocols.private.p_dpop import PDPOP, UTIL, CellTable, Codes, PDP
 from robochoc.protocols.private.rerooting import Join, Next, RerootingMessage, RerootingProtocol, Setup, Vector
 from robochoc.protocols.private.ring import Ring
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 MOST = 1_000
 

@@ -73,9 +73,9 @@ from robochoc.protocols.private.anonymous_dfs import AnonymousTreeMessage, Anony
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_CELLS = 100_000_000

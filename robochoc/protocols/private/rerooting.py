@@ -22,7 +22,7 @@ from robochoc.protocols.private.ed25519 import Ed25519, Group
 from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.protocols.private.ring import Ring
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class Stage(IntEnum):

@@ -75,7 +75,7 @@ from robochoc.protocols.satisfaction.nogood import contradicts, joined
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.solver.shared_constraint import Gap
 from robochoc.system.plain_text import listed
 

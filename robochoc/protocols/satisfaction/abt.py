@@ -54,7 +54,7 @@ from robochoc.protocols.satisfaction.backtracking import Backtracking
 from robochoc.protocols.satisfaction.nogood import contradicts
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

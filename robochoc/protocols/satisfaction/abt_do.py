@@ -64,7 +64,7 @@ from robochoc.protocols.satisfaction.abt_do_messages import AddLink, Counters, N
 from robochoc.protocols.satisfaction.backtracking import Backtracking
 from robochoc.protocols.satisfaction.nogood import contradicts
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

@@ -47,7 +47,7 @@ from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class ABTHyb(ABT):

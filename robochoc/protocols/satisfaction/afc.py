@@ -50,7 +50,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

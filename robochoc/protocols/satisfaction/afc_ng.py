@@ -60,7 +60,7 @@ from robochoc.protocols.satisfaction.afc_ng_view import AgentView
 from robochoc.protocols.satisfaction.nogood import NogoodStore, contradicts
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 _NEVER: Final = sys.maxsize

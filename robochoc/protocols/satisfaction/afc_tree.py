@@ -50,7 +50,7 @@ from robochoc.protocols.satisfaction.afc_ng_messages import CPA, Solved
 from robochoc.protocols.satisfaction.afc_tree_messages import Accept
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

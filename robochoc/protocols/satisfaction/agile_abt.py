@@ -69,7 +69,7 @@ from robochoc.protocols.satisfaction.backtracking import Backtracking
 from robochoc.protocols.satisfaction.nogood import LeftSide, NogoodStore, contradicts, joined
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

@@ -53,7 +53,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.awc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.satisfaction.nogood import LeftSide, joined
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

@@ -12,7 +12,7 @@ from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.nogood import NogoodStore, joined
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

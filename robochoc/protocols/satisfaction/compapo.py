@@ -78,7 +78,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.mediation import Mediation, Table, allows, distinct, own_tables, sizes_in
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 Changes = dict[str, tuple[int, int]]

@@ -63,7 +63,7 @@ from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Value
 from robochoc.protocols.traits import Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import Charged, LocalProblem
+from robochoc.solver.local_problem import Charged, LocalProblem
 from robochoc.system.plain_text import counted
 
 

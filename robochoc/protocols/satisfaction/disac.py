@@ -43,8 +43,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 

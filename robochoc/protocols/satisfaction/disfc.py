@@ -49,8 +49,8 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.disfc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.satisfaction.nogood import NogoodStore
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.filters import allows
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

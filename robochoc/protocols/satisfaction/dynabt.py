@@ -46,8 +46,8 @@ from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.nogood import NO_EXPLANATION, Explanation, NogoodStore
 from robochoc.protocols.satisfaction.nogood_messages import Nogood as PlainNogood
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated, domain_key
+from robochoc.solver.local_problem import LocalProblem
 
 
 class Nogood(PlainNogood, frozen=True):

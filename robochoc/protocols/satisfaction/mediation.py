@@ -16,7 +16,7 @@ from typing import NamedTuple
 import msgspec
 
 from robochoc.protocols.message import Value
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 
 class Table(msgspec.Struct, frozen=True, array_like=True):

@@ -39,7 +39,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.sbt_messages import CPA, Backtrack
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

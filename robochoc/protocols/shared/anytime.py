@@ -37,8 +37,8 @@ from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import Hearing, Proof, can_take
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.wording import Wording, cost_text
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import Cost
+from robochoc.solver.local_problem import LocalProblem
 
 Natural = Annotated[int, msgspec.Meta(ge=0)]
 

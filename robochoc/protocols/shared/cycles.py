@@ -32,7 +32,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.anytime import Anytime, Best, Paid, Place, Step
 from robochoc.protocols.wording import Wording
-from robochoc.solver.compiled import LexicographicCost, LocalProblem
+from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 
 
 class CycleCount(Settings, frozen=True):

@@ -25,7 +25,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.messages.dfs import Back, Token, Wave
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 

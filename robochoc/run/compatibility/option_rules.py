@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from robochoc.run.defaults import MOST_LOSS
 from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 LEAST_SEED, LARGEST_SEED = -(2**63), 2**64 - 1
 """Journals and robots on a network receive the seed in msgpack, whose integers are at most this long."""

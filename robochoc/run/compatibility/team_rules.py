@@ -14,7 +14,7 @@ from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, Options, Runtime, Withdrawal
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exclusions import allocation_fault
 from robochoc.system.errors import TransferableError
 from robochoc.verification.objective import withdrawal_cost
@@ -145,11 +145,6 @@ TEAM_RULES = (
         "--withdraw minimum has to be proven, and {protocol} proves nothing",
         other_protocol=True,
         complete=True,
-    ),
-    TeamRule(
-        lambda c: c.has_costs and not c.traits.costs and not c.minimum_withdrawal,
-        "{team} is a DisWCSP, and {protocol} does not minimise costs",
-        other_protocol=True,
     ),
     TeamRule(
         lambda c: c.options.withdraw is not None and c.has_negative_costs,

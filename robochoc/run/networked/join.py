@@ -19,7 +19,7 @@ from robochoc.run.networked.address import Address
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 PATIENCE_S = 30.0
 """The longest time for which the master may be out of reach, in seconds."""

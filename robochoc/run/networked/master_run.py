@@ -36,7 +36,7 @@ from robochoc.run.networked.machines import Machines, claimed, first_names, regi
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_or_stage
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
 LOOPBACK_ADDRESS = Address(LOOPBACK)

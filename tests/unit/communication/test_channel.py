@@ -24,7 +24,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import solutions
 from tests.support.cases import looped
 from tests.support.examples import examples

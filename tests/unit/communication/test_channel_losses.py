@@ -33,7 +33,7 @@ from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import decided
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.problems import PREDICATES, team_of
 
 STEP = ((10.0, 0.0), (20.0, 1.0))

@@ -27,7 +27,7 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Lost, Sent
 from robochoc.journal.journal import Ended, Follower, Header, read_journal, sorted_by_time
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.endless_runs import (
     CROWD,

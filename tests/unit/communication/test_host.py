@@ -14,7 +14,7 @@ from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.first_fit_messages import Placed
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.cases import looped
 from tests.support.problems import team_of
 

@@ -14,7 +14,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import team_of

@@ -36,7 +36,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import decided
 from robochoc.run.options import ScheduleName
 from robochoc.run.recording import journal_header
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.problems import random_team

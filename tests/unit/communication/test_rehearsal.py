@@ -10,7 +10,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.solver.agent_problem import AgentProblem, agent_problems
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 
 @pytest.fixture

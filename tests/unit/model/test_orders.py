@@ -21,7 +21,7 @@ from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, ScenarioEvent, Semantics
 from robochoc.protocols.order import PseudoTree
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import random_team, shuffled, team_of, with_unique_definitions

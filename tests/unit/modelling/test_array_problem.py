@@ -20,7 +20,7 @@ from robochoc.modelling.array_problem import ArrayProblem
 from robochoc.protocols.chance import Chance
 from robochoc.run.registry import UnknownProtocolError, protocol_named
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError
 from tests.support.cases import looped
 from tests.support.cost_problems import cost_of, with_costs

@@ -9,7 +9,7 @@ from random import Random
 
 import robochoc
 from robochoc.model.outcome import Verdict
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.examples import count
 from tests.support.random_models import RandomProblem, large_problem, random_problem
 

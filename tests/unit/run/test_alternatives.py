@@ -12,7 +12,7 @@ from robochoc.run import alternatives, solve
 from robochoc.run.alternatives import MOST_NAMED
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.registry import InstalledProtocol, installed_protocols
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.program import ROOT
 from tests.support.refusals import costly_team, refusal_of

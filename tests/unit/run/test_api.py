@@ -21,7 +21,7 @@ from robochoc.journal.events import AnyEvent, Concluded
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import cases
 from tests.support.deployments import Deployment
 from tests.support.problems import team_of

@@ -22,7 +22,7 @@ from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
 from robochoc.run.choice import SOMEBODY, decided, decided_unseen
 from robochoc.run.facts import Facts, TreeTables
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import solutions
 from tests.support.cases import cases
 from tests.support.complex_problems import random_complex_team

@@ -21,7 +21,7 @@ from robochoc.run.evaluation import Search, check_with_files, evaluate_search
 from robochoc.run.phases import first_phase
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.compiled_team import ensure_compiled
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.brute_force import least_cost, priced_solutions
 from tests.support.cost_problems import random_cost_team

@@ -16,7 +16,7 @@ from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
 from robochoc.robots.source import SourceError
 from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.environments import SIMULATED, Says, openings
 from tests.support.faults import own_children
 from tests.support.limits import HANG_S

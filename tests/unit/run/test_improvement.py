@@ -18,7 +18,7 @@ from robochoc.model.problem import ProblemKind
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, solve
 from robochoc.run.options import Preprocess, ScheduleName
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import assignment_cost
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team

@@ -20,7 +20,7 @@ from robochoc.model.orders import Order
 from robochoc.run import solve
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.options import CentralSolverName, OnLoss, Options, Preprocess, Runtime, ScheduleName, Withdrawal
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import cases
 from tests.support.refusals import costly_team, refusal_of
 

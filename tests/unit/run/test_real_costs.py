@@ -41,7 +41,7 @@ from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError, assignment_cost, check_told_cost
 from tests.support.examples import count
 from tests.support.losing import Losing
@@ -247,7 +247,7 @@ def test_who_reads_costs_otherwise_stays_away(old: str, new: str, why: str, tmp_
     file.write_text(file.read_text().replace(old, new))
     journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=1)
     list(journey.epochs(Losing(journey.team, ["b"]), lambda _: None))
-    assert journey.withdrawn == ["b"]
+    assert journey.lost_for_good == ["b"]
     assert why in journey.failed_returns[0]
 
 

@@ -76,7 +76,7 @@ def travel(
 def test_who_is_lost_leaves_and_the_others_go_on(team: Team) -> None:
     journey, session, played = travel(team, ["RB"])
     assert [one.team for one in played] == [team, without_robots(team, ["RB"])]
-    assert journey.withdrawn == ["RB"]
+    assert journey.lost_for_good == ["RB"]
     assert session.epochs[0].restarted == frozenset()
     assert "RB" in session.epochs[0].invalidated.agents
 
@@ -84,7 +84,7 @@ def test_who_is_lost_leaves_and_the_others_go_on(team: Team) -> None:
 def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team) -> None:
     journey, session, played = travel(team, ["RB"], spares=1)
     assert [one.team for one in played] == [team, team]
-    assert journey.withdrawn == []
+    assert journey.lost_for_good == []
     (epoch,) = session.epochs
     assert epoch.team.order == ("RA", "RC", "RD", "RB")
     assert epoch.restarted == frozenset({"RB"})
@@ -93,7 +93,7 @@ def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team)
 
 def test_so_many_come_back_as_there_are_spares(team: Team) -> None:
     journey, session, played = travel(team, ["RB RD", "RA"], spares=1)
-    assert journey.withdrawn == ["RD", "RA"]
+    assert journey.lost_for_good == ["RD", "RA"]
     assert [one.team.order for one in played[1:]] == [("RA", "RB", "RC"), ("RB", "RC")]
     assert [epoch.team.order for epoch in session.epochs] == [("RA", "RC", "RB"), ("RC", "RB")]
     assert [epoch.restarted for epoch in session.epochs] == [{"RB"}, set()]
@@ -128,7 +128,7 @@ def test_events_go_on_without_those_that_were_lost(team: Team) -> None:
     last = played[-1].team
     assert [parent.name for parent in last["RE"].parents] == ["RA"]
     assert [[*last.variables[name].domain] for name in "CE"] == [[2, 7], [2]]
-    assert journey.withdrawn == [], "it would have left by now"
+    assert journey.lost_for_good == [], "it would have left by now"
 
 
 def test_a_team_that_all_have_left_may_be_joined() -> None:
@@ -144,7 +144,7 @@ def test_a_team_that_all_have_left_may_be_joined() -> None:
 def test_a_file_that_cannot_be_read_keeps_its_robot_away(team: Team) -> None:
     Path(team["RB"].file).write_text("<instance>")
     journey, _, _ = travel(team, ["RB"], spares=1)
-    assert journey.withdrawn == ["RB"]
+    assert journey.lost_for_good == ["RB"]
     assert "RB could not come back" in journey.failed_returns[0]
 
 
@@ -156,7 +156,7 @@ def test_a_file_that_has_lost_a_variable_meanwhile_does_not_stop_the_scenario(te
     bare = text[:start] + text[end:].replace("</agents_neighbours>", "<agents_neighbours/>")
     file.write_text(bare.replace('<variable name="D"', '<variable name="E"'))
     journey, _, played = travel(replace(alone, scenario=(event(AddValue("D", 7)),)), ["RD"], spares=1)
-    assert journey.withdrawn == []
+    assert journey.lost_for_good == []
     assert list(played[-1].team.variables) == ["E"]
 
 

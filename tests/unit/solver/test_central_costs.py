@@ -24,8 +24,7 @@ from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import AceSolutions
 from robochoc.solver.central import CentralAnswer, CentralSolver
-from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.errors import SolverLostError
+from robochoc.solver.errors import SolverLostError, UnsupportedError
 from robochoc.verification.checker import RefutedError, robots_without_values, violations
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import contradiction

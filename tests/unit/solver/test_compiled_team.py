@@ -27,7 +27,7 @@ from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, agent_problems
 from robochoc.solver.compiled_domain import CompiledDomain, compile_domain
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.objective import Objective
 from tests.support.cost_problems import with_costs
 from tests.support.loose_problems import every_order, loose_team, turned_interface, untold_interface

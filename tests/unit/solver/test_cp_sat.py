@@ -24,8 +24,7 @@ from robochoc.solver import cp_sat
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.cp_sat import CpSatSolver
-from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.errors import SolverLostError, SolverMissingError
+from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.verification.checker import RefutedError
 from robochoc.verification.objective import withdrawal_cost
 from tests.support.brute_force import least_cost

@@ -12,7 +12,8 @@ from robochoc.model.constraint import Constraint, ConstraintModel, Predicate, Re
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import INFINITE, Team
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.encoding import UnsupportedError, cost_function
+from robochoc.solver.encoding import cost_function
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exclusions import Evaluations, Task, allocation_fault, tasks_of
 from tests.support.allocation_problems import random_allocation, random_congestion
 from tests.support.examples import count

@@ -13,7 +13,7 @@ from robochoc.formats.dialects.xcsp3.writer import xcsp3
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs

@@ -15,7 +15,7 @@ from robochoc.formats.dialects.xcsp3.writer import xcsp3
 from robochoc.generators.coloring import coloring
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import least_cost
 from tests.support.complex_problems import complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs

@@ -18,11 +18,11 @@ from robochoc.model.problem import (
     Team,
 )
 from robochoc.protocols.message import Value
-from robochoc.solver import compiled
+from robochoc.solver import local_problem
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.loose_problems import loosened
@@ -143,7 +143,7 @@ def test_the_first_conflict_is_the_one_that_is_explained(monkeypatch: pytest.Mon
     for _ in range(60):
         team = random_complex_team(chance)
         for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
-            monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", chance.choice((1, 1000)))
+            monkeypatch.setattr(local_problem, "MIN_TABLE_VALUES", chance.choice((1, 1000)))
             _compare(part, chance)
 
 
@@ -152,7 +152,7 @@ def test_conflicts_of_several_values_are_those_of_each_with_as_many_checks(
     few: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where robots are unknown or withdrawn, and from any place in the order on."""
-    monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", few)
+    monkeypatch.setattr(local_problem, "MIN_TABLE_VALUES", few)
     chance = Random("conflicts of several")
     seen = Counter[int]()
     for _ in range(30):
@@ -249,7 +249,7 @@ def test_the_least_is_what_the_cheapest_values_of_the_others_cost(monkeypatch: p
                         )
                 assert least[index] == expected
                 seen[expected > 0] += 1
-            monkeypatch.setattr(compiled, "MAX_BOUNDED_ROWS", 0)
+            monkeypatch.setattr(local_problem, "MAX_BOUNDED_ROWS", 0)
             assert problem.lower_bounds(robots) == [0] * len(problem.values)
             monkeypatch.undo()
     assert min(seen.values()) > 50, seen
@@ -294,7 +294,7 @@ def test_the_least_and_the_most_are_those_of_the_whole_table(monkeypatch: pytest
         problem = LocalProblem(agent_problems(team, shared_scopes=True)["RA"])
         assert problem.least_and_most(0) == found
         assert problem.checks == 4
-        monkeypatch.setattr(compiled, "MAX_BOUNDED_ROWS", 3)
+        monkeypatch.setattr(local_problem, "MAX_BOUNDED_ROWS", 3)
         assert problem.least_and_most(0) == unseen
         monkeypatch.undo()
 

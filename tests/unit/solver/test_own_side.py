@@ -19,7 +19,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.solver.agent_problem import RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.compiled import plain_python_only
 from tests.support.problems import team_of

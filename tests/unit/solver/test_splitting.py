@@ -20,7 +20,7 @@ from robochoc.solver import splitting
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
 from robochoc.solver.cp_sat import CpSatSolver
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.splitting import Split, split
 from tests.support.xcsp3_solvers import read_document
 

@@ -9,8 +9,8 @@ from robochoc.communication.host import Host
 from robochoc.generators.coloring import coloring
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
-from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.solver.local_problem import LocalProblem
 
 
 def parts(robots: int) -> list[AgentProblem]:

@@ -16,7 +16,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.verification.checker import violations
 
 

@@ -15,7 +15,7 @@ from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 from robochoc.run.choice import decided
 from robochoc.run.options import Options, Runtime
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 MOST_CHOSEN_FOR = 60
 """For larger teams, the choice of `auto` is not computed before the run."""

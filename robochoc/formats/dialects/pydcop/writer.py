@@ -27,7 +27,7 @@ from robochoc.formats.dialects.tabulation import (
 )
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import RemoveAgent, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 CAPACITY = 1000
 """The capacity of an agent for each variable, constraint and value: more than any algorithm of pyDCOP needs."""

@@ -16,7 +16,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 LIMIT = 2**53
 """The limit of costs in their unit: toulbar2 1.1 reads costs in a cfn as floating-point numbers."""

@@ -22,7 +22,7 @@ from robochoc.formats.dialects.tabulation import (
 from robochoc.model.constraint import INFINITE, Domain, Function, Predicate
 from robochoc.model.expression import Apply, Constant, Expression, Name, text
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 
 MAX_LISTED = 10_000
 """The maximum number of tuples of a predicate or function that is written as a relation although it need not be."""

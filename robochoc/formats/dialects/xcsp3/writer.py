@@ -11,7 +11,8 @@ from lxml import etree
 from robochoc.model.costs import flat_units, normalized
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import Codes, Network, Table, UnsupportedError
+from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.team_network import identifiers, team_network
 from robochoc.solver.weighted import MAX_CODE
 

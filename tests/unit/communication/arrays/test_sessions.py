@@ -22,7 +22,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import installed_protocols
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import team_of

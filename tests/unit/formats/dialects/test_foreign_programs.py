@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from robochoc.model.problem import Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.foreign_problems import Tables, optimum, random_problem, written
 from tests.support.foreign_solvers import Solver, solvers
 

@@ -17,7 +17,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Predicate, Relation, Semantics, Variable
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.foreign_problems import imported, optimum, random_problem, refused, written
 

@@ -21,7 +21,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.constraint import INFINITE, Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, RemoveAgent, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.cases import looped
 from tests.support.foreign_problems import imported, optimum, refused, written
 

@@ -23,7 +23,7 @@ from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.examples import count
 from tests.support.foreign_problems import optimum, random_problem, written

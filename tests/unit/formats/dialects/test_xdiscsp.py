@@ -15,7 +15,7 @@ from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Funct
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.errors import UnsupportedError
 from tests.support.foreign_problems import imported, optimum, written
 
 
