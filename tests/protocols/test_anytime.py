@@ -255,7 +255,7 @@ def test_if_all_steps_break_something_the_last_values_stay() -> None:
     ("protocol", "value", "why"),
     [
         ("dsa", "maybe", "anytime"),
-        ("a-dsa", "yes", "anytime is for robots that go through cycles together"),
+        ("a-dsa", "yes", "anytime=yes requires robots that go through cycles together"),
         ("d-gibbs", "yes", "'anytime' is not a setting of this protocol: it has cycles, temperature"),
         ("acls", "yes", "'anytime' is not a setting of this protocol: it has"),
         ("mcs-mgm", "yes", "'anytime' is not a setting of this protocol: it has"),

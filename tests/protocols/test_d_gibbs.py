@@ -99,8 +99,8 @@ def test_at_the_end_all_take_their_values_of_the_best_sample() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    assert_refused(lambda: robot("B"), [("RA", Difference(0, 0))], "RA had nothing to add up")
-    assert_refused(lambda: robot("B"), [("RC", Finish(True))], "RC is not the parent of RB")
+    assert_refused(lambda: robot("B"), [("RA", Difference(0, 0))], "RA sent an unexpected or repeated Difference")
+    assert_refused(lambda: robot("B"), [("RC", Finish(True))], "RC ended the search, but is not the parent of RB")
 
 
 @count("teams", 15, 250)

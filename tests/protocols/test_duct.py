@@ -194,14 +194,14 @@ def test_memory_is_bounded_and_new_contexts_get_the_cheapest_value() -> None:
 
 
 @looped(("sender", "message", "why"), [
-    ("RA", Separator(["RB"], 0), "RA had no separator"),
-    ("RC", Separator(["RB"], 3), "RC had no separator"),
-    ("RC", SampleContext({"RA": (1,)}), "RC had no sample to begin"),
+    ("RA", Separator(["RB"], 0), "RA sent an unexpected or repeated Separator"),
+    ("RC", Separator(["RB"], 3), "RC sent an unexpected or repeated Separator"),
+    ("RC", SampleContext({"RA": (1,)}), "RC requested an unexpected sample from RB"),
     ("RA", SampleContext({"RC": (1,)}), "RB depends on RA"),
-    ("RC", Fixed({"RA": (1,)}), "RC had no sample to begin"),
-    ("RC", SampleCost(0, 0, 0, hopeless=False), "RC had no sample to tell of"),
+    ("RC", Fixed({"RA": (1,)}), "RC requested an unexpected sample from RB"),
+    ("RC", SampleCost(0, 0, 0, hopeless=False), "RC sent an unexpected or repeated SampleCost"),
 ])  # fmt: skip
-def test_what_cannot_be_is_refused(sender: str, message: Message, why: str) -> None:
+def test_unexpected_messages_are_refused(sender: str, message: Message, why: str) -> None:
     made, _ = told("B")
     with pytest.raises(ValueError, match=why):
         replies(made, (sender, message))
@@ -211,18 +211,18 @@ def test_what_cannot_be_is_refused(sender: str, message: Message, why: str) -> N
     "cost",
     [SampleCost(-1, 0, 0, hopeless=False), SampleCost(0, 0, -1, hopeless=False), SampleCost(0, 0, 1, hopeless=True)],
 )
-def test_costs_that_cannot_be_are_refused(cost: SampleCost) -> None:
+def test_invalid_costs_are_refused(cost: SampleCost) -> None:
     made, _ = told("B")
     replies(made, ("RA", SampleContext({"RA": (1,)})))
-    with pytest.raises(ValueError, match="RC tells costs that cannot be"):
+    with pytest.raises(ValueError, match="RC sent invalid costs of a sample"):
         replies(made, ("RC", cost))
 
 
-def test_separators_that_cannot_be_are_refused() -> None:
+def test_invalid_separators_are_refused() -> None:
     """Nobody is above a root."""
     wrong = [Separator([], 0), Separator(["RA"], -1), Separator(["RA", "RA"], 0), Separator(["RA", "RX"], 0)]
     for separator in wrong:
-        with pytest.raises(ValueError, match=r"a separator that cannot be|RX cannot be above it"):
+        with pytest.raises(ValueError, match=r"an invalid separator|RX cannot be above it"):
             replies(robot("A"), ("RB", separator))
 
 
@@ -303,8 +303,8 @@ class Watched(DUCT):
 
     known_best: ClassVar[list[int | None]] = []
 
-    def _carry_on(self) -> None:
-        super()._carry_on()
+    def _sample_or_choose(self) -> None:
+        super()._sample_or_choose()
         if self.chosen and self.parent is None:
             self.known_best.append(self.samples.best if self.children else int(self.problem.cost(self._present, {})))
 

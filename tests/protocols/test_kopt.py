@@ -13,15 +13,15 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search import kopt
 from robochoc.protocols.local_search.kopt import (
+    CostList,
     KOpt,
     KOptSettings,
     MoveTogether,
     Neighbourhood,
     Offer,
     Offers,
-    Part,
+    ProblemPart,
     Region,
-    Table,
     Values,
 )
 from robochoc.protocols.shared.cycles import Domain
@@ -53,10 +53,10 @@ def chain(names: str = "ABC") -> Team:
     return team_of(dict.fromkeys(names, (1, 2)), [Constraint("C", BOTH, pair, pair) for pair in pairwise(names)])
 
 
-def parts(names: str = "ABCDE") -> dict[str, Part]:
+def parts(names: str = "ABCDE") -> dict[str, ProblemPart]:
     """Return the part of each robot of `chain`, as its message has it."""
-    tables = {left: [Table([f"R{left}", f"R{right}"], COSTS)] for left, right in pairwise(names)}
-    return {f"R{name}": Part(FREE, tables.get(name, [])) for name in names}
+    tables = {left: [CostList([f"R{left}", f"R{right}"], COSTS)] for left, right in pairwise(names)}
+    return {f"R{name}": ProblemPart(FREE, tables.get(name, [])) for name in names}
 
 
 def pair(*, k: int = 2) -> KOpt:
@@ -64,14 +64,14 @@ def pair(*, k: int = 2) -> KOpt:
     robot = robot_of(KOpt, chain("AB"), "RA", 0.0)
     robot.settings = KOptSettings(k=k)  # type: ignore[misc]
     assert started(robot) == [("RB", TWO)]
-    assert replies(robot, ("RB", TWO)) == [("RB", Region({"RA": Part(FREE, [Table(["RA", "RB"], COSTS)])}))]
+    assert replies(robot, ("RB", TWO)) == [("RB", Region({"RA": ProblemPart(FREE, [CostList(["RA", "RB"], COSTS)])}))]
     return robot
 
 
 def offering(*, told: bool = False) -> KOpt:
     """The same, when all values are known: 1 and 1; with `told` its offer has been told."""
     robot = pair()
-    replies(robot, ("RB", Region({"RB": Part(FREE, [])})))
+    replies(robot, ("RB", Region({"RB": ProblemPart(FREE, [])})))
     assert replies(robot, ("RB", Region({}))) == [("RB", Values({"RA": 0}))]
     assert replies(robot, ("RB", Values({"RB": 0}))) == [("RB", Values({"RB": 0}))]
     if told:
@@ -81,7 +81,9 @@ def offering(*, told: bool = False) -> KOpt:
 
 def test_what_is_new_is_told_a_link_further() -> None:
     robot = pair()
-    assert replies(robot, ("RB", Region({"RB": Part(FREE, [])}))) == [("RB", Region({"RB": Part(FREE, [])}))]
+    assert replies(robot, ("RB", Region({"RB": ProblemPart(FREE, [])}))) == [
+        ("RB", Region({"RB": ProblemPart(FREE, [])}))
+    ]
 
 
 def test_a_centre_offers_the_best_move_of_a_group() -> None:
@@ -123,29 +125,29 @@ def test_groups_are_connected_and_reach_half_of_k_from_the_centre(centre: str, k
 
 
 def test_a_broken_constraint_weighs_more_than_any_cost() -> None:
-    told = {"RA": Part([0, 99], []), "RB": Part([0, 0], [])}
-    told["RA"] = Part([0, 99], [Table(["RA", "RB"], [INF, INF, 0, 0])])
+    told = {"RA": ProblemPart([0, 99], []), "RB": ProblemPart([0, 0], [])}
+    told["RA"] = ProblemPart([0, 99], [CostList(["RA", "RB"], [INF, INF, 0, 0])])
     move = Neighbourhood("RA", told, RANK, 1, 0).best({"RA": 0, "RB": 0})
     assert move == ((1, -99), {"RA": 1})
 
 
 def test_of_equally_good_moves_one_of_the_fewest_robots_is_offered() -> None:
-    told = {"RA": Part([3, 0], [Table(["RA", "RB"], [0, 0, 0, 0])]), "RB": Part([0, 0], [])}
+    told = {"RA": ProblemPart([3, 0], [CostList(["RA", "RB"], [0, 0, 0, 0])]), "RB": ProblemPart([0, 0], [])}
     assert Neighbourhood("RA", told, RANK, 2, 1).best({"RA": 0, "RB": 1}).moves.keys() == {"RA"}
 
 
 @looped("table", [
-    Table(["RA", "RB"], [0, 0, 0]), Table(["RB", "RA"], COSTS), Table(["RA", "RA"], COSTS),
-    Table(["RA", "RB"], [0, -1, 0, 0]), Table(["RA", "RB"], [0, float("nan"), 0, 0]),
+    CostList(["RA", "RB"], [0, 0, 0]), CostList(["RB", "RA"], COSTS), CostList(["RA", "RA"], COSTS),
+    CostList(["RA", "RB"], [0, -1, 0, 0]), CostList(["RA", "RB"], [0, float("nan"), 0, 0]),
 ])  # fmt: skip
-def test_tables_that_cannot_be_are_refused(table: Table) -> None:
-    with pytest.raises(ValueError, match=r"that cannot be|not its own"):
-        Neighbourhood("RA", {"RA": Part(FREE, [table]), "RB": Part(FREE, [])}, RANK, 2, 1)
+def test_invalid_tables_are_refused(table: CostList) -> None:
+    with pytest.raises(ValueError, match=r"invalid costs of|must begin with RA"):
+        Neighbourhood("RA", {"RA": ProblemPart(FREE, [table]), "RB": ProblemPart(FREE, [])}, RANK, 2, 1)
 
 
-def test_places_that_are_none_are_refused() -> None:
+def test_invalid_places_are_refused() -> None:
     robot = pair()
-    replies(robot, ("RB", Region({"RB": Part(FREE, [])})), ("RB", Region({})), ("RB", Values({"RB": 2})))
+    replies(robot, ("RB", Region({"RB": ProblemPart(FREE, [])})), ("RB", Region({})), ("RB", Values({"RB": 2})))
     with pytest.raises(ValueError, match="RB has no value number 3"):
         replies(robot, ("RB", Values({})))
 

@@ -115,7 +115,7 @@ def test_of_a_neighbour_whose_colour_is_lost_the_priority_decides() -> None:
 def test_a_value_instead_of_a_colour_is_refused() -> None:
     robot = robot_of(LAMDLS, triangle(), "RB", 0.0)
     started(robot)
-    with pytest.raises(ValueError, match="RA tells no colour, and that comes first"):
+    with pytest.raises(ValueError, match="RA sent no colour, which must come first"):
         replies(robot, ("RA", Value((1,))))
 
 

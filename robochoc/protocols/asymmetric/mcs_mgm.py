@@ -146,7 +146,7 @@ class MCSMGM(Gainers):
         for name, message in messages.items():
             if isinstance(message, Transfer) and message.entry is not None and name in self._values:
                 self._add(name, self._values[name], message.entry)
-        self.best_of(self.burdens(self._values))
+        self.find_best_move(self.burdens(self._values))
         self.multicast(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 

@@ -58,7 +58,7 @@ class WinningBids(wire.Message, frozen=True):
 
     bids: list[WinningBid]
 
-    act = Act(Performative.INFORM, "the receiver comes to know the highest bids that the sender knows")
+    act = Act(Performative.INFORM, "the receiver learns the highest bids that the sender knows")
 
     def in_words(self, words: Wording) -> str:
         return listed([winning_bid_in_words(words, *bid) for bid in self.bids])

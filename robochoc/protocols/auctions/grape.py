@@ -67,7 +67,7 @@ class Partition(wire.Message, frozen=True):
     mover: str
     coalitions: dict[str, Lot]
 
-    act = Act(Performative.INFORM, "the receiver comes to know who does what as far as the sender knows")
+    act = Act(Performative.INFORM, "the receiver learns who does what as far as the sender knows")
 
     def in_words(self, words: Wording) -> str:
         who = [f"{robot} does {lot_in_words(words, robot, lot)}" for robot, lot in self.coalitions.items()]

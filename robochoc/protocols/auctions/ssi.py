@@ -87,7 +87,7 @@ class Won(wire.Message, frozen=True):
     lots: list[Lot]
     amount: int
 
-    act = Act(Performative.INFORM, "the receiver comes to know that a task is the sender's")
+    act = Act(Performative.INFORM, "the receiver learns that a task is the sender's")
 
     def in_words(self, words: Wording) -> str:
         lots = listed([lot_in_words(words, words.sender, lot) for lot in self.lots])

@@ -70,7 +70,7 @@ class Dependency(Message, frozen=True):
     weight: float | None
     rest: list[float]
 
-    act = Act(Performative.INFORM, "the receiver comes to know how much the function binds both")
+    act = Act(Performative.INFORM, "the receiver learns how much the function binds both")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:

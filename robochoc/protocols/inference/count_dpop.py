@@ -83,7 +83,7 @@ class Counts(Message, frozen=True):
     width: Annotated[int, msgspec.Meta(ge=1, le=MOST_BITS // 8)]
     numbers: bytes
 
-    act = Act(Performative.INFORM, "the receiver comes to know in how many ways the sender's subtree attains its costs")
+    act = Act(Performative.INFORM, "the receiver learns in how many ways the sender's subtree attains its costs")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

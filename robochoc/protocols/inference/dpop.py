@@ -144,7 +144,7 @@ class Dimensions(Message, frozen=True):
     induced_width: int
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver comes to know how large the sender's table will be")
+    act = Act(Performative.INFORM, "the receiver learns how large the sender's table will be")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -182,7 +182,7 @@ class UTIL(Message, frozen=True):
     width: Width
     costs: bytes
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs")
+    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs")
 
     def in_words(self, _: Wording) -> str:
         return piece_in_words(self.costs, self.width)
@@ -209,7 +209,7 @@ class VALUE(Message, frozen=True):
 
     assignment: list[int]
 
-    act = Act(Performative.INFORM, "the receiver comes to know the values above it")
+    act = Act(Performative.INFORM, "the receiver learns the values above it")
 
     def in_words(self, _: Wording) -> str:
         if not self.assignment:

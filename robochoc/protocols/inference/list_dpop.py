@@ -94,7 +94,7 @@ class ListedValues(Message, frozen=True):
     assignments: list[list[int]]
     numbers: list[Number]
 
-    act = Act(Performative.INFORM, "the receiver comes to know the values above it in each optimum")
+    act = Act(Performative.INFORM, "the receiver learns the values above it in each optimum")
 
     def in_words(self, _: Wording) -> str:
         optima = "optimum" if len(self.numbers) == 1 else "optima"

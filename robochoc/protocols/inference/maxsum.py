@@ -103,7 +103,7 @@ class R(wire.Message, frozen=True):
 
     rows: list[Row]
 
-    act = Act(Performative.INFORM, "the receiver comes to know what each of its values costs")
+    act = Act(Performative.INFORM, "the receiver learns what each of its values costs")
     # Costs are sums over many robots, and may be split, damped or shifted to a minimum of 0.
     proves_nothing = True
 
@@ -121,7 +121,7 @@ class Q(wire.Message, frozen=True):
 
     rows: list[Row]
 
-    act = Act(Performative.INFORM, "the receiver comes to know what each value costs elsewhere")
+    act = Act(Performative.INFORM, "the receiver learns what each value costs elsewhere")
     # Costs are sums over many robots, and may be split, damped or shifted to a minimum of 0.
     proves_nothing = True
 

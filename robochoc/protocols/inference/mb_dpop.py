@@ -136,7 +136,7 @@ class Label(Message, frozen=True):
     induced_width: int
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver comes to know the sender's table, and who is fixed for it")
+    act = Act(Performative.INFORM, "the receiver learns the sender's table, and who is fixed for it")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

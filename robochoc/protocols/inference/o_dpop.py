@@ -73,7 +73,7 @@ class Good(Message, frozen=True):
     assignment: list[int]
     cost: Cost
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs at least from here on")
+    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs at least from here on")
 
     def in_words(self, _: Wording) -> str:
         places = listed([str(place + 1) for place in self.assignment])
@@ -89,7 +89,7 @@ class Good(Message, frozen=True):
 class Done(Message, frozen=True):
     """The sender has no more goods: all other combinations break something hard."""
 
-    act = Act(Performative.INFORM, "the receiver comes to know that no other combination is possible")
+    act = Act(Performative.INFORM, "the receiver learns that no other combination is possible")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

@@ -102,7 +102,7 @@ class ClusterLabel(Message, frozen=True):
     induced_width: int
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver comes to know the sender's table, and who may be fixed for it")
+    act = Act(Performative.INFORM, "the receiver learns the sender's table, and who may be fixed for it")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -120,7 +120,7 @@ class SepDegree(Message, frozen=True):
     candidates: dict[str, Candidate]
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver comes to know who else may be fixed")
+    act = Act(Performative.INFORM, "the receiver learns who else may be fixed")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -149,7 +149,7 @@ class CutUTIL(Message, frozen=True):
     costs: bytes
     places: bytes
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs, and the values for it")
+    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs, and the values for it")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

@@ -33,7 +33,7 @@ class Fragment(Message, frozen=True):
 
     root: str
 
-    act = Act(Performative.INFORM, "the receiver comes to know whether both are in one part of the forest")
+    act = Act(Performative.INFORM, "the receiver learns whether both are in one part of the forest")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
@@ -60,7 +60,7 @@ class Choice(Message, frozen=True):
 
     ends: Ends | None
 
-    act = Act(Performative.INFORM, "the receiver comes to know where the tree grows")
+    act = Act(Performative.INFORM, "the receiver learns where the tree grows")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
@@ -74,7 +74,7 @@ class Merged(Message, frozen=True):
 
     joined: bool
 
-    act = Act(Performative.INFORM, "the receiver comes to know whether their function is in the tree")
+    act = Act(Performative.INFORM, "the receiver learns whether their function is in the tree")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
@@ -86,7 +86,7 @@ class NewRoot(Message, frozen=True):
 
     root: str
 
-    act = Act(Performative.INFORM, "the receiver comes to know its parent")
+    act = Act(Performative.INFORM, "the receiver learns its parent")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface

@@ -1,15 +1,15 @@
 """Cooperative Constraint Approximation (CoCoA).
 
-No cycles: each robot takes one value, once. Before that it asks all neighbours that have none what each of its values
-would cost them at least, and takes the value for which the sum is least. If too many values are equally good, it waits
-(HOLD) until a neighbour has taken a value. If nobody around can go on, it accepts more equally good values.
+No cycles: each robot chooses one value, once. Before that it asks all neighbours without a value for the least cost of
+each of its values to them, and chooses the value with the least sum. If too many values are equally good, it waits
+(HOLD) until a neighbour has chosen a value. If no robot around can continue, it accepts more equally good values.
 
 - **When to use**: costs, also asymmetric ones, few messages: a fair answer from a number of messages that does not
   depend on cycles.
 - **Guarantees**: incomplete, no proof of optimality. It always ends: a robot with d neighbours and v values becomes
-  active at most d + v times, so it sends at most 2 d (d + v) messages, and as many answers as it is asked for; with
-  asymmetric costs d questions more. No robot changes its value. A robot with an empty domain proves that there is no
-  solution.
+  active at most d + v times, so it sends at most 2 d (d + v) messages, and one answer for each inquiry that it
+  receives; with asymmetric costs d more inquiries. No robot changes its value. A robot with an empty domain proves that
+  there is no solution.
 - **Parameters**: none.
 - **Reference**: van Leeuwen, Pawelczak: "CoCoA: a non-iterative approach to a local search (A)DCOP solver", AAAI 2017.
 
@@ -17,26 +17,26 @@ Its states and steps:
 
     IDLE      not asked to act yet                          an active robot asks its neighbours      `_activate`
     ACTIVE    waits for its neighbours' answers             a neighbour answers                      `_answer`
-    HOLD      too many values are equally good              it chooses, or waits                     `_decide`
+    HOLD      too many values are equally good              it chooses, or waits                     `_choose_or_wait`
     DONE      has its value                                 beta, the bound on equally good values   `bound`
 
 Choices that the paper leaves open, and differences:
 
-- Robots that have a higher priority than all their neighbours begin. So each part of the team has one that begins; it
-  may have several, which does no harm.
+- Robots that have a higher priority than all their neighbours start. So each connected part of the team has at least
+  one; several do no harm.
 - An idle robot becomes active when a neighbour has chosen, and also when one waits. Otherwise the search could stop.
-- Neighbours that are DONE are not asked, as the robot itself knows what they charge. They have told their value before
-  any answer arrives that is still under way, and that answer is not used.
-- If all neighbours are DONE, nothing more can become known: one of the best values is chosen by lot, however many
+- Neighbours that are DONE are not asked, as the robot itself knows their constraints' costs. Their value arrives before
+  any answer that is still in transit, and that answer is not used.
+- If all neighbours are DONE, nothing more can become known: a random one of the best values is chosen, however many
   there are.
 - A constraint of more than two robots counts when all but one or two have values, once: unknown robots charge nothing.
-- Asymmetric costs (ADCOP): an answer counts the neighbour's own side only, and names the neighbour's value with which
-  it is least. The asker adds its own side at this value. A neighbour that is DONE is asked, too, once: its own side for
-  its value is nobody else's to know. If it is DONE only after its answer, it is asked again.
+- Asymmetric costs (ADCOP): an answer counts the neighbour's side only, and contains the neighbour's value for which it
+  is least. The asking robot adds its own side at this value. A neighbour that is DONE is asked, too, once: only this
+  neighbour knows its side for its value. If it is DONE only after its answer, it is asked again.
 - Fewer violated hard constraints are always better, so plain DisCSPs work, too.
 
-It ends: of the robots of a part of the team, the last one to choose or to wait finds all its neighbours DONE or in
-HOLD, and goes on. So nobody is left in HOLD, nor IDLE beside a robot that is not.
+It ends: in a connected part of the team, the last robot to choose or to wait finds all its neighbours DONE or in HOLD,
+and continues. So no robot remains in HOLD, or IDLE beside a robot that is not.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -83,7 +83,7 @@ Burden = tuple[int, int | float]
 
 
 class Inquiry(wire.Message, frozen=True):
-    """A question: what would each of the sender's `values` cost the receiver at least?
+    """A question: what is the least cost to the receiver of each of the sender's `values`?
 
     `known` are the final values of other robots that the sender knows. The sender is active from now on.
     """
@@ -91,7 +91,7 @@ class Inquiry(wire.Message, frozen=True):
     values: list[wire.Value]
     known: dict[str, wire.Value]
 
-    act = Act(Performative.QUERY_REF, "the sender asks what its values would cost the receiver")
+    act = Act(Performative.QUERY_REF, "the sender asks for the costs of its values to the receiver")
 
     def in_words(self, words: Wording) -> str:
         so_far = f"; so far {words.assigned(self.known.items())}" if self.known else ""
@@ -102,11 +102,11 @@ class Inquiry(wire.Message, frozen=True):
 
 
 class Costs(wire.Message, frozen=True):
-    """The answer to an inquiry: for each value that was asked for, the least that it would cost the sender."""
+    """The answer to an inquiry: for each value in it, the least cost to the sender."""
 
     burdens: list[Burden]
 
-    act = Act(Performative.INFORM, "the receiver comes to know what its values would cost the sender")
+    act = Act(Performative.INFORM, "the receiver learns the costs of its values to the sender")
 
     def in_words(self, _: Wording) -> str:
         if not self.burdens:
@@ -116,9 +116,9 @@ class Costs(wire.Message, frozen=True):
         return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} would cost me least: {price}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what values cost the sender, given others' final values.
+        """Return the sender's costs for the receiver's values, given others' final values.
 
-        Where it shares constraints with the receiver alone, and has no final value, all its values cost that much.
+        If it shares constraints with the receiver only, and has no final value, all its values cost that much.
         """
         asked = hearing.last(Inquiry, hearing.receiver, hearing.sender)
         if asked is None:
@@ -135,31 +135,31 @@ class Costs(wire.Message, frozen=True):
 
 
 class CostsAt(Costs, frozen=True):
-    """The answer where both sides of a constraint have costs of their own (ADCOP): the sender's side only.
+    """The answer if both sides of a constraint have their own costs (ADCOP): the sender's side only.
 
-    `values` are the sender's own values with which it costs the sender least, one for each value that was asked for.
+    `values`: for each value in the inquiry, the sender's value with the least cost to the sender.
     """
 
     values: list[wire.Value]
 
-    act = Act(Performative.INFORM, "the receiver comes to know what its values would cost the sender, and with which")
+    act = Act(Performative.INFORM, "the receiver learns the costs of its values to the sender, and with which value")
 
     def in_words(self, words: Wording) -> str:
-        told = super().in_words(words)
+        text = super().in_words(words)
         if not self.burdens or len(self.values) != len(self.burdens):
-            return told
-        return f"{told}, with {words.own_value(self.values[self.burdens.index(min(self.burdens))])}"
+            return text
+        return f"{text}, with {words.own_value(self.values[self.burdens.index(min(self.burdens))])}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         return [*super().proves(hearing), *(can_take(hearing.sender, value) for value in dict.fromkeys(self.values))]
 
 
 class FinalSide(wire.Message, frozen=True):
-    """The answer of a robot that has its value (ADCOP): what its parts charge for each value that was asked for."""
+    """The answer of a robot that is DONE (ADCOP): the cost of its side for each value in the inquiry."""
 
     burdens: list[Burden]
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's parts charge for its values")
+    act = Act(Performative.INFORM, "the receiver learns the costs of the sender's side for the receiver's values")
 
     def in_words(self, _: Wording) -> str:
         if not self.burdens:
@@ -169,13 +169,13 @@ class FinalSide(wire.Message, frozen=True):
         return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} costs my side least: {price}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the sender's parts, for its value and all that were asked."""
+        """Return the costs of the sender's side, for its value and all values of the inquiry."""
         asked = hearing.last(Inquiry, hearing.receiver, hearing.sender)
-        stands = hearing.last(SetValue, hearing.sender, hearing.receiver)
-        if asked is None or stands is None:
+        final = hearing.last(SetValue, hearing.sender, hearing.receiver)
+        if asked is None or final is None:
             return NOTHING
         return [
-            PartPays(hearing.sender, stands.value, hearing.receiver, value, INFINITE if broken else cost)
+            PartPays(hearing.sender, final.value, hearing.receiver, value, INFINITE if broken else cost)
             for value, (broken, cost) in zip(asked.values, self.burdens, strict=False)
         ]
 
@@ -183,7 +183,7 @@ class FinalSide(wire.Message, frozen=True):
 class Hold(wire.Message, frozen=True):
     """The sender waits: too many of its values are equally good."""
 
-    act = Act(Performative.INFORM, "the receiver comes to know that it may choose before the sender")
+    act = Act(Performative.INFORM, "the receiver learns that it may choose before the sender")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -204,7 +204,7 @@ class SetValue(wire.Message, frozen=True):
         return [StandsAt(hearing.sender, self.value)]
 
 
-class State(StrEnum):
+class SearchState(StrEnum):
     """The states of a robot."""
 
     IDLE = "idle"
@@ -213,16 +213,16 @@ class State(StrEnum):
     DONE = "done"
 
 
-_AT_REST = (State.HOLD, State.DONE)
+_AT_REST = (SearchState.HOLD, SearchState.DONE)
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class CoCoA(Protocol):
     """One agent of CoCoA.
 
-    State: the own `state` and the neighbours' (`states`), the final values of neighbours (`view`), `answers` to the
-    last inquiry, and `bound`: the number of equally good values among which it chooses (beta). `sides` are what the
-    parts of neighbours that are DONE charge for each own value.
+    State: this robot's `state` and its neighbours' (`states`), the final values of neighbours (`view`), `answers` to
+    the last inquiry, and `bound`: the number of equally good values among which it chooses (beta). `sides` are the
+    costs of each of its values in the sides of neighbours that are DONE.
     """
 
     messages: ClassVar[Any] = Inquiry | Costs | CostsAt | FinalSide | Hold | SetValue
@@ -236,13 +236,13 @@ class CoCoA(Protocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
-        use_when="costs, few messages: each robot takes one value, once",
+        use_when="costs, few messages: each robot chooses one value, once",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.state = State.IDLE
-        self.states = dict.fromkeys(problem.neighbours, State.IDLE)
+        self.state = SearchState.IDLE
+        self.states = dict.fromkeys(problem.neighbours, SearchState.IDLE)
         self.view: dict[str, wire.Value] = {}
         self.answers: dict[str, list[Burden]] = {}
         self.sides: dict[str, list[Burden]] = {}
@@ -260,53 +260,53 @@ class CoCoA(Protocol):
             self.settle()
 
     def receive(self, sender: str, message: wire.Message) -> None:
-        """Note a neighbour's state or answer; answer its inquiry."""
+        """Store a neighbour's state or answer; answer its inquiry."""
         if self.verdict is not None:
             return
         if sender not in self.states:
-            raise ValueError(f"{sender} is no neighbour of {self.problem.agent}")
+            raise ValueError(f"{sender} is not a neighbour of {self.problem.agent}")
         match cast("Inquiry | Costs | CostsAt | FinalSide | Hold | SetValue", message):
             case Inquiry(values, known):
-                self._refuse([*((sender, value) for value in values), *known.items()])
-                self.states[sender] = State.ACTIVE
+                self._check_values([*((sender, value) for value in values), *known.items()])
+                self.states[sender] = SearchState.ACTIVE
                 self._answer(sender, values, known)
             case CostsAt(burdens, values):
-                self._refuse_number(sender, values)
+                self._check_number(sender, values)
                 own = self._own_sides(sender, values)
-                self._keep(sender, burdens)
+                self._store_answer(sender, burdens)
                 self.answers[sender] = _sums(own, burdens)
             case Costs(burdens):
-                self._keep(sender, burdens)
+                self._store_answer(sender, burdens)
             case FinalSide(burdens):
-                if self.states[sender] != State.DONE:
-                    raise ValueError(f"{sender} has told {self.problem.agent} no value that is final")
-                self._keep(sender, burdens)
+                if self.states[sender] != SearchState.DONE:
+                    raise ValueError(f"{sender} sent FinalSide to {self.problem.agent}, but no final value before")
+                self._store_answer(sender, burdens)
                 self.sides[sender] = burdens
             case Hold():
-                self.states[sender] = State.HOLD
+                self.states[sender] = SearchState.HOLD
             case SetValue(value):
-                self._refuse([(sender, value)])
-                self.states[sender] = State.DONE
+                self._check_values([(sender, value)])
+                self.states[sender] = SearchState.DONE
                 self.view[sender] = value
                 self._ask_again(sender)
             case never:
                 assert_never(never)
 
     def settle(self) -> None:
-        """Go on as far as what is known allows."""
-        while self.verdict is None and self._goes_on():
+        """Make all steps for which the messages have arrived."""
+        while self.verdict is None and self._make_step():
             pass
 
-    def _goes_on(self) -> bool:
-        """Take the next step, if there is one: begin to ask, or decide."""
+    def _make_step(self) -> bool:
+        """Make the next step, if there is one: send inquiries, or choose; return whether there was one."""
         match self.state:
-            case State.ACTIVE if len(self.answers) == len(self._asked):
-                self._decide()
-            case State.IDLE if any(state in _AT_REST for state in self.states.values()):
+            case SearchState.ACTIVE if len(self.answers) == len(self._asked):
+                self._choose_or_wait()
+            case SearchState.IDLE if any(state in _AT_REST for state in self.states.values()):
                 self._activate()
-            case State.HOLD if len(self.view) > self._done_before:
+            case SearchState.HOLD if len(self.view) > self._done_before:
                 self._activate()
-            case State.HOLD if all(state in _AT_REST for state in self.states.values()):
+            case SearchState.HOLD if all(state in _AT_REST for state in self.states.values()):
                 self.bound += 1
                 self._activate()
             case _:
@@ -314,27 +314,29 @@ class CoCoA(Protocol):
         return True
 
     def _activate(self) -> None:
-        """Ask neighbours what the own values would cost them: all that have no value, and parts that are not told."""
-        self.state = State.ACTIVE
+        """Send an inquiry to all neighbours that have no value, or whose side is missing."""
+        self.state = SearchState.ACTIVE
         self._done_before = len(self.view)
         self.answers = {}
-        self._asked = tuple(name for name, state in self.states.items() if state != State.DONE or self._lacks(name))
+        self._asked = tuple(
+            name for name, state in self.states.items() if state != SearchState.DONE or self._lacks(name)
+        )
         inquiry = Inquiry(list(self.problem.values), dict(self.view))
         for name in self._asked:
             self.send(name, inquiry)
 
     def _lacks(self, name: str) -> bool:
-        """Return whether a neighbour that is DONE has not told yet what its parts charge."""
+        """Return whether the side of a neighbour that is DONE is still missing."""
         return name not in self.sides and self.problem.shares_parts_with(name)
 
     def _ask_again(self, name: str) -> None:
-        """Ask a neighbour that has taken its value after its answer for what its parts charge now."""
-        if self.state == State.ACTIVE and name in self.answers and self._lacks(name):
+        """Ask a neighbour that became DONE after its answer for its side."""
+        if self.state == SearchState.ACTIVE and name in self.answers and self._lacks(name):
             del self.answers[name]
             self.send(name, Inquiry(list(self.problem.values), dict(self.view)))
 
     def _answer(self, sender: str, values: list[wire.Value], known: Mapping[str, wire.Value]) -> None:
-        """Send the least cost of each of the sender's values: over all own values, or for the final one."""
+        """Send the least cost of each of the sender's values: over all values of this robot, or for its final one."""
         divided = self.problem.shares_parts_with(sender)
         if divided and self.value is not None:
             own = self.value
@@ -343,59 +345,60 @@ class CoCoA(Protocol):
         view = {**known, **self.view}
         view.pop(self.problem.agent, None)
         totals = [self.problem.lexicographic_costs({**view, sender: value}) for value in values]
-        least = [self._least(burdens) for burdens in totals]
+        least = [self._least(costs) for costs in totals]
         if divided:
-            at = [burdens.index(cost) for burdens, cost in zip(totals, least, strict=True)]
+            at = [costs.index(cost) for costs, cost in zip(totals, least, strict=True)]
             self.send(sender, CostsAt(least, [self.problem.values[place] for place in at]))
         else:
             self.send(sender, Costs(least))
 
     def _own_sides(self, sender: str, values: list[wire.Value]) -> list[Burden]:
-        """Return what the own parts charge for each own value, where the sender has the value of the same place."""
+        """Return the cost of this robot's side for each of its values, with the sender's value at the same place."""
         return [self.problem.own_side(place, sender, value) for place, value in enumerate(values)]
 
-    def _refuse(self, told: Iterable[tuple[str, wire.Value]]) -> None:
-        """Raise `ValueError` for a value that a neighbour cannot have; what others have means nothing here."""
-        for name, value in told:
+    def _check_values(self, values: Iterable[tuple[str, wire.Value]]) -> None:
+        """Raise `ValueError` for a value outside a neighbour's domain; other robots' values are not used here."""
+        for name, value in values:
             if name in self.states:
                 self.problem.refuse_value(name, value)
 
-    def _least(self, burdens: list[Burden]) -> Burden:
-        return min(burdens) if self.value is None else burdens[self.value]
+    def _least(self, costs: list[Burden]) -> Burden:
+        return min(costs) if self.value is None else costs[self.value]
 
-    def _keep(self, sender: str, burdens: list[Burden]) -> None:
-        """Store an answer; raise `ValueError` if it was not asked for, or is not about the own values."""
-        asked = self.state == State.ACTIVE and sender in self._asked and sender not in self.answers
+    def _store_answer(self, sender: str, burdens: list[Burden]) -> None:
+        """Store an answer; raise `ValueError` if there was no inquiry, or the number of values is wrong."""
+        asked = self.state == SearchState.ACTIVE and sender in self._asked and sender not in self.answers
         if not asked:
-            raise ValueError(f"{sender} tells costs that {self.problem.agent} has not asked for")
-        self._refuse_number(sender, burdens)
+            raise ValueError(f"{sender} sent costs without an inquiry from {self.problem.agent}")
+        self._check_number(sender, burdens)
         self.answers[sender] = burdens
 
-    def _refuse_number(self, sender: str, told: Sequence[object]) -> None:
-        """Raise `ValueError` for an answer that is not about the own values."""
-        if len(told) != len(self.problem.values):
-            raise ValueError(f"{sender} tells costs that {self.problem.agent} has not asked for")
+    def _check_number(self, sender: str, answer: Sequence[object]) -> None:
+        """Raise `ValueError` for an answer without exactly one element for each of this robot's values."""
+        if len(answer) != len(self.problem.values):
+            own = f"{self.problem.agent} has {counted(len(self.problem.values), 'value')}"
+            raise ValueError(f"{sender} sent costs of {len(answer):,}, but {own}")
 
-    def _decide(self) -> None:
+    def _choose_or_wait(self) -> None:
         """Choose one of the best values, or wait if too many are equally good."""
         totals = self.problem.lexicographic_costs(self.view)
         waiting = [name for name in self._asked if name not in self.view]
-        for told in (*self.sides.values(), *(self.answers[name] for name in waiting)):
-            totals = _sums(totals, told)
+        for costs in (*self.sides.values(), *(self.answers[name] for name in waiting)):
+            totals = _sums(totals, costs)
         least = min(totals)
         best = [place for place, total in enumerate(totals) if total == least]
         if len(best) <= self.bound or not waiting:
-            self.state = State.DONE
+            self.state = SearchState.DONE
             self.value = one_of(self.chance, best)
-            self._tell(SetValue(self.problem.values[self.value]))
+            self._send_to_undecided(SetValue(self.problem.values[self.value]))
         else:
-            self.state = State.HOLD
-            self._tell(Hold())
+            self.state = SearchState.HOLD
+            self._send_to_undecided(Hold())
 
-    def _tell(self, message: wire.Message) -> None:
-        """Tell all neighbours that have no value yet."""
+    def _send_to_undecided(self, message: wire.Message) -> None:
+        """Send a message to all neighbours that have no value yet."""
         for name, state in self.states.items():
-            if state != State.DONE:
+            if state != SearchState.DONE:
                 self.send(name, message)
 
 

@@ -2,36 +2,36 @@
 
 Sampling on a pseudo-tree. In each cycle the robots draw new values, from the root down: a cheap value with a high
 probability, given the values that all neighbours have. Neighbours never draw at the same time. From the leaves up they
-add up by how much the sample has changed the cost. So the root knows which sample was the best, though nobody knows
-what it costs, and in the end all take their values of that sample.
+add up the changes of cost by the sample. So the root knows which sample was the best, though no robot knows its cost,
+and in the end all robots choose their values of that sample.
 
-- **When to use**: costs, and little memory: good answers where local search is caught, as dearer values are drawn too.
+- **When to use**: costs, and little memory: good answers where local search is stuck, as dearer values are drawn too.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The values at the end are
   those of the best sample of each pseudo-tree. Memory is linear in the number of neighbours. A robot with an empty
   domain proves that there is no solution.
-- **Parameters (`--set`)**: `temperature` (default 1: as the paper), `cooling` (by what it is multiplied after each
+- **Parameters (`--set`)**: `temperature` (default 1: as the paper), `cooling` (the factor that multiplies it after each
   cycle; default 1), `hard` (default 4), `cycles` (default 100).
 - **Reference**: Nguyen, Yeoh, Lau: "Distributed Gibbs: a memory-bounded sampling-based DCOP algorithm", AAMAS 2013.
 
 Its parts:
 
-    build the pseudo-tree       `dfs.TreeProtocol`           BACKTRACK, from the leaves up     `_tell_change`
-    VALUE, from the root down   `_sample`                    the root keeps the best           `_judge`
+    build the pseudo-tree       `dfs.TreeProtocol`    BACKTRACK, from the leaves up    `_send_difference`
+    VALUE, from the root down   `_sample`             the root keeps the best          `_record_sample`
 
 A value is drawn with a probability proportional to exp(-cost / temperature), where the cost is that of all constraints
-of the robot with its neighbours' present values. Robots above have drawn in this cycle already, and robots below have
-not. So the samples are those of one robot drawing after the other, and the change of the cost is exactly the sum of
-what the robots pay more. In the paper, temperature is 1.
+of the robot with its neighbours' present values. Robots above have already drawn in this cycle, robots below have not.
+So the samples are those of robots that draw one after the other, and the change of the cost is exactly the sum of the
+robots' changes. In the paper, temperature is 1.
 
 Choices that the paper leaves open, and differences:
 
 - The first value is chosen at random. Robots send it to the neighbours above before the first cycle.
-- A value that breaks more hard constraints than another is never a better one for the record, whatever it costs; it is
-  drawn e^`hard` times less often for each.
-- Robots store the value of the best sample when the root says that the last sample was it: with the next VALUE.
-- The paper also keeps what the best value of each robot would have saved. Here the record is of samples only.
-- Constraints may be n-ary, as all robots of a scope are on one branch. Parts of the team that have nothing to do with
-  each other have a tree and a record each.
+- A value that breaks more hard constraints than another is never better for the record, whatever its cost; it is drawn
+  e^`hard` times less often for each.
+- The next VALUE from the root says whether the last sample was the best. Then robots store their values of it.
+- The paper also records what the best value of each robot would have saved. Here the record is of samples only.
+- Constraints may be n-ary, as all robots of a scope are on one branch. Unconnected parts of the team have a tree and a
+  record each.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -66,10 +66,10 @@ from robochoc.system.plain_text import counted, listed
 
 
 class DGibbsSettings(CycleCount, frozen=True):
-    """`temperature`: the cost by which a value may be dearer and still be drawn e times less often.
+    """`temperature`: the additional cost of a value with which it is drawn e times less often.
 
-    `cooling`: by what it is multiplied after each cycle. `hard`: a value that breaks a hard constraint more is drawn
-    e^hard times less often. `cycles`: the number of samples.
+    `cooling`: the factor that multiplies it after each cycle. `hard`: for each additional broken hard constraint, a
+    value is drawn e^hard times less often. `cycles`: the number of samples.
     """
 
     temperature: float = 1.0
@@ -79,11 +79,11 @@ class DGibbsSettings(CycleCount, frozen=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < self.temperature < math.inf:
-            raise ValueError(f"temperature is {self.temperature:g}; it must be more than 0")
+            raise ValueError(f"temperature is {self.temperature:g}; it must be more than 0, and finite")
         if not 0 < self.cooling <= 1:
             raise ValueError(f"cooling is {self.cooling:g}; it must be more than 0 and at most 1")
         if not 0 <= self.hard < math.inf:
-            raise ValueError(f"hard is {self.hard:g}; it must be 0 or more")
+            raise ValueError(f"hard is {self.hard:g}; it must be 0 or more, and finite")
 
 
 def _record(kept: bool) -> str:  # noqa: FBT001 - a field of two messages
@@ -91,7 +91,7 @@ def _record(kept: bool) -> str:  # noqa: FBT001 - a field of two messages
 
 
 class Value(wire.Message, frozen=True):
-    """The sender's value in a sample; `kept`: the sample before is the best so far (VALUE)."""
+    """The sender's value in a sample; `kept`: the previous sample is the best so far (VALUE)."""
 
     value: wire.Value
     kept: bool
@@ -108,13 +108,15 @@ class Value(wire.Message, frozen=True):
 class Difference(wire.Message, frozen=True):
     """The change of the subtree's cost since the last sample: broken hard constraints, and costs (BACKTRACK).
 
-    Less is negative.
+    A reduction is negative.
     """
 
     broken: int
     cost: int
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sample changes in the sender's subtree")
+    act = Act(
+        Performative.INFORM, "the receiver learns by how much the sample changes the cost of the sender's subtree"
+    )
     proves_nothing = True  # it is a difference of sums
 
     def in_words(self, _: Wording) -> str:
@@ -128,7 +130,7 @@ def _change(number: int, text: str) -> str:
 
 
 class Finish(wire.Message, frozen=True):
-    """The end: all take their values of the best sample. `kept`: that is the last one."""
+    """The end: all robots choose their values of the best sample. `kept`: it is the last one."""
 
     kept: bool
 
@@ -140,13 +142,13 @@ class Finish(wire.Message, frozen=True):
 
 
 COLDEST = 1e-9
-"""Below it only the cheapest values are drawn."""
+"""Below this temperature only the cheapest values are drawn."""
 
 
 class DGibbs(TreeProtocol):
     """One agent of D-Gibbs.
 
-    State: `cycle`, the own value in it, the `view` of the neighbours' values, `best` (the own value of the best
+    State: `cycle`, this robot's value in it, the `view` of the neighbours' values, `best` (its value in the best
     sample), and the sums of changes: `change` in this cycle, and (at the root) `total` and `record` since the start.
     """
 
@@ -171,98 +173,97 @@ class DGibbs(TreeProtocol):
         self.change: LexicographicCost = NO_GAIN
         self.total: LexicographicCost = NO_GAIN
         self.record: LexicographicCost = NO_GAIN
-        self._kept = self._told_change = True
+        self._kept = self._sent_difference = True
         self._trail: list[tuple[int, int]] = []
-        self._told_by = dict.fromkeys(problem.neighbours, 0)
-        """Of each neighbour, how many of its values have been told."""
+        self._received = dict.fromkeys(problem.neighbours, 0)
+        """The number of values received from each neighbour."""
         self._changes: dict[str, LexicographicCost] = {}
-        """Of each child, what this cycle has changed in its subtree."""
+        """The change of the cost of each child's subtree in this cycle."""
 
     def start_in_tree(self) -> None:
-        """Take a random value, and tell it to the neighbours above; a robot alone takes its cheapest value."""
+        """Choose a random value, and send it to the neighbours above; without neighbours, choose the cheapest value."""
         size = len(self.problem.values)
         if not self.problem.neighbours:
-            burdens = self.problem.lexicographic_costs({})
+            costs = self.problem.lexicographic_costs({})
             self.cycle = self.settings.cycles
-            self._take(burdens.index(min(burdens)))
+            self._choose(costs.index(min(costs)))
             return
-        self._take(int(self.chance() * size))
+        self._choose(int(self.chance() * size))
         self.best = self._present
-        self._tell(self.ancestors)
+        self._send_value(self.ancestors)
 
     def handle(self, sender: str, message: wire.Message) -> None:
         match cast("Value | Difference | Finish", message):
             case Value(value, kept):
                 self.problem.refuse_value(sender, value)
                 self.view[sender] = value
-                self._told_by[sender] += 1
+                self._received[sender] += 1
                 self._kept = kept if sender == self.parent else self._kept
             case Difference(broken, cost):
                 if sender not in self.children or sender in self._changes:
-                    raise ValueError(f"{sender} had nothing to add up, or has told it already")
+                    raise ValueError(f"{sender} sent an unexpected or repeated Difference")
                 self._changes[sender] = broken, cost
             case Finish(kept):
                 if sender != self.parent:
-                    raise ValueError(f"{sender} is not the parent of {self.problem.agent}, and ends its search")
+                    raise ValueError(f"{sender} ended the search, but is not the parent of {self.problem.agent}")
                 self._kept = kept
                 self._finish()
             case never:
                 assert_never(never)
 
     def decide(self) -> None:
-        """Draw a value, or add up what has changed, as soon as all messages for that are there."""
+        """Draw a value, or add up the changes, as soon as all messages for it have arrived."""
         going = True
         while going and self.cycle <= self.settings.cycles:
             going = False
-            if not self._told_change and len(self._changes) == len(self.children):
-                self._tell_change()
+            if not self._sent_difference and len(self._changes) == len(self.children):
+                self._send_difference()
                 going = True
             if self._may_sample():
                 self._sample()
                 going = True
 
     def _may_sample(self) -> bool:
-        """Return whether robots above have drawn in this cycle, and all below have in the last one."""
+        """Return whether all robots above have drawn in this cycle, and all below in the previous one."""
         if not self.problem.neighbours or self.cycle >= self.settings.cycles:
             return False
-        below = all(self._told_by[name] == self.cycle + 1 for name in self.descendants)
-        return below and self._told_change and all(self._told_by[name] > self.cycle for name in self.ancestors)
+        below = all(self._received[name] == self.cycle + 1 for name in self.descendants)
+        return below and self._sent_difference and all(self._received[name] > self.cycle for name in self.ancestors)
 
     def _sample(self) -> None:
-        """Draw the next value, given all neighbours' values, and tell it."""
+        """Draw the next value, given all neighbours' values, and send it."""
         if self._kept:
             self.best = self._present
-        burdens = self.problem.lexicographic_costs(self.view)
-        before = burdens[self._present]
-        self._take(self._drawn(burdens))
-        self.change = gain(burdens[self._present], before)
+        costs = self.problem.lexicographic_costs(self.view)
+        before = costs[self._present]
+        self._choose(self._draw(costs))
+        self.change = gain(costs[self._present], before)
         self._changes.clear()
-        self._told_change = False
-        self._tell(self.problem.neighbours)
+        self._sent_difference = False
+        self._send_value(self.problem.neighbours)
 
-    def _drawn(self, burdens: list[LexicographicCost]) -> int:
-        """Return the place of a value, drawn with the probabilities that its cost gives it."""
-        broken, cost = min(burdens)
+    def _draw(self, costs: list[LexicographicCost]) -> int:
+        """Return the place of a random value, drawn with the probabilities of its costs."""
+        broken, cost = min(costs)
         temperature = max(COLDEST, self.settings.temperature * self.settings.cooling**self.cycle)
         weights = [
-            math.exp(-max(0, paid - cost) / temperature - self.settings.hard * (more - broken))
-            for more, paid in burdens
+            math.exp(-max(0, paid - cost) / temperature - self.settings.hard * (more - broken)) for more, paid in costs
         ]
         sums = list(accumulate(weights))
-        lot = self.chance() * sums[-1]
-        return next((place for place, end in enumerate(sums) if lot < end), len(sums) - 1)
+        point = self.chance() * sums[-1]
+        return next((place for place, end in enumerate(sums) if point < end), len(sums) - 1)
 
-    def _tell_change(self) -> None:
-        """Tell the parent what this cycle has changed in the subtree; the root judges the sample."""
-        self._told_change = True
+    def _send_difference(self) -> None:
+        """Send the parent the change in this subtree by this cycle; the root compares the sample with the best."""
+        self._sent_difference = True
         for broken, cost in self._changes.values():
             self.change = self.change[0] + broken, self.change[1] + cost
         if self.parent is None:
-            self._judge()
+            self._record_sample()
         else:
             self.send(self.parent, Difference(*map(int, self.change)))
 
-    def _judge(self) -> None:
+    def _record_sample(self) -> None:
         """Decide whether the sample is the best so far; after the last one, end the search."""
         self.total = self.total[0] + self.change[0], self.total[1] + self.change[1]
         self._kept = self.total < self.record
@@ -271,18 +272,18 @@ class DGibbs(TreeProtocol):
             self._finish()
 
     def _finish(self) -> None:
-        """Take the value of the best sample, and let all below do so."""
+        """Choose the value of the best sample, and make all robots below do so."""
         for child in self.children:
             self.send(child, Finish(self._kept))
-        self._take(self._present if self._kept else self.best)
+        self._choose(self._present if self._kept else self.best)
 
-    def _tell(self, names: tuple[str, ...]) -> None:
+    def _send_value(self, names: tuple[str, ...]) -> None:
         value = Value(self.problem.values[self._present], self._kept)
         for name in names:
             self.send(name, value)
 
-    def _take(self, index: int) -> None:
-        """Set the own value of the next cycle."""
+    def _choose(self, index: int) -> None:
+        """Set this robot's value of the next cycle."""
         self.cycle += 1
         if index != self.value:
             self.value = index
@@ -290,10 +291,10 @@ class DGibbs(TreeProtocol):
 
     @property
     def _present(self) -> int:
-        assert self.value is not None  # noqa: S101 - for mypy: `start_in_tree` takes one
+        assert self.value is not None  # noqa: S101 - for mypy: `start_in_tree` chooses one
         return self.value
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree, and the own value in every cycle."""
+        """The place in the tree, and this robot's value in every cycle."""
         return msgspec.structs.replace(super().findings, trail=Trail(list(self._trail), self.cycle))

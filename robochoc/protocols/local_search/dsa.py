@@ -1,9 +1,9 @@
 """The Distributed Stochastic Algorithm (DSA), variants A to E.
 
-Local search in cycles. In each cycle a robot looks for its best value against its neighbours' values of the cycle
-before, and takes it with a probability, so that not all neighbours move at once. The gain is the cost that a move
-saves. Variant A moves only if it gains. B also moves if it gains nothing and is in conflict. C also moves if it gains
-nothing at all. D and E are B and C in which a robot that gains always moves.
+Local search in cycles. In each cycle a robot finds its best value against its neighbours' values of the previous cycle,
+and chooses it with a probability, so that not all neighbours move at once. The gain is the cost that a move saves.
+Variant A moves only if it gains. B also moves if it gains nothing and is in conflict. C also moves if it gains nothing
+at all. D and E are B and C in which a robot that gains always moves.
 
 - **When to use**: costs, a large team: good answers fast.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
@@ -30,7 +30,7 @@ Choices that the paper leaves open, and differences:
 - Constraints may be n-ary; each robot of a scope counts the whole cost of the constraint.
 - Fewer violated hard constraints are always better.
 - One of several best values is chosen at random.
-- Where messages are lost, the last value known of a neighbour stands for the one of the cycle before.
+- For a lost message, the neighbour's last known value is used.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -69,41 +69,41 @@ class OnePhase(CycleProtocol):
     """The common base of searches with one phase: all robots send their values, and each chooses its next one."""
 
     def start_cycles(self) -> None:
-        """Take a random value."""
+        """Choose a random value."""
         self.choose(self.any_value())
         self.exchange_values(self._choose)
 
     @abstractmethod
-    def choice(self, burdens: Sequence[LexicographicCost]) -> int:
-        """Return the own value of the next cycle, where the own values cost `burdens`."""
+    def choice(self, costs: Sequence[LexicographicCost]) -> int:
+        """Return this robot's value of the next cycle, given the cost of each of its values."""
 
     def _choose(self, messages: Mapping[str, Message]) -> None:
-        """Move or stay, with all neighbours' values known."""
+        """Move or stay, once all neighbours' values are known."""
         self.choose(self.choice(self.problem.lexicographic_costs(self.checked_values(messages))))
         if not self.finished:
             self.exchange_values(self._choose)
 
 
 class StochasticSearch(OnePhase):
-    """The common base of DSA and its kin: each robot moves with some probability."""
+    """The common base of DSA and its variants: each robot moves with some probability."""
 
     @abstractmethod
-    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the values that this robot may move to, where its own cost `burdens`, and with what probability."""
+    def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the candidate values, given the cost of each of this robot's values, and the probability of a move."""
 
-    def choice(self, burdens: Sequence[LexicographicCost]) -> int:
-        """Return one of the proposed values, with their probability, or else the present one."""
-        places, probability = self.proposal(burdens)
+    def choice(self, costs: Sequence[LexicographicCost]) -> int:
+        """Return one of the proposed values with their probability, otherwise the present value."""
+        places, probability = self.proposal(costs)
         if places and probability and self.chance() < probability:
             return self.any_of(places)
         return self.present
 
-    def places_of(self, burden: LexicographicCost, burdens: Sequence[LexicographicCost]) -> list[int]:
-        """Return the values other than the present one that cost as much as `burden`."""
-        return [place for place, other in enumerate(burdens) if other == burden and place != self.present]
+    def places_of(self, cost: LexicographicCost, costs: Sequence[LexicographicCost]) -> list[int]:
+        """Return the values other than the present one whose cost is `cost`."""
+        return [place for place, other in enumerate(costs) if other == cost and place != self.present]
 
     def in_conflict(self, now: LexicographicCost) -> bool:
-        """Return whether something is violated or charges anything, where the present value costs `now`."""
+        """Return whether a shared constraint is violated or charges a cost, if the present value costs `now`."""
         return now != (0, self.problem.charges[self.present])
 
 
@@ -125,10 +125,10 @@ class DSA(StochasticSearch):
         use_when="costs, large team: good answers fast, no proof",
     )
 
-    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+    def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
         """Return the best values, and the probability of the variant (Table 1)."""
-        now, least = burdens[self.present], min(burdens)
-        return self.places_of(least, burdens), self._probability(now, least)
+        now, least = costs[self.present], min(costs)
+        return self.places_of(least, costs), self._probability(now, least)
 
     def _probability(self, now: LexicographicCost, least: LexicographicCost) -> float:
         variant, probability = self.settings.variant, self.settings.probability

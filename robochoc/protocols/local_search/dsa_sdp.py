@@ -1,15 +1,15 @@
 """DSA with slope-dependent probabilities (DSA-SDP).
 
-DSA in which the probability of a move depends on what it saves: the larger the part of its cost that a robot saves, the
-likelier it moves. Every `period`-th cycle all robots explore: those that can save nothing may also take the best of
-their other values, the likelier the less it costs more. So the search leaves local optima, and the best cycle counts.
+DSA in which the probability of a move depends on its gain: the larger the part of its cost that a robot saves, the
+likelier it moves. Every `period`-th cycle all robots explore: robots without a gain may also choose the best of their
+other values, the likelier the less it costs more. So the search leaves local optima, and the best cycle counts.
 
 - **When to use**: as DSA, with time for many cycles.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime); costs rise when robots explore. A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `pa` and `pb` (a robot that saves the part r of its cost moves with probability
-  pa + min(pb, r); defaults 0.6 and 0.15), `pc` and `pd` (in a cycle of exploration, one whose cost would rise by the
-  part r of it moves with probability max(pc, pd - r), and never where r > 1; defaults 0.4 and 0.8), `period` (the
+  pa + min(pb, r); defaults 0.6 and 0.15), `pc` and `pd` (in a cycle of exploration, a robot whose cost would rise by
+  the part r of it moves with probability max(pc, pd - r), and never if r > 1; defaults 0.4 and 0.8), `period` (the
   paper's k; default 40), `cycles` (default 100).
 - **References**: Zivan, Okamoto, Peled: "Explorative anytime local search for distributed constraint optimization",
   AIJ 212, 2014, Section 5.
@@ -22,9 +22,9 @@ The rules:
 
 Choices that the paper leaves open, and differences:
 
-- Costs are pairs as in `mgm`, broken hard constraints first. The part r is of broken constraints, where the move
-  changes their number, otherwise of the costs.
-- A robot that costs nothing has nothing to save, and does not explore either: any rise is more than all of its cost.
+- Costs are pairs as in `mgm`, broken hard constraints first. If the move changes their number, r is a part of this
+  number, otherwise of the costs.
+- A robot without costs has nothing to save, and does not explore either: any rise is more than all of its cost.
 - A robot explores only where its best other value saves nothing. One of several such values is chosen at random.
 - First values are random, and constraints may be n-ary, as in `dsa`.
 
@@ -49,10 +49,10 @@ from robochoc.solver.local_problem import LexicographicCost
 
 
 class DSASDPSettings(CycleSettings, frozen=True):
-    """`pa`, `pb`: the probability of a move that saves the part r of the own cost is pa + min(pb, r).
+    """`pa`, `pb`: a move that saves the part r of the robot's cost has the probability pa + min(pb, r).
 
-    `pc`, `pd`: that of one that costs the part r more, in a cycle of exploration, is max(pc, pd - r). `period`: every
-    so many cycles is one of exploration. `cycles`: the number of cycles.
+    `pc`, `pd`: a move that costs the part r more, in a cycle of exploration, has the probability max(pc, pd - r).
+    `period`: the number of cycles from one exploration to the next. `cycles`: the number of cycles.
     """
 
     pa: float = 0.6
@@ -89,10 +89,10 @@ class DSASDP(StochasticSearch):
         use_when="as DSA, and many cycles: it explores",
     )
 
-    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the best other values, and the probability by what they save."""
-        now = burdens[self.present]
-        best = min((burden for place, burden in enumerate(burdens) if place != self.present), default=None)
+    def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the best other values, and the probability for their gain."""
+        now = costs[self.present]
+        best = min((cost for place, cost in enumerate(costs) if place != self.present), default=None)
         if best is None:
             return [], 0
         saved = gain(now, best)
@@ -100,10 +100,10 @@ class DSASDP(StochasticSearch):
             probability = self._improving(now, saved)
         else:
             probability = self._exploring(now, gain(best, now)) if self._explores else 0
-        return self.places_of(best, burdens), probability
+        return self.places_of(best, costs), probability
 
     def _improving(self, now: LexicographicCost, saved: LexicographicCost) -> float:
-        """Return the probability of a move that saves something."""
+        """Return the probability of a move that saves cost."""
         return self.settings.pa + min(self.settings.pb, _part(saved, now))
 
     def _exploring(self, now: LexicographicCost, lost: LexicographicCost) -> float:
@@ -118,6 +118,6 @@ class DSASDP(StochasticSearch):
 
 
 def _part(difference: LexicographicCost, now: LexicographicCost) -> float:
-    """Return what part of `now` the `difference` is; infinite if `now` is nothing."""
-    changed, whole = (difference[0], now[0]) if difference[0] else (difference[1], now[1])
-    return changed / whole if whole else float("inf")
+    """Return `difference` as a part of `now`; infinite if `now` is zero."""
+    changed, total = (difference[0], now[0]) if difference[0] else (difference[1], now[1])
+    return changed / total if total else float("inf")

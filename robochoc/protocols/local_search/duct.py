@@ -1,14 +1,14 @@
 """Distributed Upper Confidence Tree (DUCT).
 
-Sampling on a pseudo-tree. A sample starts at the root: each robot is told the values above it that matter to its
-subtree (the context), takes a value, and passes the context on. The costs of the sample come back from the leaves. A
-robot keeps for each context how often it has tried each value, and what that has cost. It tries the value with the
-best confidence bound: what was cheap is tried often, and what is hardly known now and then.
+Sampling on a pseudo-tree. A sample starts at the root: each robot receives the values above it that matter to its
+subtree (the context), chooses a value, and sends the context on. The costs of the sample come back from the leaves. A
+robot counts for each context how often it has tried each value, and stores the costs. It tries the value with the best
+confidence bound: cheap values often, and rarely tried values now and then.
 
 - **When to use**: costs, and a pseudo-tree that is too wide for `dpop`: the more samples, the better.
 - **Guarantees**: incomplete; the cost at the end is no more than the best that the root knows. Memory is bounded by
   `contexts` times the size of the domain. A robot with an empty domain proves that there is no solution, and so does a
-  root none of whose values has one below.
+  root without a value that has a solution below.
 - **Parameters (`--set`)**: `samples` (default 300), `by` (`mean`, default, or `best`), `bound` (default 1), `error`
   (default 0.1), `confidence` (default 0.9), `contexts` (default 10,000).
 - **Reference**: Ottens, Dimitrakakis, Faltings: "DUCT: an upper confidence bound approach to distributed constraint
@@ -16,26 +16,26 @@ best confidence bound: what was cheap is tried often, and what is hardly known n
 
 Its parts:
 
-    build the pseudo-tree           `dfs.TreeProtocol`    COST, from the leaves up       `_learn`
+    build the pseudo-tree           `dfs.TreeProtocol`    COST, from the leaves up       `_record_cost`
     CONTEXT, from the root down     `_sample`             the value to be sampled        `Samples.next`
     the end of a robot's samples    `Samples.enough`      the value at the end           `Samples.final`
 
-After its samples, the root fixes the value with the best cost. Then its children go on sampling, each as the root of
-its own subtree, until they fix theirs, and so on. A robot stops when with the given confidence no other value is better
-by more than `error`, but after `samples` samples in this context at the latest. Those that it took before count.
+After its samples, the root fixes the value with the best cost. Then its children continue to sample, each as the root
+of its own subtree, until they fix theirs, and so on. A robot stops when with the given confidence no other value is
+better by more than `error`, but after `samples` samples in this context at the latest. Its earlier samples count.
 
 Choices that the paper leaves open, and differences:
 
-- Before the first sample, robots tell their parents their separators, and the most that their subtrees can cost. By
-  that the costs are normalised.
-- Values that were never tried come first, the cheapest of them by what is known above. Ties go to the first value.
+- Before the first sample, robots send their parents their separators, and the highest possible costs of their subtrees,
+  which normalise the costs.
+- Values that were never tried come first, the cheapest of them by the known costs above. Ties go to the first value.
 - A value that breaks a hard constraint with robots above is never tried. A context with no other value is hopeless, and
-  its parent never takes its value in that context again. A broken constraint in a sample counts as the most that the
-  subtree can cost.
-- Besides the cost of the sample, a robot tells the best that it knows for this context. Bests of several children add
-  up even if they come from different samples, so the end may be better than every sample.
-- When `contexts` are in memory, nothing is forgotten: in new ones a robot takes its cheapest value, which it can do
-  again. So what a robot has told to be possible stays so. A leaf keeps nothing, as it knows its costs.
+  its parent never chooses its value in that context again. A broken constraint in a sample counts as the highest
+  possible cost of the subtree.
+- Besides the cost of the sample, a robot sends the best cost that it knows for this context. The best costs of several
+  children add up even if they come from different samples, so the end may be better than every sample.
+- When `contexts` are in memory, none is removed: in new ones a robot chooses its cheapest value, which it can repeat.
+  So the costs that a robot has reported as possible remain so. A leaf stores nothing, as it knows its costs.
 - Constraints may be n-ary, as all robots of a scope are on one branch. The lowest of them pays.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -76,12 +76,12 @@ from robochoc.system.plain_text import counted, listed
 
 
 class DUCTSettings(Settings, frozen=True):
-    """`samples`: after how many samples a robot chooses its value at the latest.
+    """`samples`: the number of samples after which a robot chooses its value at the latest.
 
-    `by`: whether values are compared by the `mean` cost of their samples, or by the `best` one. `bound`: by what the
-    confidence bound is multiplied; more tries dear values more often. `error` and `confidence`: a robot also chooses
-    when, with this confidence, no other value is better by more than this part of what its subtree can cost at most.
-    `contexts`: how many combinations of values above it a robot keeps samples of.
+    `by`: whether values are compared by the `mean` cost of their samples, or by the `best` one. `bound`: the factor of
+    the confidence bound; a larger one tries dear values more often. `error` and `confidence`: a robot also chooses
+    when, with this confidence, no other value is better by more than this part of the highest possible cost of its
+    subtree. `contexts`: the number of combinations of values above a robot for which it stores samples.
     """
 
     samples: int = 300
@@ -97,21 +97,21 @@ class DUCTSettings(Settings, frozen=True):
                 raise ValueError(f"{name} is {number}; it must be 1 or more")
         for name, measure in (("bound", self.bound), ("error", self.error)):
             if not 0 <= measure < math.inf:
-                raise ValueError(f"{name} is {measure:g}; it must be 0 or more")
+                raise ValueError(f"{name} is {measure:g}; it must be 0 or more, and finite")
         if not 0 < self.confidence < 1:
             raise ValueError(f"confidence is {self.confidence:g}; it must be between 0 and 1")
 
 
 class Separator(wire.Message, frozen=True):
-    """The robots above the sender that matter to its subtree, and the most that the subtree can cost.
+    """The robots above the sender that matter to its subtree, and the highest possible cost of the subtree.
 
-    That is, without broken hard constraints.
+    This cost does not include broken hard constraints.
     """
 
     robots: list[str]
     dearest: int
 
-    act = Act(Performative.INFORM, "the receiver comes to know whose values the sender has to be told")
+    act = Act(Performative.INFORM, "the receiver learns which values the sender needs")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -123,7 +123,7 @@ class SampleContext(wire.Message, frozen=True):
 
     values: dict[str, wire.Value]
 
-    act = Act(Performative.REQUEST, "the receiver is to take a sample of its subtree for these values")
+    act = Act(Performative.REQUEST, "the receiver samples its subtree for these values")
 
     def in_words(self, words: Wording) -> str:
         return f"sample your subtree with {words.assigned(self.values.items())}"
@@ -135,8 +135,8 @@ class SampleContext(wire.Message, frozen=True):
 class SampleCost(wire.Message, frozen=True):
     """The cost of the sample in the sender's subtree: broken hard constraints, and costs (COST).
 
-    `best`: the least that is known for these values without a broken one, and None before there is any. `hopeless`:
-    there is none, whatever the subtree does.
+    `best`: the least known cost for these values without a broken one; None if there is none yet. `hopeless`: there is
+    none, whatever values the subtree has.
     """
 
     broken: int
@@ -144,7 +144,7 @@ class SampleCost(wire.Message, frozen=True):
     best: int | None
     hopeless: bool
 
-    act = Act(Performative.INFORM, "the receiver comes to know what its sample costs below")
+    act = Act(Performative.INFORM, "the receiver learns the cost of its sample below")
 
     def in_words(self, _: Wording) -> str:
         broken = f", and breaks {counted(self.broken, 'constraint')}" if self.broken else ""
@@ -155,9 +155,9 @@ class SampleCost(wire.Message, frozen=True):
         return f"this sample costs my subtree {cost_text(self.cost)}{broken}; {best}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the sender pays no more than its subtree does.
+        """Return the proofs that the sender pays no more than its subtree does.
 
-        If all its neighbours are in the context, nobody is below, and what is hopeless is so by its own constraints.
+        If all its neighbours are in the context, no robot is below, and a hopeless context breaks its own constraints.
         """
         asked = hearing.last(SampleContext, hearing.receiver, hearing.sender)
         if asked is None:
@@ -173,11 +173,11 @@ class SampleCost(wire.Message, frozen=True):
 
 
 class Fixed(wire.Message, frozen=True):
-    """The values of the receiver's separator in the end: it goes on sampling for these only."""
+    """The final values of the receiver's separator: from now on it samples for these only."""
 
     values: dict[str, wire.Value]
 
-    act = Act(Performative.REQUEST, "the receiver is to choose its value for good, for these values")
+    act = Act(Performative.REQUEST, "the receiver chooses its final value for these values")
 
     def in_words(self, words: Wording) -> str:
         return f"{words.assigned(self.values.items())} for good; choose your own value"
@@ -189,8 +189,8 @@ class Fixed(wire.Message, frozen=True):
 class Samples:
     """The samples of one context.
 
-    `local` are the costs of the own values with those above, and `options` the values that are still tried: those that
-    break nothing above, and below which no context was hopeless. `scale` is the most that the subtree can cost; a
+    `local` are the costs of this robot's values with those above, and `options` the values that are still tried: they
+    break nothing above, and no context below them was hopeless. `scale` is the highest possible cost of the subtree; a
     broken constraint counts as much.
     """
 
@@ -206,21 +206,21 @@ class Samples:
 
     @property
     def best(self) -> int | None:
-        """The least cost of the subtree that is known here, without a broken constraint; None if there is none yet."""
+        """The least known cost of the subtree without a broken constraint; None if there is none yet."""
         return min((least for place in self.options if (least := self._least[place]) is not None), default=None)
 
     def total(self, place: int, below: Sequence[LexicographicCost]) -> LexicographicCost:
-        """Return what a sample costs the subtree."""
+        """Return the cost of a sample of the subtree."""
         costs = [self._local[place], *below]
         return int(sum(broken for broken, _ in costs)), int(sum(cost for _, cost in costs))
 
     def rule_out(self, place: int) -> None:
-        """Note that a value has no solution below."""
+        """Record that a value has no solution below."""
         self.taken += 1
         self.options = [option for option in self.options if option != place]
 
     def add(self, place: int, sample: LexicographicCost, below: Sequence[int | None]) -> None:
-        """Note what a sample of a value has cost, and the best that each child knows for it."""
+        """Record the cost of a sample of a value, and the best known cost of each child for it."""
         broken, cost = sample
         self.taken += 1
         self._tries[place] += 1
@@ -229,21 +229,21 @@ class Samples:
             self._least[place] = int(self._local[place][1]) + sum(best for best in below if best is not None)
 
     def next(self, settings: DUCTSettings) -> int:
-        """Return the value for the next sample: one never tried, the cheapest first; then the least bound."""
+        """Return the value for the next sample: the cheapest that was never tried, or that with the least bound."""
         new = [place for place in self.options if not self._tries[place]]
         if new or not self.options:
             return self._cheapest(new or range(len(self._local)))
         return min(self.options, key=lambda place: self._measure(place, settings) - self._margin(place, settings))
 
     def final(self) -> int:
-        """Return the value of the best solution; while there is none, the one that breaks least in the mean."""
+        """Return the value of the best solution; if there is none, the one with the least mean cost."""
         if self.best is not None:
             return next(place for place in self.options if self._least[place] == self.best)
         tried = [place for place in self.options if self._tries[place]]
         return min(tried, key=self._mean) if tried else self._cheapest(self.options or range(len(self._local)))
 
     def enough(self, settings: DUCTSettings) -> bool:
-        """Return whether no other value is likely to be better by more than the error, or samples are used up."""
+        """Return whether no other value is likely to be better by more than the error, or all samples are used."""
         if self.taken >= settings.samples or not self.options:
             return True
         if self.best is None or not all(self._tries[place] for place in self.options):
@@ -260,21 +260,21 @@ class Samples:
         return min(places, key=self._local.__getitem__)
 
     def _mean(self, place: int) -> float:
-        """Return the mean cost of a value's samples, as a part of what the subtree can cost."""
+        """Return the mean cost of a value's samples, as a part of the highest possible cost of the subtree."""
         return self._sums[place] / (self._tries[place] * self._scale)
 
     def _measure(self, place: int, settings: DUCTSettings) -> float:
-        """Return the cost by which a value is compared; the mean where no sample of it was a solution."""
+        """Return the cost by which a value is compared; the mean if none of its samples was a solution."""
         least = self._least[place]
         return self._mean(place) if settings.by == "mean" or least is None else least / self._scale
 
     def _margin(self, place: int, settings: DUCTSettings) -> float:
-        """Return how much better than its samples a value may be: the less, the more often it was tried."""
+        """Return by how much a value may be better than its samples; it falls with the number of tries."""
         return settings.bound * math.sqrt(2 * math.log(2 * self.taken) / self._tries[place])
 
 
 MOST_ROBOTS = 100_000
-"""No separator has more."""
+"""The most robots of a separator."""
 Key = tuple[wire.Value, ...]
 """The values of a separator, in its order."""
 
@@ -282,9 +282,9 @@ Key = tuple[wire.Value, ...]
 class DUCT(TreeProtocol):
     """One agent of DUCT.
 
-    State: `separators` of the children, the own `separator`, `dearest` (the most that the subtree can cost), `known`
-    (the samples of each context), and of the present sample the `view` (the context) and its `samples`. `fixed`: the
-    robots above have chosen. `chosen`: this one has, too.
+    State: `separators` of the children, this robot's `separator`, `dearest` (the highest possible cost of the subtree),
+    `known` (the samples of each context), and of the present sample the `view` (the context) and its `samples`.
+    `fixed`: the robots above have chosen. `chosen`: this one has, too.
     """
 
     messages = TreeMessage | Separator | SampleContext | SampleCost | Fixed
@@ -310,45 +310,45 @@ class DUCT(TreeProtocol):
         self.samples = Samples([], 0)
         self.fixed = self.chosen = False
         self._costs: dict[str, SampleCost] = {}
-        """The costs of the present sample that children have told."""
+        """The children's costs of the present sample."""
         self._sampling = False
 
     def start_in_tree(self) -> None:
-        """Tell the parent the separator, if no child has one to tell."""
+        """Send the parent the separator, if there are no children to wait for."""
         own = [charge for _, charge in self.problem.scopes(self.ancestors)]
         own.append(max((charge for charge in self.problem.charges if charge != float("inf")), default=0))
         self.dearest = int(sum(own))
-        self._tell_separator()
+        self._send_separator()
 
     def handle(self, sender: str, message: wire.Message) -> None:
         match cast("Separator | SampleContext | SampleCost | Fixed", message):
             case Separator(robots, dearest):
-                self._keep_separator(sender, robots, dearest)
+                self._receive_separator(sender, robots, dearest)
             case SampleContext(values):
-                self._enter(sender, values)
+                self._enter_context(sender, values)
                 self._sample()
             case SampleCost() as cost:
-                self._keep_cost(sender, cost)
+                self._receive_cost(sender, cost)
             case Fixed(values):
-                self._enter(sender, values)
-                self._fix()
+                self._enter_context(sender, values)
+                self._start_fixed_samples()
             case never:
                 assert_never(never)
 
     # The separators, from the leaves up
 
-    def _keep_separator(self, child: str, robots: list[str], dearest: int) -> None:
+    def _receive_separator(self, child: str, robots: list[str], dearest: int) -> None:
         """Store a child's separator."""
         if child not in self.children or child in self.separators:
-            raise ValueError(f"{child} had no separator to tell, or has told it already")
+            raise ValueError(f"{child} sent an unexpected or repeated Separator")
         if self.problem.agent not in robots or dearest < 0 or len({*robots}) < len(robots) or len(robots) > MOST_ROBOTS:
-            raise ValueError(f"{child} tells a separator that cannot be")
+            raise ValueError(f"{child} sent an invalid separator: {', '.join(robots[:10])}, cost {dearest}")
         self.separators[child] = tuple(robots)
         self.dearest += dearest
-        self._tell_separator()
+        self._send_separator()
 
-    def _tell_separator(self) -> None:
-        """Tell the parent the own separator, when all children have told theirs; the root begins to sample."""
+    def _send_separator(self) -> None:
+        """Send the parent the separator, when all children have sent theirs; the root starts to sample."""
         if len(self.separators) < len(self.children):
             return
         others = (name for child in self.children for name in self.separators[child] if name != self.problem.agent)
@@ -356,19 +356,20 @@ class DUCT(TreeProtocol):
         if self.parent is None:
             if self.separator:
                 raise ValueError(f"{self.problem.agent} is a root, and {', '.join(self.separator)} cannot be above it")
-            self._enter(None, {})
-            self._fix()
+            self._enter_context(None, {})
+            self._start_fixed_samples()
         else:
             self.send(self.parent, Separator(list(self.separator), self.dearest))
 
     # Contexts, from the root down
 
-    def _enter(self, sender: str | None, values: Mapping[str, wire.Value]) -> None:
-        """Take up a context: what is known of it, or a first look at its costs."""
+    def _enter_context(self, sender: str | None, values: Mapping[str, wire.Value]) -> None:
+        """Make a context the present one, with its stored samples or new ones."""
         if sender != self.parent or self._sampling or self.fixed:
-            raise ValueError(f"{sender} had no sample to begin at {self.problem.agent}")
+            raise ValueError(f"{sender} requested an unexpected sample from {self.problem.agent}")
         if values.keys() != {*self.separator}:
-            raise ValueError(f"{self.problem.agent} depends on {', '.join(self.separator)}, and is told of others")
+            expected, got = ", ".join(self.separator), ", ".join(values)
+            raise ValueError(f"{self.problem.agent} depends on {expected}, but received values of {got}")
         self.view = dict(values)
         key = tuple(values[name] for name in self.separator)
         known = self.known.get(key)
@@ -378,13 +379,13 @@ class DUCT(TreeProtocol):
                 self.known[key] = known
         self.samples = known
 
-    def _fix(self) -> None:
-        """Begin to sample as the root of the own subtree: the robots above have chosen."""
+    def _start_fixed_samples(self) -> None:
+        """Start to sample as the root of this robot's subtree, once the robots above have chosen."""
         self.fixed = True
-        self._carry_on()
+        self._sample_or_choose()
 
-    def _carry_on(self) -> None:
-        """Take another sample as the root of the subtree, or choose for good."""
+    def _sample_or_choose(self) -> None:
+        """Make another sample as the root of the subtree, or choose the final value."""
         if self.children and not self.samples.enough(self.settings):
             self._sample()
             return
@@ -397,7 +398,7 @@ class DUCT(TreeProtocol):
             self.send(child, Fixed(self._context_of(child)))
 
     def _sample(self) -> None:
-        """Take the next value, and let the children sample for it; a leaf knows at once what it costs."""
+        """Choose the next value, and let the children sample for it; a leaf knows its cost at once."""
         self.value = self.samples.next(self.settings)
         self._sampling = True
         self._costs.clear()
@@ -405,7 +406,7 @@ class DUCT(TreeProtocol):
             for child in self.children:
                 self.send(child, SampleContext(self._context_of(child)))
         else:
-            self._learn()
+            self._record_cost()
 
     def _context_of(self, child: str) -> dict[str, wire.Value]:
         """Return the values of a child's separator."""
@@ -414,32 +415,32 @@ class DUCT(TreeProtocol):
 
     # Costs, from the leaves up
 
-    def _keep_cost(self, child: str, told: SampleCost) -> None:
-        """Store what a child's sample costs; learn from it when all have told."""
+    def _receive_cost(self, child: str, cost: SampleCost) -> None:
+        """Store the cost of a child's sample; record the total once all children have sent theirs."""
         if not self._sampling or child not in self.children or child in self._costs:
-            raise ValueError(f"{child} had no sample to tell of, or has told it already")
-        if min(told.broken, told.cost, told.best or 0) < 0 or (told.hopeless and told.best is not None):
-            raise ValueError(f"{child} tells costs that cannot be")
-        self._costs[child] = told
+            raise ValueError(f"{child} sent an unexpected or repeated SampleCost")
+        if min(cost.broken, cost.cost, cost.best or 0) < 0 or (cost.hopeless and cost.best is not None):
+            raise ValueError(f"{child} sent invalid costs of a sample: {cost}")
+        self._costs[child] = cost
         if len(self._costs) == len(self.children):
-            self._learn()
+            self._record_cost()
 
-    def _learn(self) -> None:
-        """Note what the sample has cost, and tell the parent, or go on where the robots above have chosen."""
+    def _record_cost(self) -> None:
+        """Record the cost of the sample; send it to the parent, or continue if the robots above have chosen."""
         self._sampling = False
         below = [self._costs[child] for child in self.children if child in self._costs]
-        broken, cost = self.samples.total(self._present, [(told.broken, told.cost) for told in below])
-        if any(told.hopeless for told in below):
+        broken, cost = self.samples.total(self._present, [(child.broken, child.cost) for child in below])
+        if any(child.hopeless for child in below):
             self.samples.rule_out(self._present)
         elif self.samples.options:
-            self.samples.add(self._present, (broken, cost), [told.best for told in below])
+            self.samples.add(self._present, (broken, cost), [child.best for child in below])
         if self.fixed:
-            self._carry_on()
+            self._sample_or_choose()
         else:
             best = self.samples.best
             self.send(self.parent or "", SampleCost(int(broken), int(cost), best, not self.samples.options))
 
     @property
     def _present(self) -> int:
-        assert self.value is not None  # noqa: S101 - for mypy: `_sample` takes one
+        assert self.value is not None  # noqa: S101 - for mypy: `_sample` chooses one
         return self.value

@@ -1,37 +1,37 @@
 """The Generalized Distributed Breakout Algorithm (GDBA).
 
 Local search in cycles: MGM in which constraints weigh more the longer they keep robots in a local minimum. Each robot
-has modifiers of its own for the entries of its constraints' tables; a cost together with its modifier is the effective
+has its own modifiers for the entries of its constraints' tables; a cost combined with its modifier is the effective
 cost. All robots send their values, then the reduction of their effective cost by their best move; among neighbours the
-one with the largest moves. Where neither a robot nor one of its neighbours can reduce anything (a quasi-local minimum),
-the robot raises the modifiers of its violated constraints.
+one with the largest reduction moves. If neither a robot nor one of its neighbours can reduce its cost (a quasi-local
+minimum), the robot raises the modifiers of its violated constraints.
 
 - **When to use**: costs, a large team, time for many cycles: it leaves the local optima in which MGM ends.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime); costs rise and fall. A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `modifier` (A or M; default M), `violation` (NZ, NM or MX; default NM), `scope` (E, R, C or
-  T; default T), `cycles` (default 100). They are explained below; the defaults are the variant that later papers take.
+  T; default T), `cycles` (default 100). They are explained below; the defaults are the variant that later papers use.
 - **References**: Okamoto, Zivan, Nahon: "Distributed breakout: beyond satisfaction", IJCAI 2016. For the algorithm that
   it generalizes: Yokoo, Hirayama: "Distributed breakout algorithm for solving distributed constraint satisfaction
   problems", ICMAS 1996.
 
-The paper's three choices, 24 variants together:
+The paper's three choices, 24 variants in all:
 
     effective cost: additive (A), multiplicative (M)                `modifier`, `_effective`
     violated: non-zero, non-minimum, maximum cost (NZ, NM, MX)      `violation`, `_violated`
-    what is raised: entry, row, column, table (E, R, C, T)          `scope`, `_key`
-    send value, send improvement, raise or move                     `exchange_values`, `_weigh`, `_move`
+    scope of a raise: entry, row, column, table (E, R, C, T)        `scope`, `_key`
+    send value, send improvement, raise or move                     `exchange_values`, `_send_improve`, `_move`
 
-With A and R, or A and T, all own values are raised alike, so no decision changes: these variants are exactly MGM.
-E and C leave minima fastest, and rest nowhere; their last cycle may be far from the best one.
+With A and R, or A and T, all values of a robot are raised alike, so no decision changes: these variants are exactly
+MGM. E and C leave minima fastest, but never settle; their last cycle may be far from the best one.
 
 Choices that the paper leaves open, and differences:
 
-- A row (R) is all own values against the others' current values, a column (C) the own value against all of theirs.
+- A row (R) is all values of the robot against the others' current values, a column (C) its value against all of theirs.
 - Constraints may be n-ary; then the others' current values are those of all other robots of the scope.
-- A broken hard constraint stands for a cost larger than all others: costs are pairs as in `mgm`, and a broken
+- A broken hard constraint counts as a cost larger than all others: costs are pairs as in `mgm`, and a broken
   constraint is raised by one broken constraint (A) or weighs as one more (M).
-- A robot's private costs are no constraints with others, and are never raised.
+- A robot's private costs are not shared constraints, and are never raised.
 - First values, equally good values, equal reductions and lost messages are treated as in `mgm`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -63,9 +63,9 @@ from robochoc.solver.shared_constraint import OtherValues
 class GDBASettings(CycleSettings, frozen=True):
     """The rule by which a constraint that is violated in a quasi-local minimum weighs more from then on.
 
-    `modifier`: A adds to what it charges, M multiplies it. `violation`: NZ (it charges anything), NM (more than its
-    minimum) or MX (its maximum). `scope`: E changes one entry of its table, R those of all own values against the
-    others' current ones, C those of the own value against all of theirs, T the whole table. `cycles`: the number of
+    `modifier`: A adds to its cost, M multiplies it. `violation`: NZ (its cost is not zero), NM (more than its minimum)
+    or MX (its maximum). `scope`: E changes one entry of its table, R those of all the robot's values against the
+    others' current ones, C those of the robot's value against all of theirs, T the whole table. `cycles`: the number of
     cycles.
     """
 
@@ -82,19 +82,19 @@ class Improve(Gain, frozen=True):
 
 
 Raised = tuple[int, int]
-"""Two counts of raised modifiers: where the constraint was broken, and where it just cost something."""
+"""The numbers of raises: in cycles that broke the constraint, and in cycles in which it only had a cost."""
 
 Key = tuple[int | None, OtherValues | None]
-"""The entries of a table that are raised together: those of one code of own values, of what the others say, or all."""
+"""The entries of a table that are raised together: those of one code of this robot's values, of others' values, all."""
 
 MOST = 1 << 62
-"""The largest reduction that is told: effective costs may outgrow what a message holds."""
+"""The largest reduction that is sent: effective costs may exceed the integers of a message."""
 
 
 class GDBA(Gainers):
     """One agent of GDBA. A cycle has two phases: all robots send their values, then their reductions.
 
-    `raised` are the modifiers: for each constraint, by its number, how often its entries were raised.
+    `raised` are the modifiers: for each constraint, by its number, the number of raises of its entries.
     """
 
     messages = Value | Improve | AnytimeMessage
@@ -118,37 +118,37 @@ class GDBA(Gainers):
         self._ranges: dict[int, tuple[Cost, Cost]] = {}
 
     def start_cycles(self) -> None:
-        """Take a random value."""
+        """Choose a random value."""
         self.choose(self.any_value())
-        self.exchange_values(self._weigh)
+        self.exchange_values(self._send_improve)
 
-    def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the reduction of the best own move, with all neighbours' values known."""
+    def _send_improve(self, messages: Mapping[str, wire.Message]) -> None:
+        """Send the reduction of this robot's best move, once all neighbours' values are known."""
         self._charged = self.problem.charged(self.checked_values(messages))
-        self.best_of(self._burdens())
+        self.find_best_move(self._effective_costs())
         broken, cost = self.gain
         self.gain = broken, max(-MOST, min(MOST, cost))
         self.multicast(self.problem.neighbours, Improve(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if the own reduction is the largest; raise modifiers in a quasi-local minimum."""
+        """Move if this robot's reduction is the largest; raise modifiers in a quasi-local minimum."""
         complete = len(messages) == len(self.problem.neighbours)
-        told = [(said.broken, said.cost) for said in messages.values() if isinstance(said, Improve)]
-        if complete and max(self.gain, *told) <= NO_GAIN:
+        others = [(message.broken, message.cost) for message in messages.values() if isinstance(message, Improve)]
+        if complete and max(self.gain, *others) <= NO_GAIN:
             self._raise_modifiers()
         self.choose(self.target if complete and self.wins(messages) else self.present)
         if not self.finished:
-            self.exchange_values(self._weigh)
+            self.exchange_values(self._send_improve)
 
-    def _burdens(self) -> list[LexicographicCost]:
-        """Return the effective cost of each own value."""
+    def _effective_costs(self) -> list[LexicographicCost]:
+        """Return the effective cost of each of this robot's values."""
         alone = [_pair(cost) for cost in self.problem.charges]
         rows = [alone, *(self._effective(one) for one in self._charged)]
         return [(sum(broken for broken, _ in row), sum(cost for _, cost in row)) for row in zip(*rows, strict=True)]
 
     def _effective(self, charged: Charged) -> Sequence[LexicographicCost]:
-        """Return the effective cost of each own value by one constraint."""
+        """Return the effective cost of each of this robot's values in one constraint."""
         raised = self.raised.get(charged.number)
         if raised is None:
             return [_pair(cost) for cost in charged.costs]
@@ -180,7 +180,7 @@ class GDBA(Gainers):
                 raised[key] = (broken + 1, paid) if cost == INFINITE else (broken, paid + 1)
 
     def _violated(self, number: int, cost: Cost) -> bool:
-        """Return whether a constraint that charges `cost` is violated (is-violated)."""
+        """Return whether a constraint whose cost is `cost` is violated (is-violated)."""
         if self.settings.violation == "NZ":
             return cost > 0
         if number not in self._ranges:
@@ -189,7 +189,7 @@ class GDBA(Gainers):
         return cost > least if self.settings.violation == "NM" else cost == most
 
     def _key(self, code: int, others: OtherValues) -> Key:
-        """Return the entries that are raised with the one of an own value's `code` and what the `others` say."""
+        """Return the key of all entries that are raised together with that of `code` and the others' values."""
         scope = self.settings.scope
         return code if scope in "EC" else None, others if scope in "ER" else None
 

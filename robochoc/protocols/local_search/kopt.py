@@ -1,13 +1,13 @@
 """k-optimal local search in rounds (KOPT).
 
 MGM for groups: in each cycle every robot, as the centre of a group, finds the best joint move of at most `k` connected
-robots, itself among them. Of moves that would touch each other only the one with the largest gain is made. So the cost
+robots, including itself. Of moves that would touch each other only the one with the largest gain is made. So the cost
 falls by the gain of each move, until no `k` connected robots can gain.
 
 - **When to use**: as MGM or MGM-2, for better answers: a bound on how good a k-optimum is grows with k. A robot
   enumerates the values of k robots, and learns the constraints of those around it.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
-  one cycle to the next (anytime). When no move is found any more, no k connected robots can do better by moving
+  one cycle to the next (anytime). When no more moves are found, no k connected robots can do better by moving
   together (k-optimum). A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `k` (default 3), `cycles` (default 100).
 - **References**: Katagishi, Pearce: "KOPT: Distributed DCOP algorithm for arbitrary k-optima with monotonically
@@ -15,26 +15,26 @@ falls by the gain of each move, until no `k` connected robots can gain.
   Yin, Kumar, Tambe: "Asynchronous algorithms for approximate distributed constraint optimization with quality bounds",
   AAMAS 2010.
 
-Everything spreads from robot to robot, a link further in each phase. With r = k // 2, all k connected robots are at
-most r links from one of them, their centre:
+All information spreads from robot to robot, one link further in each phase. With r = k // 2, all k connected robots are
+at most r links from one of them, their centre:
 
-    once: domains; then constraints      to robots r + 1 links away     `_tell_part`, `_survey`
-    values of those who have moved       r + 1 links                    `_tell_values`
-    the best move of each centre         2 r + 1 links                  `_offer`, `_choose`
-    moves that are made                  r links                        `_choose`, `_move`
+    once: domains; then constraints      to robots r + 1 links away     `_send_part`, `_find_groups`
+    values of robots that have moved     r + 1 links                    `_send_values`
+    the best move of each centre         2 r + 1 links                  `_offer`, `_select_move`
+    selected moves                       r links                        `_select_move`, `_move`
 
 That is 4 r + 2 messages to each neighbour in a cycle. With k = 1 it is MGM.
 
 Choices that the papers leave open, and differences:
 
-- A centre alone decides whether its group moves: it sees all moves that touch its own, those that move one of its
-  robots or a neighbour of them. Of equal gains the one of the first centre in the priority order wins. In KOPT the
-  robots of a group vote.
+- A centre alone decides whether its group moves: it knows all moves that touch its own, which move one of its robots or
+  their neighbours. Of equal gains the one of the first centre in the priority order wins. In KOPT the robots of a group
+  vote.
 - The first value is chosen at random. Of moves with equal gains a centre offers one with the fewest robots.
 - Constraints may be n-ary: all robots of a scope are one link apart.
 - A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
-- Constraints are sent as tables, each by the highest robot of its scope. A group whose values have more than 2^20
-  combinations, or a robot in more than 20,000 groups, ends the run before the search begins.
+- Constraints are sent as tables, each by the robot of highest priority in its scope. If the values of a group have more
+  than 2^20 combinations, or a robot is in more than 20,000 groups, the run ends before the search starts.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -72,11 +72,11 @@ from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 MOST = 8
-"""More robots at once than this are a search of their own."""
+"""The largest `k`: more robots at once are a search problem of their own."""
 
 
 class KOptSettings(CycleSettings, frozen=True):
-    """`k`: how many robots may move together. `cycles`: the number of cycles."""
+    """`k`: the most robots that may move together. `cycles`: the number of cycles."""
 
     k: int = 3
 
@@ -89,29 +89,29 @@ class KOptSettings(CycleSettings, frozen=True):
 Place = Annotated[int, msgspec.Meta(ge=0)]
 
 
-class Table(msgspec.Struct, frozen=True, array_like=True):
-    """The costs of a constraint for all places of the values of `scope`, the last robot's changing first.
+class CostList(msgspec.Struct, frozen=True, array_like=True):
+    """The costs of a constraint for all combinations of values of `scope`, the last robot's place changing first.
 
-    The robots are in priority order. `inf` stands for a violated hard constraint.
+    The robots are in priority order. `inf` is a violated hard constraint.
     """
 
     scope: list[str]
     costs: list[int | float]
 
 
-class Part(msgspec.Struct, frozen=True, array_like=True):
-    """A robot's part of the problem: what each of its values costs, and the constraints in which it is the highest."""
+class ProblemPart(msgspec.Struct, frozen=True, array_like=True):
+    """A robot's part of the problem: the cost of each of its values, and the constraints in which it is the highest."""
 
     charges: list[int | float]
-    tables: list[Table]
+    tables: list[CostList]
 
 
 class Region(wire.Message, frozen=True):
-    """The parts of robots that are new to the sender."""
+    """The parts of the problem that are new to the sender, by robot."""
 
-    parts: dict[str, Part]
+    parts: dict[str, ProblemPart]
 
-    act = Act(Performative.INFORM, "the receiver comes to know the constraints of robots around")
+    act = Act(Performative.INFORM, "the receiver learns the constraints of robots around")
 
     def in_words(self, _: Wording) -> str:
         if not self.parts:
@@ -120,15 +120,15 @@ class Region(wire.Message, frozen=True):
         return f"{counted(tables, 'constraint')} of {listed(self.parts)}, value by value"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what values cost by themselves, and in pairs of robots.
+        """Return the costs of single values and of pairs of robots' values.
 
-        Constraints of more robots are left out: others of the same robots may stand in other messages.
+        Constraints of more robots are left out, as other messages may contain others of the same robots.
         """
         return [proof for robot, part in self.parts.items() for proof in _part_proves(robot, part, hearing)]
 
 
 class Values(wire.Message, frozen=True):
-    """The places of the values of robots that have moved, as far as they are new to the sender."""
+    """The places of the values of robots that have moved, if they are new to the sender."""
 
     places: dict[str, Place]
 
@@ -149,25 +149,25 @@ class Offer(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Offers(wire.Message, frozen=True):
-    """The best moves that robots have found, by robot, as far as they are new to the sender."""
+    """The best moves that robots have found, by robot, if they are new to the sender."""
 
     offers: dict[str, Offer]
 
-    act = Act(Performative.PROPOSE, "what robots around would save by moving together")
+    act = Act(Performative.PROPOSE, "the savings of robots around by moving together")
     proves_nothing = True  # the moves are those of several robots
 
     def in_words(self, _: Wording) -> str:
         if not self.offers:
             return "I have heard of no move that saves anything"
-        said = [
+        moves = [
             f"{listed(offer.moves)} would save {saving_in_words(offer.broken, offer.cost)}"
             for offer in self.offers.values()
         ]
-        return f"{'; '.join(said)}"
+        return f"{'; '.join(moves)}"
 
 
 class MoveTogether(wire.Message, frozen=True):
-    """The moves that are made: the places of the robots' new values, as far as they are new to the sender."""
+    """The selected moves: the places of the robots' new values, if they are new to the sender."""
 
     moves: dict[str, Place]
 
@@ -178,8 +178,8 @@ class MoveTogether(wire.Message, frozen=True):
         return f"go: {listed(self.moves)}" if self.moves else "I have heard of no move that is made"
 
 
-def _part_proves(robot: str, part: Part, hearing: Hearing) -> Iterator[Proof]:
-    """Yield what a robot's part proves, as far as the receiver knows whose values its numbers stand for."""
+def _part_proves(robot: str, part: ProblemPart, hearing: Hearing) -> Iterator[Proof]:
+    """Yield the proofs of a robot's part, if the receiver knows the values of its places."""
     values = hearing.values(robot)
     if values is None:
         return
@@ -192,8 +192,8 @@ def _part_proves(robot: str, part: Part, hearing: Hearing) -> Iterator[Proof]:
             yield Pays(robot, value, {other: their}, charge + cost, charge + cost)
 
 
-def _pairs(robot: str, part: Part) -> dict[str, list[int | float]]:
-    """Return, for each other robot, the costs of all constraints over the two robots together."""
+def _pairs(robot: str, part: ProblemPart) -> dict[str, list[int | float]]:
+    """Return, for each other robot, the total costs of all constraints over exactly these two robots."""
     found: dict[str, list[int | float]] = {}
     for table in part.tables:
         if len(table.scope) == len((robot, "other")):
@@ -204,7 +204,7 @@ def _pairs(robot: str, part: Part) -> dict[str, list[int | float]]:
 
 
 MOST_COMBINATIONS = 1 << 20
-"""Of the values of a group. Groups with more would take gigabytes and minutes."""
+"""The most combinations of a group's values: more would need gigabytes and minutes."""
 
 
 MOST_GROUPS = 20_000
@@ -220,22 +220,22 @@ Group = tuple[str, ...]
 """In priority order."""
 
 
-class Burdens(NamedTuple):
-    """The costs of a constraint, with an axis for each robot of `scope`: broken hard constraints, and the cost else."""
+class ConstraintCosts(NamedTuple):
+    """The costs of a constraint, with an axis for each robot of `scope`: broken hard constraints, and other costs."""
 
     scope: Group
     broken: Counts
     cost: Counts
 
-    def seen_by(self, group: Group, sizes: Mapping[str, int], view: Mapping[str, int]) -> tuple[Counts, Counts]:
-        """Return the costs with an axis for each robot of `group`; all others have their values of `view`."""
+    def in_group(self, group: Group, sizes: Mapping[str, int], view: Mapping[str, int]) -> tuple[Counts, Counts]:
+        """Return the costs with an axis for each robot of `group`; all others keep their values of `view`."""
         index = tuple(slice(None) if name in group else view[name] for name in self.scope)
         shape = [sizes[name] if name in self.scope else 1 for name in group]
         return self.broken[index].reshape(shape), self.cost[index].reshape(shape)
 
 
-class Move(NamedTuple):
-    """A joint move: its gain, and the places of the new values of those who move."""
+class GroupMove(NamedTuple):
+    """A joint move: its gain, and the places of the new values of the moving robots."""
 
     gain: LexicographicCost
     moves: dict[str, int]
@@ -244,37 +244,39 @@ class Move(NamedTuple):
 class Neighbourhood:
     """The problem of the robots around a centre, and the groups that the centre may lead.
 
-    `groups` are the largest connected ones of at most `k` robots, itself among them, that are at most `radius` links
+    `groups` are the largest connected ones of at most `k` robots that include the centre and are at most `radius` links
     away. Smaller ones are contained in them, as robots of a group may keep their values.
     """
 
-    def __init__(self, centre: str, parts: Mapping[str, Part], rank: Mapping[str, int], k: int, radius: int) -> None:
+    def __init__(
+        self, centre: str, parts: Mapping[str, ProblemPart], rank: Mapping[str, int], k: int, radius: int
+    ) -> None:
         self._centre = centre
         self._rank = rank
         self.sizes = {name: len(part.charges) for name, part in parts.items()}
-        self._on: dict[str, list[Burdens]] = {name: [] for name in parts}
+        self._on: dict[str, list[ConstraintCosts]] = {name: [] for name in parts}
         for name, part in parts.items():
-            self._add(_burdens((name,), part.charges, self.sizes))
+            self._add(_constraint_costs((name,), part.charges, self.sizes))
             for table in part.tables:
                 self._add(self._checked(name, table))
         self._within = self._reached(radius)
         self.groups = self._connected(k)
 
-    def _checked(self, owner: str, table: Table) -> Burdens | None:
+    def _checked(self, owner: str, table: CostList) -> ConstraintCosts | None:
         """Return the costs of a constraint; None if it reaches further than this region."""
         scope = tuple(table.scope)
         if scope[:1] != (owner,) or len(set(scope)) < len(scope):
-            raise ValueError(f"{owner} tells of a constraint that is not its own")
-        return _burdens(scope, table.costs, self.sizes) if all(name in self.sizes for name in scope) else None
+            raise ValueError(f"{owner} sent a constraint of {', '.join(scope)}; its scope must begin with {owner}")
+        return _constraint_costs(scope, table.costs, self.sizes) if all(name in self.sizes for name in scope) else None
 
-    def _add(self, burdens: Burdens | None) -> None:
-        if burdens is not None:
-            for name in burdens.scope:
-                self._on[name].append(burdens)
+    def _add(self, costs: ConstraintCosts | None) -> None:
+        if costs is not None:
+            for name in costs.scope:
+                self._on[name].append(costs)
 
     def touched(self, group: Iterable[str]) -> dict[str, None]:
         """Return the robots of a group and all that share a constraint with them, in a fixed order."""
-        return {name: None for member in group for burdens in self._on[member] for name in burdens.scope}
+        return {name: None for member in group for costs in self._on[member] for name in costs.scope}
 
     def _reached(self, radius: int) -> dict[str, None]:
         """Return the robots at most `radius` links away, the centre first."""
@@ -307,31 +309,31 @@ class Neighbourhood:
             )
         return group
 
-    def best(self, view: Mapping[str, int]) -> Move:
-        """Return the move of a group that gains most; of several that of the fewest robots, then the first one."""
+    def best(self, view: Mapping[str, int]) -> GroupMove:
+        """Return the group's move with the largest gain; of several, that of the fewest robots, then the first one."""
         moves = (self.best_of(group, view) for group in self.groups)
         return max(moves, key=lambda move: (move.gain, -len(move.moves)))
 
-    def best_of(self, group: Group, view: Mapping[str, int]) -> Move:
-        """Return the best move of one group, where all others keep their values."""
+    def best_of(self, group: Group, view: Mapping[str, int]) -> GroupMove:
+        """Return the best move of one group, if all other robots keep their values."""
         shape = [self.sizes[name] for name in group]
         broken, cost = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
-        for burdens in {id(one): one for member in group for one in self._on[member]}.values():
-            more_broken, more_cost = burdens.seen_by(group, self.sizes, view)
+        for constraint in {id(one): one for member in group for one in self._on[member]}.values():
+            more_broken, more_cost = constraint.in_group(group, self.sizes, view)
             broken += more_broken
             cost += more_cost
         now = tuple(view[name] for name in group)
         ranked = np.where(broken == broken.min(), cost, _LARGEST)
-        best = np.unravel_index(int(np.where(ranked == ranked.min(), _moving(shape, now), _LARGEST).argmin()), shape)
+        best = np.unravel_index(int(np.where(ranked == ranked.min(), _movers(shape, now), _LARGEST).argmin()), shape)
         before, after = ((int(broken[place]), int(cost[place])) for place in (now, best))
         if after >= before:
-            return Move((0, 0), {})
+            return GroupMove((0, 0), {})
         changed = {name: int(new) for name, old, new in zip(group, now, best, strict=True) if new != old}
-        return Move(gain(before, after), changed)
+        return GroupMove(gain(before, after), changed)
 
 
-def _moving(shape: Sequence[int], now: Sequence[int]) -> Counts:
-    """Return how many robots move, for each combination of values."""
+def _movers(shape: Sequence[int], now: Sequence[int]) -> Counts:
+    """Return the number of robots that move, for each combination of values."""
     moving = np.zeros(shape, np.int64)
     for axis, (size, place) in enumerate(zip(shape, now, strict=True)):
         others = [1] * len(shape)
@@ -340,13 +342,14 @@ def _moving(shape: Sequence[int], now: Sequence[int]) -> Counts:
     return moving
 
 
-def _burdens(scope: Group, costs: Sequence[float], sizes: Mapping[str, int]) -> Burdens:
-    """Return costs that were told as a list; raise `ValueError` if they cannot be those of `scope`."""
+def _constraint_costs(scope: Group, costs: Sequence[float], sizes: Mapping[str, int]) -> ConstraintCosts:
+    """Return the received costs with their axes; raise `ValueError` if they cannot be those of `scope`."""
     shape = [sizes[name] for name in scope]
     if len(costs) != math.prod(shape) or not all(cost >= 0 for cost in costs):
-        raise ValueError(f"costs of {', '.join(scope)} that cannot be")
+        wanted = f"{math.prod(shape):,} costs, each 0 or more"
+        raise ValueError(f"invalid costs of {', '.join(scope)}: there must be {wanted}")
     broken = np.array([cost == math.inf for cost in costs], np.int64).reshape(shape)
-    return Burdens(
+    return ConstraintCosts(
         scope, broken, np.array([0 if cost == math.inf else cost for cost in costs], np.int64).reshape(shape)
     )
 
@@ -382,36 +385,36 @@ class KOpt(CycleProtocol):
         return self.settings.k // 2
 
     def start_cycles(self) -> None:
-        """Take a random value, and send the domain."""
+        """Choose a random value, and send the domain."""
         self.choose(self.any_value())
         self.multicast(self.problem.neighbours, Domain(list(self.problem.values)))
-        self.listen(self.problem.neighbours, self._tell_part)
+        self.listen(self.problem.neighbours, self._send_part)
 
     def _spread(
         self,
-        what: Callable[[dict[str, T]], wire.Message],
+        message_type: Callable[[dict[str, T]], wire.Message],
         items: Mapping[str, T],
         links: int,
         then: Callable[[dict[str, T]], None],
     ) -> None:
-        """Tell `items` to all robots at most `links` away, then call `then` with those of all these robots."""
+        """Send `items` to all robots at most `links` away, then call `then` with the items of all these robots."""
         known = dict(items)
 
         def send_new(new: Mapping[str, T], left: int) -> None:
             if left == 0:
                 then(known)
                 return
-            self.multicast(self.problem.neighbours, what(dict(new)))
+            self.multicast(self.problem.neighbours, message_type(dict(new)))
             self.listen(self.problem.neighbours, lambda messages: receive_new(messages, left - 1))
 
         def receive_new(messages: Mapping[str, wire.Message], left: int) -> None:
             new: dict[str, T] = {}
             for name, message in messages.items():
-                if type(message) is not what:
+                if type(message) is not message_type:
                     raise ValueError(f"{name} sent an unexpected message in this phase")
-                told: Mapping[str, T]
-                (told,) = msgspec.structs.astuple(message)
-                new |= {key: item for key, item in told.items() if key not in known}
+                received: Mapping[str, T]
+                (received,) = msgspec.structs.astuple(message)
+                new |= {key: item for key, item in received.items() if key not in known}
             known.update(new)
             send_new(new, left)
 
@@ -419,52 +422,53 @@ class KOpt(CycleProtocol):
 
     # Once, before the search
 
-    def _tell_part(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the own part of the problem, with all neighbours' domains known."""
+    def _send_part(self, messages: Mapping[str, wire.Message]) -> None:
+        """Send this robot's part of the problem, once all neighbours' domains are known."""
         own = self.order.rank[self.problem.agent]
         domains = self.checked_domains(messages)
         lower = {name: values for name, values in domains.items() if self.order.rank[name] > own}
         tables = []
         for table in self.problem.tables(lower):
             costs: list[float] = table.charges.reshape(-1, len(self.problem.values)).T.ravel().tolist()
-            tables.append(Table([self.problem.agent, *table.agents], [self._exact(cost) for cost in costs]))
-        part = Part(list(self.problem.charges), tables)
-        self._spread(Region, {self.problem.agent: part}, self.radius + 1, self._survey)
+            tables.append(CostList([self.problem.agent, *table.agents], [self._exact(cost) for cost in costs]))
+        part = ProblemPart(list(self.problem.charges), tables)
+        self._spread(Region, {self.problem.agent: part}, self.radius + 1, self._find_groups)
 
     def _exact(self, cost: float) -> int | float:
-        """Return a cost as an integer, where it is finite."""
+        """Return a cost as an integer, if it is finite."""
         if cost == float("inf"):
             return cost
         check_exact(int(cost))
         return int(cost)
 
-    def _survey(self, parts: dict[str, Part]) -> None:
-        """Find the groups, with the parts of all robots around known."""
+    def _find_groups(self, parts: dict[str, ProblemPart]) -> None:
+        """Find the groups, once the parts of all robots around are known."""
         settings = self.settings
         self.region = Neighbourhood(self.problem.agent, parts, self.order.rank, settings.k, self.radius)
-        self._tell_values({self.problem.agent: self.present})
+        self._send_values({self.problem.agent: self.present})
 
     # A cycle
 
-    def _tell_values(self, moved: Mapping[str, int]) -> None:
+    def _send_values(self, moved: Mapping[str, int]) -> None:
         self._spread(Values, moved, self.radius + 1, self._offer)
 
     def _offer(self, moved: dict[str, int]) -> None:
-        """Send the best move of a group around this robot, with all values around known."""
+        """Send the best move of a group around this robot, once all values around are known."""
         region = self._known_region
         for name, place in moved.items():
             if place >= region.sizes.get(name, 0):
                 raise ValueError(f"{name} has no value number {place + 1}")
         self.places |= moved
         if self.places.keys() != region.sizes.keys():
-            raise ValueError(f"{self.problem.agent} has not been told all values around")
+            missing = ", ".join(name for name in region.sizes if name not in self.places)
+            raise ValueError(f"{self.problem.agent} has not received the values of {missing}")
         move = region.best(self.places)
         self.offer = Offer(*move.gain, move.moves) if move.gain > NO_GAIN else None
         offers = {self.problem.agent: self.offer} if self.offer else {}
-        self._spread(Offers, offers, 2 * self.radius + 1, self._choose)
+        self._spread(Offers, offers, 2 * self.radius + 1, self._select_move)
 
-    def _choose(self, offers: dict[str, Offer]) -> None:
-        """Let the own group move if no other move that touches it gains more."""
+    def _select_move(self, offers: dict[str, Offer]) -> None:
+        """Let this robot's group move if no other move that touches it gains more."""
         moves = self.offer.moves if self.offer and self._wins(self.offer, offers) else {}
         self._spread(MoveTogether, moves, self.radius, self._move)
 
@@ -477,16 +481,16 @@ class KOpt(CycleProtocol):
         return (offer.broken, offer.cost), -self.order.rank[centre]
 
     def _move(self, moves: dict[str, int]) -> None:
-        """Take the new value, if there is one, and begin the next cycle."""
+        """Change to the new value, if there is one, and start the next cycle."""
         place = moves.get(self.problem.agent, self.present)
         if place >= len(self.problem.values):
             raise ValueError(f"{self.problem.agent} has no value number {place + 1}")
         moved = {self.problem.agent: place} if place != self.value else {}
         self.choose(place)
         if not self.finished:
-            self._tell_values(moved)
+            self._send_values(moved)
 
     @property
     def _known_region(self) -> Neighbourhood:
-        assert self.region is not None  # noqa: S101 - for mypy: `_survey` has made it
+        assert self.region is not None  # noqa: S101 - for mypy: `_find_groups` has made it
         return self.region

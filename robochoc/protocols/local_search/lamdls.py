@@ -1,23 +1,23 @@
 """Latency-aware Monotonic Distributed Local Search (LAMDLS).
 
 Local search in which neighbours never move at the same time. First the robots colour themselves: neighbours have
-different colours. Then in each cycle a robot waits until its neighbours of smaller colours have moved, and takes its
-best value against what all neighbours have now. Robots of one colour move at the same time, and nobody waits for more
-than its neighbours.
+different colours. Then in each cycle a robot waits until its neighbours of smaller colours have moved, and chooses its
+best value against the present values of all neighbours. Robots of the same colour move at the same time, and no robot
+waits for others than its neighbours.
 
-- **When to use**: as MGM: the cost never rises. A cycle takes half of MGM's messages, and every robot may move in it.
+- **When to use**: as MGM: the cost never rises. A cycle needs half of MGM's messages, and every robot may move in it.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
-  one cycle to the next (anytime), and it ends in a local optimum if there are cycles enough. The course of the search
-  does not depend on how long messages take. A robot with an empty domain proves that there is no solution.
+  one cycle to the next (anytime), and it ends in a local optimum after enough cycles. The course of the search
+  does not depend on message delays. A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `cycles` (default 100).
 - **Reference**: Rachmut, Zivan, Yeoh: "Communication-aware local search for distributed constraint optimization",
   IJCAI 2022.
 
 Its two phases:
 
-    the robots colour themselves       `_colour`, `_meet`
-    a step, once all neighbours of     `_wait_for_earlier`, `_move`, `_wait_for_later`
-      smaller colours have made it
+    the robots colour themselves          `_choose_colour`, `_start_first_step`
+    a step, after the same step of all    `_wait_for_earlier`, `_move`, `_wait_for_later`
+      neighbours of smaller colours
 
 Choices that the paper leaves open, and differences:
 
@@ -27,11 +27,11 @@ Choices that the paper leaves open, and differences:
 - Values need no step number: from each neighbour they arrive in the order of its steps.
 - Constraints may be n-ary, as all robots of a scope are neighbours.
 - Fewer violated hard constraints are always better, so plain DisCSPs work, too.
-- Where messages are lost, the last value known of a neighbour stands for the one that is missing. One whose colour is
-  lost goes before or after by its priority. Then neighbours may move at the same time, and the cost may rise.
+- For a lost value, the neighbour's last known value is used. A neighbour whose colour is lost moves before or after
+  this robot by its priority. Then neighbours may move at the same time, and the cost may rise.
 
-Why the cost never rises: when a robot moves, it knows the values that its neighbours have now, and none of them can
-move before it has told its own. So each move saves the team what it saves the robot.
+The cost never rises, because a robot that moves knows its neighbours' present values, and none of them can move before
+it has sent its value. So the team saves as much by each move as the robot does.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -65,7 +65,7 @@ class Colour(wire.Message, frozen=True):
     value: wire.Value
     colour: Annotated[int, msgspec.Meta(ge=0)]
 
-    act = Act(Performative.INFORM, "the receiver comes to know when the sender will move")
+    act = Act(Performative.INFORM, "the receiver learns when the sender will move")
 
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} at first, and my colour is number {self.colour + 1}"
@@ -77,8 +77,8 @@ class Colour(wire.Message, frozen=True):
 class LAMDLS(CycleProtocol):
     """One agent of LAMDLS.
 
-    State: the own `colour`, the neighbours of smaller colours (`earlier`) and of larger ones (`later`), and the `view`:
-    the values that the neighbours have.
+    State: this robot's `colour`, the neighbours of smaller colours (`earlier`) and of larger ones (`later`), and the
+    `view`: the neighbours' present values.
     """
 
     messages = Colour | Value | AnytimeMessage
@@ -99,27 +99,27 @@ class LAMDLS(CycleProtocol):
         own = order.rank[problem.agent]
         self.colour: int | None = None
         self.earlier = tuple(name for name in problem.neighbours if order.rank[name] < own)
-        """At first those of higher and lower priority: that is the order of colouring."""
+        """At first the neighbours of higher and lower priority: the order of colouring."""
         self.later = tuple(name for name in problem.neighbours if order.rank[name] > own)
         self.view: dict[str, wire.Value] = {}
         self._colours: dict[str, int] = {}
 
     def start_cycles(self) -> None:
-        """Take a random value, and wait for the colours of all neighbours of higher priority."""
+        """Choose a random value, and wait for the colours of all neighbours of higher priority."""
         self.choose(self.any_value())
-        self.listen(self.earlier, self._colour)
+        self.listen(self.earlier, self._choose_colour)
 
-    def _colour(self, messages: Mapping[str, wire.Message]) -> None:
-        """Choose the smallest colour that is free, and tell it."""
-        self._note(messages)
+    def _choose_colour(self, messages: Mapping[str, wire.Message]) -> None:
+        """Choose the smallest free colour, and send it."""
+        self._store_colours(messages)
         taken = {*self._colours.values()}
         self.colour = next(colour for colour in range(len(taken) + 1) if colour not in taken)
         self.multicast(self.problem.neighbours, Colour(self.problem.values[self.present], self.colour))
-        self.listen(self.later, self._meet)
+        self.listen(self.later, self._start_first_step)
 
-    def _meet(self, messages: Mapping[str, wire.Message]) -> None:
-        """Begin with the first step, with all neighbours' colours known."""
-        self._note(messages)
+    def _start_first_step(self, messages: Mapping[str, wire.Message]) -> None:
+        """Start the first step, once all neighbours' colours are known."""
+        self._store_colours(messages)
         neighbours = self.problem.neighbours
         higher = {*self.earlier}
         before = {name: self._is_before(name, higher=name in higher) for name in neighbours}
@@ -128,23 +128,23 @@ class LAMDLS(CycleProtocol):
         self._wait_for_earlier()
 
     def _is_before(self, name: str, *, higher: bool) -> bool:
-        """Return whether a neighbour moves first: by its colour; where that is lost, or the same, by its priority."""
+        """Return whether a neighbour moves first: by its colour; if that is lost or the same, by its priority."""
         colour, own = self._colours.get(name), self.colour
         return higher if colour is None or own is None or colour == own else colour < own
 
     def receive_late(self, sender: str, message: wire.Message) -> None:
-        """Note the value in a message whose phase is over."""
+        """Store the value in a message whose phase is over."""
         super().receive_late(sender, message)
         if isinstance(message, Colour):
             self.check_value(sender, message.value)
         if isinstance(message, Colour | Value):
             self.view[sender] = message.value
 
-    def _note(self, messages: Mapping[str, wire.Message]) -> None:
+    def _store_colours(self, messages: Mapping[str, wire.Message]) -> None:
         """Store first values and colours."""
         for name, message in messages.items():
             if not isinstance(message, Colour):
-                raise ValueError(f"{name} tells no colour, and that comes first")  # noqa: TRY004 - as any bad message
+                raise ValueError(f"{name} sent no colour, which must come first")  # noqa: TRY004 - as any bad message
             self.check_value(name, message.value)
             self.view[name] = message.value
             self._colours[name] = message.colour
@@ -153,19 +153,19 @@ class LAMDLS(CycleProtocol):
         self.listen(self.earlier, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Take the best value against the neighbours' values, and tell it."""
+        """Choose the best value against the neighbours' values, and send it."""
         self.view |= self.checked_values(messages)
-        burdens = self.problem.lexicographic_costs(self.view)
-        least = min(burdens)
+        costs = self.problem.lexicographic_costs(self.view)
+        least = min(costs)
         index = self.present
-        if burdens[index] > least:
-            index = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
+        if costs[index] > least:
+            index = self.any_of([place for place, cost in enumerate(costs) if cost == least])
         self.choose(index)
         self.multicast(self.problem.neighbours, Value(self.problem.values[index]))
         if not self.finished:
             self.listen(self.later, self._wait_for_later)
 
     def _wait_for_later(self, messages: Mapping[str, wire.Message]) -> None:
-        """Go on with the next step, once all neighbours of larger colours have made the last one."""
+        """Start the next step, once all neighbours of larger colours have made the last one."""
         self.view |= self.checked_values(messages)
         self._wait_for_earlier()

@@ -13,9 +13,9 @@ saves the robot.
 
 The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
 
-    SendValueMessage, GetValueMessages   `exchange_values`, `_weigh`
-    BestUnilateralGain                   `_weigh`
-    SendGainMessage, GetGainMessages     `_weigh`, `_move`
+    SendValueMessage, GetValueMessages   `exchange_values`, `_send_gain`
+    BestUnilateralGain                   `best_unilateral`
+    SendGainMessage, GetGainMessages     `_send_gain`, `_move`
     if gain > max(neighbours' gains)     `_move`
 
 Choices that the paper leaves open:
@@ -24,7 +24,7 @@ Choices that the paper leaves open:
 - If neighbours have the same gain, the first one in the priority order moves.
 - Constraints may be n-ary, as all robots of a scope are neighbours.
 - A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
-- Where a value is lost, the last one known stands for it; a robot that misses a gain stays. Then the cost may rise.
+- For a lost value, the neighbour's last known value is used; a robot that misses a gain stays. Then the cost may rise.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -61,9 +61,9 @@ class Gain(wire.Message, frozen=True):
     broken: int
     cost: int | float
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
-    # A gain may be that of two robots that move together (MGM-2), weighted (GDBA), or contain costs that were handed
-    # over (MCS-MGM). So it does not bound the sender's cost.
+    act = Act(Performative.INFORM, "the receiver learns what the sender's move would save")
+    # A gain may be that of two robots that move together (MGM-2), weighted (GDBA), or contain transferred costs
+    # (MCS-MGM). So it does not bound the sender's cost.
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -83,23 +83,23 @@ class Gainers(CycleProtocol):
 
     def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
         """Find the best move of this robot alone, which may be to stay (BestUnilateralGain)."""
-        self.best_of(self.problem.lexicographic_costs(view))
+        self.find_best_move(self.problem.lexicographic_costs(view))
 
-    def best_of(self, burdens: Sequence[LexicographicCost]) -> None:
-        """Find the best move where the own values cost `burdens`."""
-        least = min(burdens)
-        self.gain = gain(burdens[self.present], least)
+    def find_best_move(self, costs: Sequence[LexicographicCost]) -> None:
+        """Find the best move, given the cost of each of this robot's values."""
+        least = min(costs)
+        self.gain = gain(costs[self.present], least)
         self.target = self.present
         if self.gain > NO_GAIN:
-            self.target = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
+            self.target = self.any_of([place for place, cost in enumerate(costs) if cost == least])
 
     def wins(self, gains: Mapping[str, wire.Message]) -> bool:
-        """Return whether the own gain is positive and the largest; ties go to the first robot in the order."""
+        """Return whether this robot's gain is positive and the largest; ties go to the first robot in the order."""
         rank = self.order.rank
         return self.gain > NO_GAIN and all(
-            (self.gain, rank[name]) > ((told.broken, told.cost), rank[self.problem.agent])
-            for name, told in gains.items()
-            if isinstance(told, Gain)
+            (self.gain, rank[name]) > ((message.broken, message.cost), rank[self.problem.agent])
+            for name, message in gains.items()
+            if isinstance(message, Gain)
         )
 
 
@@ -121,19 +121,19 @@ class MGM(Gainers):
     )
 
     def start_cycles(self) -> None:
-        """Take a random value."""
+        """Choose a random value."""
         self.choose(self.any_value())
-        self.exchange_values(self._weigh)
+        self.exchange_values(self._send_gain)
 
-    def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the gain of the best own move, with all neighbours' values known."""
+    def _send_gain(self, messages: Mapping[str, wire.Message]) -> None:
+        """Send the gain of this robot's best move, once all neighbours' values are known."""
         self.best_unilateral(self.checked_values(messages))
         self.multicast(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if the own gain is the largest, with all neighbours' gains known; stay where one is lost."""
+        """Move if this robot's gain is the largest of all neighbours' gains; stay if one of them is lost."""
         moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
         self.choose(self.target if moves else self.present)
         if not self.finished:
-            self.exchange_values(self._weigh)
+            self.exchange_values(self._send_gain)

@@ -2,7 +2,7 @@
 
 MGM in which two neighbours may also move together. In each cycle a robot is an offerer with probability `threshold`
 (the paper's q). An offerer sends one random neighbour an offer: its gain for each pair of their values. The receiver
-adds its gain on constraints that the offerer has no part in, so shared constraints count once. It accepts the best
+adds its gain on constraints that do not include the offerer, so shared constraints count once. It accepts the best
 offer if its total gain is positive; then both robots are committed to the joint move. As in MGM, the robot with the
 largest gain among its neighbours moves. A committed pair moves if both have the largest gain, each among its neighbours
 without the partner.
@@ -18,21 +18,22 @@ The phases of a cycle:
 
     value messages                              `exchange_values`, `_offer`
     offers (offerers), to one neighbour each    `_offer`, `_answer`
-    accept, reject                              `_answer`, `_hear_answer`
-    gain messages                               `_tell_gain`, `_decide`
-    go, no go (of two that are committed)       `_decide`, `_go`
+    accept, reject                              `_answer`, `_receive_answer`
+    gain messages                               `_send_gain`, `_decide`
+    go, no go (of committed robots)             `_decide`, `_go`
 
 Choices that the paper leaves open, and differences:
 
 - An offer contains all pairs of values, also those with which the offerer alone does not gain. Without them, as in the
   paper, some moves that save the team costs are missed. With them, a team in which no robot or pair can gain is at a
   2-optimum.
-- A robot that is no offerer, or has no offer for a neighbour, says so, as its neighbours wait for all offers.
+- A robot that is not an offerer, or has no offer for a neighbour, sends an empty offer, as its neighbours wait for all
+  offers.
 - First values, equally good values and equal gains are treated as in `mgm`. Constraints may be n-ary.
-- Where messages are lost, the last value known stands for the one that is missing. A neighbour whose domain or value is
-  not known is offered nothing; an answer that does not come is a rejection; a robot that misses a gain, or its
-  partner's `Go`, stays. If only one of a pair moves, the cost may rise. What tells the phases apart is then the kinds
-  of messages, as answers and `Go` are sent to some neighbours only.
+- For a lost value, the neighbour's last known value is used. A neighbour whose domain or value is unknown receives no
+  offer; a lost answer counts as a rejection; a robot that misses a gain, or its partner's `Go`, stays. If only one of a
+  pair moves, the cost may rise. Then the types of messages tell the phases apart, as answers and `Go` are sent to some
+  neighbours only.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -83,7 +84,7 @@ class Offer(wire.Message, frozen=True):
 
     gains: Gains | None
 
-    act = Act(Performative.PROPOSE, "what both would gain by moving together")
+    act = Act(Performative.PROPOSE, "the gains of both robots' joint moves")
 
     def in_words(self, _: Wording) -> str:
         if self.gains is None:
@@ -95,13 +96,10 @@ class Offer(wire.Message, frozen=True):
         return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: what pairs of values cost more than the cheapest pair.
-
-        It does where no other robot's value is in it.
-        """
+        """Return the costs of pairs of values above the cheapest pair, if no other robot's value is in them."""
         own = hearing.last(Domain, hearing.receiver, hearing.sender)
-        told = hearing.last(Domain, hearing.sender, hearing.receiver)
-        if own is None or told is None or not self.gains or not hearing.is_only_neighbour():
+        theirs = hearing.last(Domain, hearing.sender, hearing.receiver)
+        if own is None or theirs is None or not self.gains or not hearing.is_only_neighbour():
             return NOTHING
         most_broken = max(broken for row in self.gains for broken, _ in row)
         most = max(cost for row in self.gains for _, cost in row)
@@ -109,12 +107,12 @@ class Offer(wire.Message, frozen=True):
             Pays(
                 hearing.sender,
                 value,
-                {hearing.receiver: theirs},
+                {hearing.receiver: received},
                 INFINITE if broken < most_broken else most - cost,
                 INFINITE,
             )
-            for theirs, row in zip(own.values, self.gains, strict=True)
-            for value, (broken, cost) in zip(told.values, row, strict=True)
+            for received, row in zip(own.values, self.gains, strict=True)
+            for value, (broken, cost) in zip(theirs.values, row, strict=True)
         ]
 
 
@@ -136,7 +134,7 @@ class Accept(wire.Message, frozen=True):
 class Reject(wire.Message, frozen=True):
     """The rejection of an offer (`reject`)."""
 
-    act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
+    act = Act(Performative.REJECT_PROPOSAL, "the proposed offer is rejected")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -144,14 +142,14 @@ class Reject(wire.Message, frozen=True):
 
 
 class Go(wire.Message, frozen=True):
-    """A committed robot's word on the joint move: whether its gain is the largest among its neighbours.
+    """A committed robot's decision on the joint move: whether its gain is the largest among its neighbours.
 
     The paper's messages are `go` and `no go`.
     """
 
     go: bool
 
-    act = Act(Performative.INFORM, "the receiver comes to know whether the sender gains most")
+    act = Act(Performative.INFORM, "the receiver learns whether the sender's gain is the largest")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -161,15 +159,15 @@ class Go(wire.Message, frozen=True):
 
 
 _DOMAINS, _VALUES, _OFFERS, _ANSWERS, _GAINS, _GO = range(-1, 5)
-"""The phases: once, and those of each cycle."""
+"""The phases: the first one once, the others in each cycle."""
 _PHASES = 5
 """The phases of a cycle."""
 _MOST_AHEAD = 2
-"""A neighbour is at most so many phases ahead, as it waits for this robot in three of five."""
+"""The most phases that a neighbour can be ahead, as it waits for this robot in three of five."""
 
 
 def _phase_of(message: wire.Message) -> int:
-    """Return the phase that a message belongs to; of what is about the best cycle, that of values."""
+    """Return the phase of a message; for messages about the best cycle, the phase of values."""
     match message:
         case Domain():
             return _DOMAINS
@@ -221,22 +219,22 @@ class MGM2(Gainers):
         self._phase = _DOMAINS
 
     def start_cycles(self) -> None:
-        """Take a random value and send the domain."""
+        """Choose a random value and send the domain."""
         self.choose(self.any_value())
         self.multicast(self.problem.neighbours, Domain(list(self.problem.values)))
-        self.listen_for(_DOMAINS, self.problem.neighbours, self._meet)
+        self.listen_for(_DOMAINS, self.problem.neighbours, self._start_first_cycle)
 
-    def _meet(self, messages: Mapping[str, wire.Message]) -> None:
-        """Begin the first cycle, with all neighbours' domains known."""
+    def _start_first_cycle(self, messages: Mapping[str, wire.Message]) -> None:
+        """Start the first cycle, once all neighbours' domains are known."""
         self.domains = self.checked_domains(messages)
-        self._tell_own_value()
+        self._send_value()
 
-    def _tell_own_value(self) -> None:
+    def _send_value(self) -> None:
         self.multicast(self.problem.neighbours, Value(self.problem.values[self.present]))
         self.listen_for(_VALUES, self.problem.neighbours, self._offer)
 
     def _offer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Become an offerer or not, with all neighbours' values known."""
+        """Become an offerer or not, once all neighbours' values are known."""
         self.view = self.checked_values(messages)
         self.partner = None
         if self.chance() < self.settings.threshold:
@@ -249,21 +247,21 @@ class MGM2(Gainers):
         self.listen_for(_OFFERS, self.problem.neighbours, self._answer)
 
     def _gains(self, partner: str) -> Gains:
-        """Return the gain for each of the partner's values and each own value."""
+        """Return the gain for each of the partner's values and each of this robot's values."""
         rows = [self.problem.lexicographic_costs({**self.view, partner: value}) for value in self.domains[partner]]
         now = rows[self.domains[partner].index(self.view[partner])][self.present]
-        return [[gain(now, burden) for burden in row] for row in rows]
+        return [[gain(now, cost) for cost in row] for row in rows]
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
         """Answer all offers: an offerer rejects them; other robots accept the best if it gains anything."""
-        offers = {name: told.gains for name, told in messages.items() if isinstance(told, Offer) and told.gains}
+        offers = {name: offer.gains for name, offer in messages.items() if isinstance(offer, Offer) and offer.gains}
         if self.partner is not None:
             self.multicast(offers, Reject())
-            self.listen_for(_ANSWERS, (self.partner,), self._hear_answer)
+            self.listen_for(_ANSWERS, (self.partner,), self._receive_answer)
         else:
             self.partner = self._commit(offers)
             self.multicast([name for name in offers if name != self.partner], Reject())
-            self._tell_gain()
+            self._send_gain()
 
     def _commit(self, offers: Mapping[str, Gains]) -> str | None:
         """Accept the best offer if its total gain is positive; return its sender."""
@@ -279,36 +277,34 @@ class MGM2(Gainers):
     def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
         """Yield all offered moves with the total gain of both robots.
 
-        To the offerer's gain it adds the gain on constraints that the offerer has no part in.
+        They are the offerer's gain plus this robot's gain on constraints that do not include the offerer.
         """
-        burdens = self.problem.lexicographic_costs(
-            {name: value for name, value in self.view.items() if name != offerer}
-        )
-        now = burdens[self.present]
-        for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
-            broken, cost = gain(now, burden)
+        costs = self.problem.lexicographic_costs({name: value for name, value in self.view.items() if name != offerer})
+        now = costs[self.present]
+        for own, (own_cost, row) in enumerate(zip(costs, gains, strict=True)):
+            broken, cost = gain(now, own_cost)
             for place, offered in enumerate(row):
                 yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
 
-    def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Commit to the partner if it accepted the offer; otherwise use the best own move."""
+    def _receive_answer(self, messages: Mapping[str, wire.Message]) -> None:
+        """Commit to the partner if it accepted the offer; otherwise use this robot's best move alone."""
         answer = next(iter(messages.values()), None)
         if isinstance(answer, Accept):
             self.target, self.gain = answer.place, (answer.broken, answer.cost)
         else:
             self.partner = None
-        self._tell_gain()
+        self._send_gain()
 
-    def _tell_gain(self) -> None:
+    def _send_gain(self) -> None:
         if self.partner is None:
             self.best_unilateral(self.view)
         self.multicast(self.problem.neighbours, Gain(*self.gain))
         self.listen_for(_GAINS, self.problem.neighbours, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move alone, or send the partner `Go`, with all neighbours' gains known."""
+        """Move alone, or send the partner `Go`, once all neighbours' gains are known."""
         complete = len(messages) == len(self.problem.neighbours)
-        wins = complete and self.wins({name: told for name, told in messages.items() if name != self.partner})
+        wins = complete and self.wins({name: message for name, message in messages.items() if name != self.partner})
         if self.partner is None:
             self._end_cycle(move=wins)
         else:
@@ -318,15 +314,15 @@ class MGM2(Gainers):
 
     def _go(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the joint move if both robots allow it."""
-        told = next(iter(messages.values()), None)
-        self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
+        answer = next(iter(messages.values()), None)
+        self._end_cycle(move=self._wins and isinstance(answer, Go) and answer.go)
 
     def _end_cycle(self, *, move: bool) -> None:
         self.choose(self.target if move else self.present)
         if not self.finished:
-            self._tell_own_value()
+            self._send_value()
 
-    # Phases, where messages are lost
+    # Phases when messages are lost
 
     def listen_for(self, phase: int, names: Sequence[str], then: Then) -> None:
         """Listen to the robots in `names` for messages of a phase."""
@@ -334,14 +330,14 @@ class MGM2(Gainers):
         self.listen(names, then)
 
     def may_be_late(self, message: wire.Message) -> bool:
-        """Return whether a message belongs to a phase that is over."""
+        """Return whether the message's phase is over."""
         phase = _phase_of(message)
         if phase == _DOMAINS:
             return self._phase != _DOMAINS
         return self._phase != _DOMAINS and (phase - self._phase) % _PHASES > _MOST_AHEAD
 
     def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
-        """Take the next messages that are of this phase; what belongs to a later one stays, for its phase."""
+        """Remove and return the next messages of this phase; messages of later phases remain for them."""
         waiting = [self._waiting[name] for name in self._names]
         for name, queue in zip(self._names, waiting, strict=True):
             while queue and (first := queue[0]) is not None and self.may_be_late(first):
@@ -356,7 +352,7 @@ class MGM2(Gainers):
         ]
 
     def receive_late(self, sender: str, message: wire.Message) -> None:
-        """Note what is new in a message whose phase is over."""
+        """Store the new information in a message whose phase is over."""
         super().receive_late(sender, message)
         if isinstance(message, Domain):
             self.domains.update(self.checked_domains({sender: message}))

@@ -1,21 +1,23 @@
 """DSA for hard and soft constraints (MixedDSA).
 
-DSA with a probability of its own for hard constraints. A robot compares its values by the number of hard constraints
-that they violate, then by the cost of all others. A move by which fewer are violated is made with one probability, a
-move that only saves cost with another. So the team can settle its hard constraints fast, and its costs with care.
+DSA with separate probabilities for hard and soft constraints. A robot compares its values by the number of hard
+constraints that they violate, then by the cost of all others. A move that reduces this number is made with one
+probability, a move that only saves cost with another. So the team can satisfy its hard constraints fast, and reduce its
+costs with care.
 
 - **When to use**: hard and soft constraints together, a large team.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime). A robot with an empty domain proves that there is no solution.
-- **Parameters (`--set`)**: `hard` (the probability of a move where hard constraints are violated; default 0.7), `soft`
-  (that of any other move; default 0.5), `variant` (A, B or C as in `dsa`; default B), `cycles` (default 100).
+- **Parameters (`--set`)**: `hard` (the probability of a move if hard constraints are violated; default 0.7), `soft`
+  (the probability of any other move; default 0.5), `variant` (A, B or C as in `dsa`; default B), `cycles` (default
+  100).
 - **References**: the variant is that of the library pyDcop (Rust, Picard, Ramparany: "Using message-passing DCOP
   algorithms to solve energy-efficient smart environment configuration problems", IJCAI 2016, where devices have hard
   and soft constraints). For DSA: Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed
   breakout: properties, comparison and applications to constraint optimization problems in sensor networks", AIJ 161,
   2005.
 
-The rules, by what the best value is, compared with the present one:
+The rules, by the best value compared with the present one:
 
     fewer hard constraints violated              move with probability `hard`
     as many, but cheaper                         `soft`
@@ -23,8 +25,8 @@ The rules, by what the best value is, compared with the present one:
     no better, some other constraint charges     `soft` (variants B and C)
     no better, nothing charges                   `soft` (variant C)
 
-A constraint is hard where it is broken by a combination of values (`inf`), and soft where it charges a cost; one
-constraint may do both. First values are random, and constraints may be n-ary, as in `dsa`.
+A constraint is hard for a combination of values that breaks it (`inf`), and soft for one that it charges a cost; the
+same constraint may do both. First values are random, and constraints may be n-ary, as in `dsa`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -47,7 +49,7 @@ from robochoc.solver.local_problem import LexicographicCost
 
 
 class MixedDSASettings(CycleSettings, frozen=True):
-    """`hard`: the probability of a move where hard constraints are violated. `soft`: that of any other move.
+    """`hard`: the probability of a move if hard constraints are violated. `soft`: the probability of any other move.
 
     `variant`: A, B or C. `cycles`: the number of cycles.
     """
@@ -80,10 +82,10 @@ class MixedDSA(StochasticSearch):
         use_when="as DSA, hard and soft constraints together",
     )
 
-    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the best values, and the probability by what they change."""
-        now, least = burdens[self.present], min(burdens)
-        return self.places_of(least, burdens), self._probability(now, least)
+    def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the best values, and the probability by the change that they bring."""
+        now, least = costs[self.present], min(costs)
+        return self.places_of(least, costs), self._probability(now, least)
 
     def _probability(self, now: LexicographicCost, least: LexicographicCost) -> float:
         fewer, saved = gain(now, least)

@@ -1,36 +1,36 @@
 """Regret matching: plain (RM), clipped (RM+), and weighted with inertia (WRM-I).
 
-Local search in cycles. The regret of a value is what a robot would have saved so far by that value, instead of those
-that it had, while its neighbours had theirs. In each cycle a robot draws a value with a probability proportional to
-its regret, if that is positive. So it follows what has paid over many cycles, and not only what pays now.
+Local search in cycles. The regret of a value is the cost that a robot would have saved so far with that value instead
+of those that it had, against its neighbours' values at the time. In each cycle a robot draws a value with a probability
+proportional to its regret, if that is positive. So it prefers values that paid over many cycles, not only now.
 
 - **When to use**: as `dsa`, with time for thirty cycles or more.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime); costs rise and fall. A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `variant` (rm or rm+; default rm+), `weight` (the fading memory rho: a cycle counts for this
   part of the regret, those before for the rest; 0: all cycles count alike; default 0.1), `inertia` (the probability to
-  keep a value whatever is regretted; default 0.1), `cycles` (default 100).
+  keep the value in spite of regrets; default 0.1), `cycles` (default 100).
 - **References**: Hart, Mas-Colell: "A simple adaptive procedure leading to correlated equilibrium", Econometrica 68,
   2000 (regret matching); Marden, Arslan, Shamma: "Regret based dynamics: convergence in weakly acyclic games",
   AAMAS 2007 (fading memory and inertia); Chapman, Rogers, Jennings, Leslie: "A unifying framework for iterative
   approximate best-response algorithms for distributed constraint optimization problems", Knowledge Engineering Review
   26, 2011 (WRM-I); Tammelin: "Solving large imperfect information games using CFR+", 2014 (RM+).
 
-The rules, where u is what a value would cost against the neighbours' values of the cycle before:
+The rules, where u is the cost of a value against the neighbours' values of the previous cycle:
 
-    regret(k) <- (1 - rho) regret(k) + rho (u(now) - u(k))    `_learn`
-    rm+: max(regret(k), 0) instead                            `_learn`
-    draw k in proportion to max(regret(k), 0)                 `_drawn`
-    inertia; nothing regretted: keep the value                `choice`
+    regret(k) <- (1 - rho) regret(k) + rho (u(now) - u(k))    `_update_regrets`
+    rm+: max(regret(k), 0) instead                            `_update_regrets`
+    draw k in proportion to max(regret(k), 0)                 `_draw`
+    inertia; no positive regret: keep the value               `choice`
 
 Choices that the papers leave open, and differences:
 
-- Regrets are unconditional: one for each value, and not one for each pair of a value and its substitute. They compare
-  with the value that the robot had, as Hart and Mas-Colell do, and not with the mean of what it might have drawn.
-- Who regrets nothing keeps its value, as in the paper of Marden and others. So a local optimum, once all have learnt
-  it, is kept.
-- A broken hard constraint costs 1 more than any own value has cost until then, broken ones not counted.
-- Regrets are integers, in 65,536ths of a cost: nothing depends on how a machine rounds. Rounding is down.
+- Regrets are unconditional: one for each value, not one for each pair of a value and its substitute. They compare with
+  the robot's actual value, as in Hart and Mas-Colell, not with the mean of the values that it might have drawn.
+- A robot without a positive regret keeps its value, as in the paper of Marden and others. So a local optimum is kept,
+  once all robots have learnt it.
+- A broken hard constraint costs 1 more than the dearest value of this robot so far, without broken constraints.
+- Regrets are integers, in 65,536ths of a cost, so nothing depends on a machine's rounding. Rounding is down.
 - First values are random, and constraints may be n-ary, as in `dsa`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -59,8 +59,8 @@ from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 class RegretMatchingSettings(CycleSettings, frozen=True):
     """`variant`: rm, or rm+, in which regrets never fall below 0.
 
-    `weight` (rho): what part of a regret the last cycle makes up; 0: all cycles count alike. `inertia`: the probability
-    that a robot keeps its value whatever it regrets. `cycles`: the number of cycles.
+    `weight` (rho): the part of a regret that comes from the last cycle; 0: all cycles count alike. `inertia`: the
+    probability that a robot keeps its value in spite of regrets. `cycles`: the number of cycles.
     """
 
     variant: Literal["rm", "rm+"] = "rm+"
@@ -76,16 +76,16 @@ class RegretMatchingSettings(CycleSettings, frozen=True):
 
 
 UNIT = 1 << 16
-"""The integer that stands for a regret of one cost: room for fractions that integers hold exactly."""
+"""The integer that represents a regret of one cost: integers represent its fractions exactly."""
 
 CHANCES = 1 << 53
-"""Random numbers are multiples of one part of so many."""
+"""Random numbers are multiples of 1 / CHANCES."""
 
 
 class RegretMatching(OnePhase):
     """One agent of regret matching. A cycle has one phase: all robots send their values.
 
-    `regrets`: for each own value, what it would have saved, in 65,536ths of a cost.
+    `regrets`: for each of this robot's values, the cost that it would have saved, in 65,536ths.
     """
 
     messages = Value | AnytimeMessage
@@ -106,23 +106,23 @@ class RegretMatching(OnePhase):
         super().__init__(problem, order)
         self.regrets = [0] * len(problem.values)
         self._most = 0
-        """The most that any value has cost so far; a broken constraint counts for 1 more."""
+        """The highest cost of any value so far; a broken constraint counts for 1 more."""
 
-    def choice(self, burdens: Sequence[LexicographicCost]) -> int:
-        """Return a value that is regretted, or the present one by inertia, or where nothing is."""
-        self._most = max(self._most, *(int(cost) for _, cost in burdens))
-        self._learn([broken * (self._most + 1) + int(cost) for broken, cost in burdens])
-        wanted = [max(regret, 0) for regret in self.regrets]
-        if not any(wanted) or self.chance() < self.settings.inertia:
+    def choice(self, costs: Sequence[LexicographicCost]) -> int:
+        """Return a value drawn by its regret; the present value by inertia, or if there is no positive regret."""
+        self._most = max(self._most, *(int(cost) for _, cost in costs))
+        self._update_regrets([broken * (self._most + 1) + int(cost) for broken, cost in costs])
+        regrets = [max(regret, 0) for regret in self.regrets]
+        if not any(regrets) or self.chance() < self.settings.inertia:
             return self.present
-        return self._drawn(wanted)
+        return self._draw(regrets)
 
     def value_notes(self, index: int) -> Mapping[str, float]:
         """Return the regret of the value at `index`, for a replay."""
         return {"regret": self.regrets[index] / UNIT}
 
-    def _learn(self, costs: Sequence[int]) -> None:
-        """Add to the regrets what each value would have saved in this cycle, where own values cost `costs`."""
+    def _update_regrets(self, costs: Sequence[int]) -> None:
+        """Add to each value's regret its saving in this cycle, given the cost of each of this robot's values."""
         now = costs[self.present]
         weight = round(self.settings.weight * UNIT)
         clipped = self.settings.variant == "rm+"
@@ -131,8 +131,8 @@ class RegretMatching(OnePhase):
             regret = before + ((saved - before) * weight // UNIT if weight else saved)
             self.regrets[place] = max(regret, 0) if clipped else regret
 
-    def _drawn(self, wanted: Sequence[int]) -> int:
-        """Return a random place, each with a probability proportional to what is wanted there."""
-        sums = list(accumulate(wanted))
+    def _draw(self, regrets: Sequence[int]) -> int:
+        """Return a random place, each with a probability proportional to its regret."""
+        sums = list(accumulate(regrets))
         point = int(self.chance() * CHANCES) * sums[-1] // CHANCES
         return bisect_right(sums, point)

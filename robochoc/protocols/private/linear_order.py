@@ -68,7 +68,7 @@ class CostRange(Message, frozen=True):
     least: int
     range: int
 
-    act = Act(Performative.INFORM, "the receiver comes to know what all costs may add up to")
+    act = Act(Performative.INFORM, "the receiver learns what all costs may add up to")
     proves_nothing = True  # about a single robot, if there are three robots or more
 
     def in_words(self, _: Wording) -> str:
@@ -108,7 +108,7 @@ class Axis(Message, frozen=True):
     codename: str
     values: list[Value]
 
-    act = Act(Performative.INFORM, "the receiver comes to know the axis that it asked for")
+    act = Act(Performative.INFORM, "the receiver learns the axis that it asked for")
     proves_nothing = True  # the files declare these values
 
     def in_words(self, words: Wording) -> str:

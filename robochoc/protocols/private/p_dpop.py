@@ -134,7 +134,7 @@ class UTIL(Message, frozen=True):
     axes: Shape
     cells: bytes
 
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs")
+    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs")
 
     def in_words(self, _: Wording) -> str:
         axes = counted(len(self.axes), "codename")
@@ -167,7 +167,7 @@ class VALUE(Message, frozen=True):
 
     codes: Shape
 
-    act = Act(Performative.INFORM, "the receiver comes to know the values above it")
+    act = Act(Performative.INFORM, "the receiver learns the values above it")
 
     def in_words(self, _: Wording) -> str:
         return f"the codes of {counted(len(self.codes), 'value')} above you"

@@ -58,7 +58,7 @@ class Setup(Message, frozen=True):
     offset: int
     turns: int
 
-    act = Act(Performative.INFORM, "the receiver comes to know the team's key")
+    act = Act(Performative.INFORM, "the receiver learns the team's key")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

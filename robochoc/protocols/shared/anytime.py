@@ -55,7 +55,7 @@ class Place(wire.Message, frozen=True):
     below: Natural | None
     height: Natural | None
 
-    act = Act(Performative.INFORM, "the receiver comes to know a root, and how far the sender is from it")
+    act = Act(Performative.INFORM, "the receiver learns a root, and how far the sender is from it")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -96,7 +96,7 @@ class Best(wire.Message, frozen=True):
 
     step: Natural | None
 
-    act = Act(Performative.INFORM, "the receiver comes to know which of its values to remember")
+    act = Act(Performative.INFORM, "the receiver learns which of its values to remember")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
