@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from report import Row, Section
 
+from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.flight.mission import mission_of
 from robochoc.flight.quadrotor.airframe import GRAVITY, HUMMINGBIRD, ROTORS, Array
 from robochoc.flight.quadrotor.control import Controller
 from robochoc.flight.quadrotor.rigid_bodies import RigidBodies
 from robochoc.flight.quadrotor.simulation import DT
-from robochoc.flight.routes.timetable import plan_routes
 from robochoc.formats.team_reader import read_team
 from robochoc.model.outcome import Outcome, Verdict
 

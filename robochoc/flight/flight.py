@@ -22,26 +22,25 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.coordination.motion import MotionLimits, RoutePlan
+from robochoc.flight.coordination.move_order import NoRouteError
+from robochoc.flight.coordination.spacing import TooCloseError
+from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.flight.layout import Point
 from robochoc.flight.log import SAMPLE_RATE_HZ, FlightLog, LegTimes
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_paths, origin_of
 from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M, FlightConditions
 from robochoc.flight.quadrotor.free_points import nearest_distances, nearest_two
 from robochoc.flight.quadrotor.goals import Hazards, LegGoals, check_separation, start_delays
-from robochoc.flight.quadrotor.obstacles import ObstacleEncounter, encounters
 from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
-from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
+from robochoc.flight.quadrotor.trajectory import STOP_S, ObstacleEncounter, Trajectory, encounters
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
-from robochoc.flight.routes.motion import MotionLimits, RoutePlan
-from robochoc.flight.routes.move_order import NoRouteError
-from robochoc.flight.routes.spacing import TooCloseError, squashed
-from robochoc.flight.routes.timetable import plan_routes
-from robochoc.flight.routes.wall_plan import WallPlan
 from robochoc.flight.wall_watch import WallWatch
-from robochoc.flight.walls import Walls
+from robochoc.maps.routes.distances import squashed
+from robochoc.maps.routes.wall_plan import WallPlan
+from robochoc.maps.walls import Walls
 
 DISTANCE_M = 0.5
 """The default distance between drones' centres."""
@@ -60,6 +59,16 @@ _CLOSE_M = 0.005
 _SLOW_M_S = 0.02
 _FAR_M = 0.05
 """A drone further from its setpoint has not finished the leg."""
+DRONES_MAX = 1_000
+"""At a time: planning looks at all pairs."""
+COORDINATE_MAX_M = 1e8
+"""Up to there, floating point distinguishes places by a tenth of a micrometre."""
+_NEAR_ORIGIN_M = 1_000.0
+"""Homes that are no further from the origin are flown where they are."""
+PATH_MAX_M = 2_000.0
+"""Of a drone in a leg. Planning looks at steps of a twentieth of a second, or less."""
+_SAMPLES_MAX = 3_000_000
+"""Of all drones together, some 300 bytes each: 1,000 drones for 100 s, or 100 for a quarter of an hour."""
 
 
 class Flight:
@@ -77,7 +86,7 @@ class Flight:
         walls: Walls that drones fly around, as slowly as the team was told.
 
     Raises:
-        ValueError: There are no drones, or too many (`quadrotor/bounds.py`); the conditions name others; or homes are
+        ValueError: There are no drones, or too many; the conditions name others; or homes are
             nearer to each other than the distance, or in a wall.
     """
 
@@ -385,3 +394,46 @@ def _distance(places: Sequence[Array], downwash: float) -> float:
     """Return the default distance: `DISTANCE_M`, or less where two points of the same (K, 3) array are nearer."""
     nearest = (nearest_two(squashed(points, downwash)) for points in places)
     return max(DISTANCE_MIN_M, min(DISTANCE_M, *(_SHARE * apart for apart in nearest)))
+
+
+def check_homes(names: Sequence[str], homes: Array) -> None:
+    """Raise `ValueError` if there are no drones, too many, or one is too far away."""
+    if not names:
+        raise ValueError("there are no drones to fly: the run has decided about none")
+    if len(names) > DRONES_MAX:
+        raise ValueError(f"{len(names):,} drones are more than can be flown at a time ({DRONES_MAX:,})")
+    check_near(names, homes)
+
+
+def check_near(names: Sequence[str], places: npt.ArrayLike) -> None:
+    """Raise `ValueError` for the first of `places` (K, 3) that is too far away, or not finite."""
+    places = np.array(places, dtype=np.float64).reshape(-1, 3)
+    far = np.flatnonzero(~(np.abs(places) <= COORDINATE_MAX_M).all(axis=1))  # true of nan as well
+    if len(far):
+        place = ", ".join(f"{part:g}" for part in places[far[0]])
+        raise ValueError(
+            f"{names[far[0]]}: the place ({place}) m is over {COORDINATE_MAX_M:,.0f} m away; ask for a smaller scale"
+        )
+
+
+def origin_of(homes: Array) -> Array:
+    """Return the origin (3,) to fly around: 0, or, where `homes` are far away, whole metres amid them."""
+    return np.zeros(3) if np.abs(homes).max() <= _NEAR_ORIGIN_M else np.asarray(np.round(homes.mean(axis=0)))
+
+
+def check_paths(names: Sequence[str], starts: Array, places: Array) -> None:
+    """Raise `ValueError` if a drone has too far to fly from `starts` to `places` (N, 3)."""
+    ways = np.sqrt(np.square(places - starts).sum(1))
+    longest = int(ways.argmax())
+    if not ways[longest] <= PATH_MAX_M:
+        raise ValueError(
+            f"{names[longest]} would have {ways[longest]:,.0f} m to fly, and {PATH_MAX_M:,.0f} m is the most: "
+            "ask for a smaller scale"
+        )
+
+
+def check_length(drones: int, until_s: float) -> None:
+    """Raise `ValueError` if the log of a flight up to `until_s` would be too long."""
+    most_s = _SAMPLES_MAX / drones / SAMPLE_RATE_HZ
+    if until_s > most_s:
+        raise ValueError(f"the flight would last {until_s:,.0f} s; of {drones:,} drones {most_s:,.0f} s are the most")

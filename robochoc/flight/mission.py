@@ -10,14 +10,20 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+import numpy.typing as npt
+
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
-from robochoc.flight.walls import Walls, walls_of
 from robochoc.maps.ground_map import ALL_SIDES, GroundMap
+from robochoc.maps.walls import Walls, walls_of
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
+
+_Array = npt.NDArray[np.float64]
+
 
 UNIT_M = 1.0
 """The default length of a unit of coordinates: drones are a little narrower."""
@@ -314,3 +320,15 @@ def _scale(axes: Sequence[Axis]) -> float:
     longest = max(1, *(axis.last - axis.first for axis in axes))
     dense = _DENSE_M if longest * _DENSE_M <= _FLOWN_M else 0.0
     return min(UNIT_M, max(VAST_M / longest, dense))
+
+
+def in_cells(mission: Mission, metres: _Array) -> _Array:
+    """Return points (..., 3), given in metres, in the cells of the mission's box."""
+    parts = [_cells(axis, metres[..., number] / mission.scale) for number, axis in enumerate(mission.axes)]
+    return np.stack(parts, axis=-1)
+
+
+def _cells(axis: Axis, values: _Array) -> _Array:
+    """Return `Axis.at` of many values."""
+    span = axis.last - axis.first
+    return axis.low + (values - axis.first) * ((axis.high - axis.low) / span if span else 1.0)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robochoc.flight.cells import in_cells
 from robochoc.flight.flight import fly
 from robochoc.flight.layout import Axis, Point
 from robochoc.flight.log import FlightLog
-from robochoc.flight.mission import Mission
+from robochoc.flight.mission import Mission, in_cells
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
 """The errors of an impossible flight: places too close to each other, no way between them, numbers beyond all bounds.

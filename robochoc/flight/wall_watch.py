@@ -13,14 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from robochoc.flight.coordination.motion import PEAK, MotionLimits
 from robochoc.flight.log import SAMPLE_RATE_HZ, NearestWall
-from robochoc.flight.routes.floor_plan import FloorPlan
-from robochoc.flight.routes.motion import PEAK, MotionLimits
-from robochoc.flight.routes.spacing import Array
-from robochoc.flight.routes.voxel_plan import VoxelPlan
-from robochoc.flight.routes.wall_plan import WallPlan
-from robochoc.flight.voxel_frame import VoxelFrame
-from robochoc.flight.walls import Walls
+from robochoc.maps.routes.distances import Array
+from robochoc.maps.routes.voxel_plan import VoxelPlan
+from robochoc.maps.routes.wall_plan import WallPlan, wall_plan_of
+from robochoc.maps.walls import Walls
 
 _SPARES_M = (0.06, 0.04, 0.02, 0.0)
 """Routes keep so much more than the radius, the most that leaves a way for all."""
@@ -44,7 +42,7 @@ class WallWatch:
         self._names = names
         self._radius = walls.radius
         self._speed = walls.speed
-        self._plan = _plan_of(walls)
+        self._plan = wall_plan_of(walls)
         self._plans: dict[float, WallPlan] = {}
         self._kept = walls.radius
         self._looked = 0
@@ -127,10 +125,3 @@ class WallWatch:
         if keep not in self._plans:
             self._plans[keep] = self._plan.keeping(keep)
         return self._plans[keep]
-
-
-def _plan_of(walls: Walls) -> WallPlan:
-    frame = walls.frame
-    if isinstance(frame, VoxelFrame):
-        return VoxelPlan(walls.solid, frame, walls.radius)
-    return FloorPlan(walls.solid, frame, walls.radius)

@@ -23,7 +23,7 @@ from robochoc.generators.graph_choice import GraphChoice
 from robochoc.generators.maps import coverage as coverages
 from robochoc.generators.maps import formation as formations
 from robochoc.generators.maps import patrol as patrols
-from robochoc.generators.maps.reach import MapChoice
+from robochoc.generators.maps.map_team import MapChoice
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team

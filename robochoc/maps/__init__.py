@@ -1,1 +1,1 @@
-"""Maps as data: occupancy grids, OctoMaps, the ground under a team, and the places of its values."""
+"""Maps: occupancy grids, OctoMaps, the ground under a team, reachability, and routes around walls."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeAlias
 
-from robochoc.maps.occupancy.content import beginning_of, told
+from robochoc.maps.map_content import beginning_of, told
 from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid
 from robochoc.maps.octomap.octree import is_octomap
 from robochoc.maps.octomap.voxels import VoxelGrid, read_voxels

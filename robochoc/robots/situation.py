@@ -15,10 +15,10 @@ from typing import assert_never
 from robochoc.flight.crafts import Craft, crafts_of
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.flight.point_index import PointIndex
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
+from robochoc.robots.point_index import PointIndex
 
 BATTERY = 0.2
 """The default charge below which a drone is out of order."""

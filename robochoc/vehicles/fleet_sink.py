@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from robochoc.flight.mission import Drone
-from robochoc.flight.routes.spacing import SLACK_M
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.maps.routes.distances import SLACK_M
 from robochoc.robots.sink import Fields, Sink, SinkError
 from robochoc.robots.waypoint import Waypoint
 from robochoc.vehicles.fleet import AtEnd, FleetError, point_text, read_fleet

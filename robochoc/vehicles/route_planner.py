@@ -1,6 +1,6 @@
 """Ways of vehicles from where they are to where they should be, none nearer to another's than the fleet's distance.
 
-The planner is that of the simulated flight (`robochoc.flight.routes`): it gives moves that are safe one after the
+The planner is that of the simulated flight (`robochoc.flight.coordination`): it gives moves that are safe one after the
 other, and here that order is all that is taken from it. When each may begin is decided on the way, by what the
 vehicles tell (`traffic.py`): no clock is in it, so a vehicle may be as late as it likes.
 
@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robochoc.flight.coordination.move_order import NoRouteError
+from robochoc.flight.coordination.moves import moves_between
+from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.spacing import TooCloseError, check_spacing
 from robochoc.flight.layout import Point
-from robochoc.flight.routes.move_order import NoRouteError
-from robochoc.flight.routes.moves import moves_between
-from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import SLACK_M, Array, TooCloseError, check_spacing, norms, squashed
+from robochoc.maps.routes.distances import SLACK_M, Array, norms, squashed
 from robochoc.vehicles.fleet import Fleet, point_text
 
 _ORDERS = 6

@@ -17,7 +17,7 @@ from enum import Enum, auto
 import numpy as np
 
 from robochoc.flight.layout import Point
-from robochoc.flight.routes.spacing import SLACK_M, Array, line_distances, squashed
+from robochoc.maps.routes.distances import SLACK_M, Array, line_distances, squashed
 from robochoc.vehicles.route_planner import PlannedLeg
 
 _PARTS = 32

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 
 from robochoc.flight.layout import Point
-from robochoc.flight.routes.spacing import SLACK_M, line_distances, squashed
+from robochoc.maps.routes.distances import SLACK_M, line_distances, squashed
 from robochoc.vehicles.craft import Clearance, Craft
 from robochoc.vehicles.fleet import Fleet
 from robochoc.vehicles.messages import Target

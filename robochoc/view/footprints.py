@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.cells import in_cells
-from robochoc.flight.mission import Mission
-from robochoc.flight.pixel_frame import PixelFrame
+from robochoc.flight.mission import Mission, in_cells
+from robochoc.maps.walls import PixelFrame
 
 _MOST = 4_000
 """Rectangles of a map. Where there would be more, pixels are drawn twice as large, and again."""

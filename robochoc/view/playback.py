@@ -12,10 +12,9 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Point
 from robochoc.flight.log import FlightEvent, FlightLog
-from robochoc.flight.mission import Leg, Mission
+from robochoc.flight.mission import Leg, Mission, in_cells
 from robochoc.model.outcome import Verdict
 
 _HIT = "hits the ground"

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Axis, Point
 from robochoc.flight.log import FlightLog
-from robochoc.flight.mission import Goal, Mission
+from robochoc.flight.mission import Goal, Mission, in_cells
 from robochoc.formats.headline import describe_outcome
 from robochoc.maps.ground_map import ALL_SIDES
 from robochoc.model.cost_units import cost_shown

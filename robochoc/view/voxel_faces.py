@@ -10,9 +10,8 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.cells import in_cells
-from robochoc.flight.mission import Mission
-from robochoc.flight.voxel_frame import VoxelFrame
+from robochoc.flight.mission import Mission, in_cells
+from robochoc.maps.walls import VoxelFrame
 
 _MOST = 20_000
 """Faces of a map. Where there would be more, voxels are drawn twice as large, and again."""

@@ -15,13 +15,10 @@ from robochoc.formats import read_team
 from robochoc.generators.coloring import coloring_of
 from robochoc.generators.graphs import grid, scale_free, small_world, tree
 from robochoc.generators.ising import ising
-from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage
-from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.map_team import MapChoice
 from robochoc.generators.maps.patrol import patrol
-from robochoc.generators.maps.reach import MapChoice
-from robochoc.generators.maps.room import room_on
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
@@ -29,6 +26,8 @@ from robochoc.generators.tasks import Skills, Ways, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.maps.occupancy.grid import read_occupancy_grid
 from robochoc.maps.octomap.voxels import read_voxels
+from robochoc.maps.reachability.cells import Cells, Cubes
+from robochoc.maps.reachability.free_space import free_space
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team
@@ -133,7 +132,7 @@ def test_what_does_not_fit_is_wrong_usage(tmp_path: Path) -> None:
                 "the anchor 80,2.5 is not on the map, which lies between -0.25,-0.25 and 10.25,6.25",
             ),
             (f"formation --map {HOUSE} --at 4.8,1", "at has '4.8,1'; expected X,Y,Z on a three-dimensional map"),
-            (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 stands where it does not fit"),
+            (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 does not fit there"),
         ]:
             with each(words):
                 done = robochoc_within("generate", *words.split())
@@ -157,7 +156,7 @@ def test_a_map_is_written_beside_the_team_and_flown_on(tmp_path: Path) -> None:
     assert found["scale"] == 0.75
     values = json.loads(solved.stdout)["assignment"]
     grid = read_occupancy_grid(Path(BUILDING))
-    cells = Cells(grid, Fraction("0.75"), room_on(grid.free, Fraction(0)))
+    cells = Cells(grid, Fraction("0.75"), free_space(grid.free, Fraction(0)))
     for drone in found["drones"]:
         place = cells.centre(values[drone["name"].replace("Robot", "V")])
         assert drone["at"][:2] == pytest.approx([float(one) for one in place], abs=0.05)

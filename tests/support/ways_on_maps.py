@@ -12,7 +12,7 @@ from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.wall_watch import WallWatch
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
-from robochoc.generators.maps.reach import MapChoice
+from robochoc.generators.maps.map_team import MapChoice
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team

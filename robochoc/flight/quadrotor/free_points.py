@@ -6,7 +6,7 @@ import numpy as np
 
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.rigid_bodies import Mask
-from robochoc.flight.routes.wall_plan import WallPlan
+from robochoc.maps.routes.wall_plan import WallPlan
 
 _STEPS = 8
 """The number of steps, of half a distance each, in which free points are searched for in each direction."""

@@ -15,8 +15,8 @@ from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M
 from robochoc.flight.quadrotor.free_points import free_point, nearest_distances, nearest_two
 from robochoc.flight.quadrotor.rigid_bodies import Mask
-from robochoc.flight.routes.spacing import SLACK_M, squashed
-from robochoc.flight.routes.wall_plan import WallPlan
+from robochoc.maps.routes.distances import SLACK_M, squashed
+from robochoc.maps.routes.wall_plan import WallPlan
 
 MARGIN_M = 0.1
 """The margin that routes keep beyond the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone

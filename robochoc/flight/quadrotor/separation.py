@@ -14,7 +14,7 @@ import numpy.typing as npt
 from robochoc.flight.log import ClosestApproach
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.rigid_bodies import Mask
-from robochoc.flight.routes.spacing import squashed
+from robochoc.maps.routes.distances import squashed
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6

@@ -12,15 +12,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from robochoc.flight.layout import Point
 from robochoc.flight.log import SAMPLE_RATE_HZ, FlightEvent
 from robochoc.flight.quadrotor.airframe import HUMMINGBIRD, Array
-from robochoc.flight.quadrotor.attitude import quaternions
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.control import Controller
 from robochoc.flight.quadrotor.rigid_bodies import Mask, RigidBodies
 from robochoc.flight.quadrotor.separation import SeparationMonitor
 from robochoc.flight.quadrotor.trajectory import Trajectory
-from robochoc.flight.quadrotor.wind import Wind
+
+_CORRELATION_S = 1.5
+
 
 STEPS_PER_SAMPLE = 4
 DT = 1 / (SAMPLE_RATE_HZ * STEPS_PER_SAMPLE)
@@ -202,3 +204,46 @@ class QuadrotorSimulation:
             self._down[drone] = self._off[drone] = True
             if not self.failed[drone]:
                 self._lose(drone, "has got out of all bounds")
+
+
+class Wind:
+    """The velocity of the air around each of `number` drones: `mean` and gusts of standard deviation `gusts`, m/s."""
+
+    def __init__(self, mean: Point, gusts: float, seed: int, number: int, dt: float) -> None:
+        self._mean = np.array(mean, dtype=np.float64)[:, None]
+        self._keeps = math.exp(-dt / _CORRELATION_S)
+        self._gusts = gusts
+        self._chance = np.random.default_rng(seed)
+        self._now = gusts * self._chance.standard_normal((3, number)) if gusts else np.zeros((3, 1))
+
+    def air(self) -> Array:
+        """Return the air's velocity in the next step: (3, N), or (3, 1) without gusts."""
+        if not self._gusts:
+            return self._mean
+        drawn = self._chance.standard_normal(self._now.shape)
+        self._now = self._keeps * self._now + self._gusts * math.sqrt(1 - self._keeps**2) * drawn
+        return np.asarray(self._mean + self._now)
+
+
+def quaternions(axes: Array) -> Array:
+    """Return unit quaternions x, y, z, w (..., 4) of rotations (..., 3, 3); `[..., k, :]` is the turned axis k.
+
+    After Shepperd, "Quaternion from rotation matrix", 1978: of four ways, the one without cancellation.
+    """
+    xx, yy, zz = axes[..., 0, 0], axes[..., 1, 1], axes[..., 2, 2]
+    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)
+    # The products of each component with all four, times four.
+    xy, yz, zx = (axes[..., i, j] + axes[..., j, i] for i, j in ((0, 1), (1, 2), (2, 0)))
+    xw, yw, zw = (axes[..., i, j] - axes[..., j, i] for i, j in ((1, 2), (2, 0), (0, 1)))
+    rows = np.stack(
+        [
+            np.stack([squares[..., 0], xy, zx, xw], axis=-1),
+            np.stack([xy, squares[..., 1], yz, yw], axis=-1),
+            np.stack([zx, yz, squares[..., 2], zw], axis=-1),
+            np.stack([xw, yw, zw, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = squares.argmax(-1)[..., None, None]
+    found = np.take_along_axis(rows, largest, -2)[..., 0, :]
+    return np.asarray(found / np.sqrt(np.square(found).sum(-1, keepdims=True)))

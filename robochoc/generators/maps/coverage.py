@@ -19,18 +19,19 @@ from itertools import combinations
 from math import floor
 
 from robochoc.generators.draws import bounded, seeded
-from robochoc.generators.maps.reach import (
-    PLACES,
+from robochoc.generators.maps.map_team import (
     MapChoice,
-    Reach,
     all_different,
-    charged,
+    cost_constraint,
     exact,
     label_of,
-    reach_of,
+    reachability_of,
+    variables_of,
+    waypoints_of,
 )
-from robochoc.generators.maps.sight import sight_on
 from robochoc.maps.ground_map import GroundMap
+from robochoc.maps.reachability.line_of_sight import sight_on
+from robochoc.maps.reachability.reachability import PLACES, Reachability
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import CostUnits
@@ -59,31 +60,33 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
         ValueError: A number is out of its bounds, or a robot can get to no cell. The text says which.
     """
     range_m, seconds = exact("sensing", sensing, 0, 1000), exact("worth", worth, 0, 10_000)
-    reach = reach_of(choice, seeded(seed))
-    for number, own in enumerate(reach.seconds, 1):
+    reachability = reachability_of(choice, seeded(seed))
+    for number, own in enumerate(reachability.seconds, 1):
         if not own:
             raise ValueError(f"robot {number} can get to no cell; take smaller cells, or allow more time")
-    seen = sight_on(reach.cells).seen(range_m)
-    a_cell = worth_of_a_cell(reach, seconds)
-    most = [max(len(seen[cell]) for cell in own) for own in reach.seconds]
+    seen = sight_on(reachability.cells).seen(range_m)
+    a_cell = worth_of_a_cell(reachability, seconds)
+    most = [max(len(seen[cell]) for cell in own) for own in reachability.seconds]
     gains = (
-        charged("unseen", f"V{number}", {cell: time + a_cell * (best - len(seen[cell])) for cell, time in own.items()})
-        for number, (own, best) in enumerate(zip(reach.seconds, most, strict=True), 1)
+        cost_constraint(
+            "unseen", f"V{number}", {cell: time + a_cell * (best - len(seen[cell])) for cell, time in own.items()}
+        )
+        for number, (own, best) in enumerate(zip(reachability.seconds, most, strict=True), 1)
     )
     team = assemble(
-        f"coverage-{label_of(choice.map)}-{len(reach.starts)}-{seed}",
-        reach.variables(reach.seconds),
-        bounded([*gains, *all_different(reach.seconds), *_overlaps(reach.seconds, seen, a_cell)]),
+        f"coverage-{label_of(choice.map)}-{len(reachability.starts)}-{seed}",
+        variables_of(reachability, reachability.seconds),
+        bounded([*gains, *all_different(reachability.seconds), *_overlaps(reachability.seconds, seen, a_cell)]),
         kind=ProblemKind.DISWCSP,
-        costs=CostUnits(places=PLACES, constant=a_cell * (len(reach.cells.free) - sum(most))),
-        extras=reach.extras(),
+        costs=CostUnits(places=PLACES, constant=a_cell * (len(reachability.cells.free) - sum(most))),
+        extras=waypoints_of(reachability),
     )
-    return team, reach.ground()
+    return team, reachability.ground()
 
 
-def worth_of_a_cell(reach: Reach, seconds: Fraction) -> int:
+def worth_of_a_cell(reachability: Reachability, seconds: Fraction) -> int:
     """Return the utility of seeing a cell, in units of costs, from the utility of a square or cubic metre."""
-    exactly: Fraction = reach.cells.side ** len(reach.cells.first) * seconds * 10**PLACES
+    exactly: Fraction = reachability.cells.side ** len(reachability.cells.first) * seconds * 10**PLACES
     return floor(exactly + Fraction(1, 2))
 
 

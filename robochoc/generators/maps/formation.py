@@ -21,21 +21,21 @@ from pathlib import Path
 
 from robochoc.formats.diagnostics import invalid_input, shortened
 from robochoc.generators.draws import bounded, check_bounds, seeded
-from robochoc.generators.maps.reach import (
+from robochoc.generators.maps.map_team import (
     MAX_ROBOTS,
-    PLACES,
     MapChoice,
-    Reach,
     all_different,
-    charged,
     check_dimensions,
+    cost_constraint,
     label_of,
-    off_map,
     places_in,
-    reach_of,
+    reachability_of,
+    variables_of,
+    waypoints_of,
 )
-from robochoc.generators.maps.sizes import Place
 from robochoc.maps.ground_map import GroundMap
+from robochoc.maps.reachability.cells import Place
+from robochoc.maps.reachability.reachability import PLACES, Reachability, off_map
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
@@ -93,34 +93,34 @@ def formation(
     middle = places_in(anchor, "anchor")
     if len(middle) > 1:
         raise ValueError("anchor is one place")
-    reach = reach_of(choice, seeded(seed))
-    check_dimensions(middle, reach.cells, "anchor")
-    if middle and reach.cells.pixel(middle[0]) is None:
-        raise ValueError(off_map(f"the anchor {anchor}", reach.cells))
-    agents = len(reach.starts)
+    reachability = reachability_of(choice, seeded(seed))
+    check_dimensions(middle, reachability.cells, "anchor")
+    if middle and reachability.cells.pixel(middle[0]) is None:
+        raise ValueError(off_map(f"the anchor {anchor}", reachability.cells))
+    agents = len(reachability.starts)
     offsets = _offsets(shape, agents, spacing)
-    slots = slots_of(reach, offsets, middle[0] if middle else _mean(reach.starts), heading)
-    values = [sorted(set(slots) & own.keys()) for own in reach.seconds]
+    slots = slots_of(reachability, offsets, middle[0] if middle else _mean(reachability.starts), heading)
+    values = [sorted(set(slots) & own.keys()) for own in reachability.seconds]
     for number, own in enumerate(values, 1):
         if not own:
             raise ValueError(f"robot {number} can get to no slot; move the anchor, or allow more time")
     travel = [
-        charged("travel", f"V{number}", {cell: seconds[cell] for cell in own})
-        for number, (own, seconds) in enumerate(zip(values, reach.seconds, strict=True), 1)
+        cost_constraint("travel", f"V{number}", {cell: seconds[cell] for cell in own})
+        for number, (own, seconds) in enumerate(zip(values, reachability.seconds, strict=True), 1)
     ]
     label = shape if shape in SHAPES else label_of(shape)
     team = assemble(
         f"formation-{label_of(choice.map)}-{label}-{agents}-{seed}",
-        reach.variables(values),
+        variables_of(reachability, values),
         bounded([*travel, *all_different(values)]),
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(places=PLACES),
-        extras=reach.extras(),
+        extras=waypoints_of(reachability),
     )
-    return team, reach.ground()
+    return team, reachability.ground()
 
 
-def slots_of(reach: Reach, offsets: Sequence[Offset], anchor: Place, heading: float) -> list[int]:
+def slots_of(reachability: Reachability, offsets: Sequence[Offset], anchor: Place, heading: float) -> list[int]:
     """Return the cell of each slot: the nearest one that a robot can get to and no slot before it has.
 
     Of cells that are equally near, the one of the lowest number.
@@ -128,12 +128,12 @@ def slots_of(reach: Reach, offsets: Sequence[Offset], anchor: Place, heading: fl
     Raises:
         ValueError: There are fewer such cells than slots.
     """
-    left = set(reach.reached)
+    left = set(reachability.reached)
     if len(left) < len(offsets):
         raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; take smaller cells")
     slots = []
     for x, y in _turned(offsets, heading):
-        slots.append(reach.nearest((anchor[0] + x, anchor[1] + y, *anchor[2:]), left))
+        slots.append(reachability.nearest((anchor[0] + x, anchor[1] + y, *anchor[2:]), left))
         left.remove(slots[-1])
     return slots
 

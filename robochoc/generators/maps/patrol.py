@@ -24,20 +24,19 @@ from random import Random
 
 from robochoc.formats import PREDEFINED
 from robochoc.generators.draws import bounded, check_bounds, seeded, uniform
-from robochoc.generators.maps.reach import (
-    PLACES,
+from robochoc.generators.maps.map_team import (
     MapChoice,
-    Reach,
-    charged,
     check_dimensions,
+    cost_constraint,
     exact,
     label_of,
     places_in,
-    reach_of,
-    squared,
+    reachability_of,
+    waypoints_of,
 )
-from robochoc.generators.maps.sizes import Place
 from robochoc.maps.ground_map import GroundMap
+from robochoc.maps.reachability.cells import Place
+from robochoc.maps.reachability.reachability import PLACES, Reachability, squared
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
@@ -90,47 +89,49 @@ def patrol(
     count = len(given) or points
     check_bounds({"points": (count, 1, MAX_POINTS), "rounds": (rounds, 1, MAX_ROUNDS), "idle": (idle, 0, MAX_IDLE)})
     metres = exact("apart", apart, 0, 1000)
-    reach = reach_of(choice, chance)
-    check_dimensions(given, reach.cells, "visit")
-    agents = len(reach.starts)
+    reachability = reachability_of(choice, chance)
+    check_dimensions(given, reachability.cells, "visit")
+    agents = len(reachability.starts)
     if agents * rounds > count:
         raise ValueError(
             f"{agents} robots make {agents * rounds} visits, more than {count} points; ask for more points"
         )
     if count**rounds > MAX_PLANS:
         raise ValueError(f"{count} points in {rounds} rounds are more than {MAX_PLANS:,} plans; ask for fewer")
-    if count > len(reach.reached):
-        raise ValueError(f"robots can get to {len(reach.reached)} cells, fewer than {count} points; take smaller cells")
-    chosen = _nearest(reach, given) if given else drawn_points(reach, count, chance)
+    if count > len(reachability.reached):
+        raise ValueError(
+            f"robots can get to {len(reachability.reached)} cells, fewer than {count} points; take smaller cells"
+        )
+    chosen = _nearest(reachability, given) if given else drawn_points(reachability, count, chance)
     idleness = {point: uniform(chance, 0, idle) * 10**PLACES for point in chosen}
-    legs = _legs(reach, chosen) if rounds > 1 else {}
-    plans = [_Plan(reach, number, chosen, rounds) for number in range(1, agents + 1)]
+    legs = _legs(reachability, chosen) if rounds > 1 else {}
+    plans = [_Plan(reachability, number, chosen, rounds) for number in range(1, agents + 1)]
     constraints = [
-        *(one for plan in plans for one in plan.private(reach, idleness, legs)),
-        *_between(plans, _crowding(reach, chosen, metres, choice.speed)),
+        *(one for plan in plans for one in plan.private(reachability, idleness, legs)),
+        *_between(plans, _crowding(reachability, chosen, metres, choice.speed)),
     ]
     # What is charged for a visit is the idleness that another point would have had.
     unvisited = sum(idleness.values()) - agents * rounds * max(idleness.values())
     team = assemble(
         f"patrol-{label_of(choice.map)}-{agents}-{count}-{rounds}-{seed}",
-        {name: plan.variables for name, plan in zip(reach.names, plans, strict=True)},
+        {name: plan.variables for name, plan in zip(reachability.names, plans, strict=True)},
         bounded(constraints),
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(places=PLACES, constant=unvisited),
-        extras=reach.extras(".1" if rounds > 1 else ""),
+        extras=waypoints_of(reachability, ".1" if rounds > 1 else ""),
     )
-    return team, reach.ground()
+    return team, reachability.ground()
 
 
-def drawn_points(reach: Reach, count: int, chance: Random) -> list[int]:
+def drawn_points(reachability: Reachability, count: int, chance: Random) -> list[int]:
     """Return points of interest that are spread over the cells that robots can get to."""
-    cells = reach.reached
+    cells = reachability.reached
     found = [cells[uniform(chance, 0, len(cells) - 1)]]
     away = dict.fromkeys(cells, MAX_IDLE**2)
     while len(found) < count:
-        last = reach.cells.coordinates(found[-1])
+        last = reachability.cells.coordinates(found[-1])
         for cell in cells:
-            here = reach.cells.coordinates(cell)
+            here = reachability.cells.coordinates(cell)
             away[cell] = min(away[cell], sum((one - other) ** 2 for one, other in zip(last, here, strict=True)))
         found.append(max(cells, key=lambda cell: (away[cell], -cell)))
     return sorted(found)
@@ -139,9 +140,9 @@ def drawn_points(reach: Reach, count: int, chance: Random) -> list[int]:
 class _Plan:
     """The visits of a robot: a variable for each round, whose values are the points that it can get to."""
 
-    def __init__(self, reach: Reach, number: int, points: Sequence[int], rounds: int) -> None:
+    def __init__(self, reachability: Reachability, number: int, points: Sequence[int], rounds: int) -> None:
         self.number = number
-        self.first = [point for point in points if point in reach.seconds[number - 1]]
+        self.first = [point for point in points if point in reachability.seconds[number - 1]]
         if not self.first:
             raise ValueError(f"robot {number} can get to no point; give other points, or allow more time")
         self._points = points
@@ -160,13 +161,13 @@ class _Plan:
         """The points that can be visited, round by round."""
         return [self.first, *[self._points] * (len(self.names) - 1)]
 
-    def private(self, reach: Reach, idleness: Mapping[int, int], legs: Legs) -> Iterator[Constraint]:
+    def private(self, reachability: Reachability, idleness: Mapping[int, int], legs: Legs) -> Iterator[Constraint]:
         """Yield what the robot's visits cost: ways, and what is gained less than at the point that is idle longest."""
         longest = max(idleness.values())
-        seconds = reach.seconds[self.number - 1]
+        seconds = reachability.seconds[self.number - 1]
         for name, values in zip(self.names, self.values, strict=True):
             way = seconds if name == self.names[0] else dict.fromkeys(values, 0)
-            yield charged("visit", name, {point: way[point] + longest - idleness[point] for point in values})
+            yield cost_constraint("visit", name, {point: way[point] + longest - idleness[point] for point in values})
         for scope in pairwise(self.names):
             rows = {(one, other): time for one in legs for other, time in legs[one].items() if one != other}
             relation = Relation(
@@ -199,29 +200,31 @@ def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) ->
                 yield Constraint("near", relation, scope, scope)
 
 
-def _nearest(reach: Reach, places: Sequence[Place]) -> list[int]:
+def _nearest(reachability: Reachability, places: Sequence[Place]) -> list[int]:
     """Return the cells of given points; no two have the same."""
-    left, found = set(reach.reached), []
+    left, found = set(reachability.reached), []
     for place in places:
-        found.append(reach.nearest(place, left))
+        found.append(reachability.nearest(place, left))
         left.remove(found[-1])
     return sorted(found)
 
 
-def _legs(reach: Reach, points: Sequence[int]) -> dict[int, dict[int, int]]:
+def _legs(reachability: Reachability, points: Sequence[int]) -> dict[int, dict[int, int]]:
     found = {}
     for point in points:
-        pixel = reach.cells.pixel(reach.cells.centre(point))
-        times = reach.seconds_from(pixel) if pixel else {}
+        pixel = reachability.cells.pixel(reachability.cells.centre(point))
+        times = reachability.seconds_from(pixel) if pixel else {}
         found[point] = {other: times[other] for other in points if other in times}
     return found
 
 
-def _crowding(reach: Reach, points: Sequence[int], apart: Fraction, speed: float) -> dict[tuple[int, int], int]:
+def _crowding(
+    reachability: Reachability, points: Sequence[int], apart: Fraction, speed: float
+) -> dict[tuple[int, int], int]:
     """Return the time that it takes to drive the metres that two points are too near to each other."""
     found = {}
     for one, other in combinations(points, 2):
-        square = squared(reach.cells.centre(one), reach.cells.centre(other))
+        square = squared(reachability.cells.centre(one), reachability.cells.centre(other))
         if square < apart**2:
             missing = apart - Fraction(isqrt(floor(square * _MM**2)), _MM)
             exactly: Fraction = missing / Fraction(str(speed)) * 10**PLACES

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from robochoc.formats.diagnostics import InvalidInputError, MistakeError, shortened
 from robochoc.formats.yaml_tree import Node, Scalar, read_yaml
-from robochoc.maps.occupancy.content import beginning_of, content_of, told
+from robochoc.maps.map_content import beginning_of, content_of, told
 from robochoc.maps.occupancy.images import Image, is_image, read_image
 from robochoc.maps.occupancy.pgm import MAX_BYTES
 from robochoc.maps.occupancy.turn import UNTURNED, Place, Turn, turn_of

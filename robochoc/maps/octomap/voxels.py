@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.maps.occupancy.content import content_of, told
+from robochoc.maps.map_content import content_of, told
 from robochoc.maps.occupancy.grid import Flags
 from robochoc.maps.octomap.octree import DEPTH, MAX_BYTES, Corners, Integers, Leaves, Octree, read_octree
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robochoc.flight.coordination.motion import MotionLimits, RoutePlan
+from robochoc.flight.coordination.spacing import TooCloseError
+from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.flight.flight import Flight, fly
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Goal
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.separation import SeparationMonitor
-from robochoc.flight.routes.motion import MotionLimits, RoutePlan
-from robochoc.flight.routes.spacing import TooCloseError
-from robochoc.flight.routes.timetable import plan_routes
 from tests.support.cases import looped
 from tests.support.flights import planar
 

@@ -9,17 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robochoc.flight.flight import Flight, fly
+from robochoc.flight.coordination.move_order import NoRouteError
+from robochoc.flight.coordination.spacing import TooCloseError
+from robochoc.flight.flight import Flight, check_length, fly
 from robochoc.flight.layout import Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import GRAVITY
-from robochoc.flight.quadrotor.bounds import check_length
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.reports import Blocked, OutOfOrder
-from robochoc.flight.routes.move_order import NoRouteError
-from robochoc.flight.routes.spacing import TooCloseError
 from tests.support.cases import looped
 from tests.support.flights import planar
 

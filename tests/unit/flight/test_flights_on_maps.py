@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from robochoc.flight.flight import fly
 from robochoc.flight.mission import Mission, mission_of
-from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.preview import preview_of
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
-from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.generators.maps.formation import formation
-from robochoc.generators.maps.reach import MapChoice
+from robochoc.generators.maps.map_team import MapChoice
 from robochoc.maps.ground_map import GroundMap, ground_map_json, read_ground_map
+from robochoc.maps.routes.floor_plan import FloorPlan
+from robochoc.maps.walls import PixelFrame
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
 from tests.support.examples import examples

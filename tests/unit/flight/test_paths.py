@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.flight.routes.motion import Motion, MotionLimits, RoutePlan
-from robochoc.flight.routes.move_order import NoRouteError
-from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, TooCloseError, norms, segment_distances
-from robochoc.flight.routes.timetable import plan_routes
+from robochoc.flight.coordination.motion import Motion, MotionLimits, RoutePlan
+from robochoc.flight.coordination.move_order import NoRouteError
+from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.spacing import TooCloseError
+from robochoc.flight.coordination.timetable import plan_routes
+from robochoc.maps.routes.distances import Array, norms, segment_distances
 from tests.support.cases import looped
 from tests.support.examples import examples
 

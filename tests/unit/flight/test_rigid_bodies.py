@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.flight.layout import Point
 from robochoc.flight.quadrotor.airframe import GRAVITY, HUMMINGBIRD, Airframe, Array
 from robochoc.flight.quadrotor.control import Controller
 from robochoc.flight.quadrotor.rigid_bodies import RigidBodies
 from robochoc.flight.quadrotor.simulation import DT
-from robochoc.flight.routes.timetable import plan_routes
 
 CALM = np.zeros((3, 1))
 OFF = np.zeros((4, 1))

@@ -9,18 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robochoc.flight.coordination.motion import MotionLimits
+from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.flight.log import ClosestApproach
 from robochoc.flight.mission import Goal
 from robochoc.flight.quadrotor.airframe import Array
-from robochoc.flight.quadrotor.attitude import quaternions
 from robochoc.flight.quadrotor.free_points import free_point, nearest_distances
 from robochoc.flight.quadrotor.goals import Hazards, LegGoals, start_delays
 from robochoc.flight.quadrotor.separation import SeparationMonitor
-from robochoc.flight.quadrotor.simulation import DT
+from robochoc.flight.quadrotor.simulation import DT, Wind, quaternions
 from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
-from robochoc.flight.quadrotor.wind import Wind
-from robochoc.flight.routes.motion import MotionLimits
-from robochoc.flight.routes.timetable import plan_routes
 from tests.support.examples import examples
 
 

@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team, read_team, write_team
-from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage, worth_of_a_cell
-from robochoc.generators.maps.reach import MapChoice, reach_of
-from robochoc.generators.maps.room import room_on
-from robochoc.generators.maps.sight import sight_on
+from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.maps.occupancy.grid import read_occupancy_grid
+from robochoc.maps.reachability.cells import Cells
+from robochoc.maps.reachability.free_space import free_space
+from robochoc.maps.reachability.line_of_sight import sight_on
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.cases import looped
@@ -63,13 +63,13 @@ def test_walls_are_in_the_way(columns: int, rows: int, seed: int, corner: str, s
     drawn = drawn_rows(Random(seed), columns, rows, 0.15)
     with TemporaryDirectory() as folder:
         grid = read_occupancy_grid(write_map(Path(folder), drawn, origin=f"[{corner}, -0.25, 0]"))
-    cells = Cells(grid, Fraction(side), room_on(grid.free, Fraction(0)))
+    cells = Cells(grid, Fraction(side), free_space(grid.free, Fraction(0)))
     assert sight_on(cells).seen(Fraction(sensing)) == seen_on(drawn, cells, Fraction(sensing))
 
 
 def least(choice: MapChoice, seed: int, sensing: Fraction, worth: Fraction) -> tuple[Fraction, Fraction]:
     """Return the least cost in pairs, and the least one if the union counted: by trying all, seen pixel by pixel."""
-    reach = reach_of(choice, Random(seed))
+    reach = reachability_of(choice, Random(seed))
     rows = ["".join(".#"[not free] for free in row) for row in reach.cells.grid.free[::-1]]
     assert isinstance(reach.cells, Cells)
     seen = seen_on(rows, reach.cells, sensing)

@@ -11,8 +11,9 @@ from random import Random
 
 from robochoc.formats import check_team, read_team, write_team
 from robochoc.generators.draws import uniform
+from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.generators.maps.patrol import drawn_points, patrol
-from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
+from robochoc.maps.reachability.reachability import Reachability
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -35,7 +36,9 @@ def test_a_seed_is_one_problem_everywhere() -> None:
     }
 
 
-def least(reach: Reach, idleness: dict[int, int], rounds: int, apart: int, within: Fraction | None) -> Fraction | None:
+def least(
+    reach: Reachability, idleness: dict[int, int], rounds: int, apart: int, within: Fraction | None
+) -> Fraction | None:
     """Return the least cost in seconds, by trying all plans, with ways found pixel by pixel."""
     grid = reach.cells.grid
     rows = ["".join(".#"[not free] for free in row) for row in grid.free[::-1]]
@@ -97,7 +100,7 @@ def test_patrols_cost_as_little_as_can_be(
     team = read_team(tmp_path / "team")
     check_team(team)
     chance = Random(seed)
-    reach = reach_of(choice, chance)
+    reach = reachability_of(choice, chance)
     idleness = {point: uniform(chance, 0, 40) for point in drawn_points(reach, points, chance)}
     wanted = least(reach, idleness, rounds, 6, None if within is None else Fraction(within))
     assert best(team) == wanted
@@ -116,7 +119,7 @@ def test_points_are_far_from_each_other(tmp_path: Path) -> None:
     """Gonzalez' theorem: at least half as far as they can be."""
     path = write_map(tmp_path, ["." * 6] * 4, origin="[-0.25, -0.25, 0]")
     choice = MapChoice(map=str(path), at="1,1", radius=0, cell=0.5)
-    reach = reach_of(choice, Random(0))
+    reach = reachability_of(choice, Random(0))
     places = {cell: complex(*map(float, reach.cells.centre(cell))) for cell in reach.reached}
 
     def nearest(points: Iterable[int]) -> float:

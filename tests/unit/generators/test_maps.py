@@ -15,15 +15,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team, read_team, write_team
-from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.formation import formation
-from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
-from robochoc.generators.maps.room import room_on
-from robochoc.generators.maps.sizes import cells_of, passable
-from robochoc.generators.maps.travel import UNREACHED, lengths_from
+from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.maps.ground_map import ground_map_json, read_ground_map
 from robochoc.maps.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
 from robochoc.maps.occupancy.packed import unpacked
+from robochoc.maps.reachability.cell_size import cells_of, passable
+from robochoc.maps.reachability.cells import Cells
+from robochoc.maps.reachability.free_space import free_space
+from robochoc.maps.reachability.path_lengths import UNREACHED, lengths_from
+from robochoc.maps.reachability.reachability import Reachability
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
@@ -102,7 +103,7 @@ def test_ways_are_the_shortest_and_cut_no_corner(columns: int, rows: int, seed: 
 def test_a_cell_is_free_where_all_its_pixels_are(columns: int, rows: int, seed: int, corner: str, side: str) -> None:
     drawn = drawn_rows(Random(seed), columns, rows, 0.1)
     grid = grid_of(drawn, resolution="0.5", origin=f"[{corner}, 0, 0]")
-    cells = Cells(grid, Fraction(side), room_on(grid.free, Fraction(0)))
+    cells = Cells(grid, Fraction(side), free_space(grid.free, Fraction(0)))
     free, known = free_pixels(drawn), set[tuple[int, int]]()
     for cell in range(cells.columns * cells.rows):
         x, y = cells.centre(cell)
@@ -168,12 +169,12 @@ def test_robots_reach_what_lies_in_no_other_room(columns: int, rows: int, seed: 
         choice = MapChoice(map=str(write_map(Path(folder), drawn)), agents=agents, radius=0.2, cell=0.5, speed=0.4)
         if len(free := free_pixels(drawn)) < agents:
             with pytest.raises(ValueError, match="free"):
-                reach_of(choice, Random(seed))
+                reachability_of(choice, Random(seed))
             return
         # Cells are pixels here, moved by half of one: each lies on a corner of four.
         path = Path(choice.map)
         path.write_text(path.read_text().replace("[0, 0, 0]", "[-0.25, -0.25, 0]"))
-        reach = reach_of(choice, Random(seed))
+        reach = reachability_of(choice, Random(seed))
     assert len(set(reach.starts)) == agents
     for (x, y), seconds in zip(reach.starts, reach.seconds, strict=True):
         start = int(x * 2), int(y * 2)
@@ -205,7 +206,7 @@ def disc_reaches(rows: list[str], start: tuple[float, float], radius: float) -> 
 @examples(25)
 def test_ways_lead_where_a_disc_of_the_radius_gets(columns: int, rows: int, seed: int, radius: str) -> None:
     drawn = drawn_rows(Random(seed), columns, rows, 0.2)
-    room = room_on(grid_of(drawn).free, Fraction(radius))
+    room = free_space(grid_of(drawn).free, Fraction(radius))
     for row, column in np.argwhere(room.passable).tolist()[:2]:
         found = pixels(lengths_from((row, column), room.passable, None, room.joined) != UNREACHED)
         parts = room.parts
@@ -232,7 +233,7 @@ def test_a_door_is_a_way_for_robots_that_fit_through(
 def reached_halves(folder: Path, rows: list[str], side: str, at: str, radius: float) -> set[bool]:
     """Return in which halves of a map, above its diagonal and below it, a robot gets to cells of half a metre."""
     path = write_map(folder, rows, resolution=side)
-    reach = reach_of(MapChoice(map=str(path), at=at, radius=radius, cell=0.5), Random(0))
+    reach = reachability_of(MapChoice(map=str(path), at=at, radius=radius, cell=0.5), Random(0))
     middle = Fraction(side) * (len(rows) + len(rows[0])) / 2
     return {sum(reach.cells.centre(cell)) > middle for cell in reach.reached}
 
@@ -246,7 +247,9 @@ def test_a_robot_fits_between_pillars_at_two_corners_of_a_pixel_or_not(tmp_path:
 
 def test_who_has_little_time_gets_less_far(rooms: str) -> None:
     choice = MapChoice(map=rooms, at="1,1", cell=0.5, radius=0, speed=0.5)
-    near, far = (reach_of(MapChoice(**{**vars(choice), "within": time}), Random(0)).seconds[0] for time in (2.0, None))
+    near, far = (
+        reachability_of(MapChoice(**{**vars(choice), "within": time}), Random(0)).seconds[0] for time in (2.0, None)
+    )
     assert near == {cell: time for cell, time in far.items() if time <= 20}
     assert 0 < len(near) < len(far)
 
@@ -254,7 +257,7 @@ def test_who_has_little_time_gets_less_far(rooms: str) -> None:
 # Formations
 
 
-def check_answer(team: Team, reach: Reach, assignment: dict[str, int]) -> None:
+def check_answer(team: Team, reach: Reachability, assignment: dict[str, int]) -> None:
     """Hold an answer against the map: all cells are different, and ways lead there over pixels that are passable."""
     assert len(set(assignment.values())) == len(team.robots)
     fits = pixels(reach.cells.passable)
@@ -286,7 +289,7 @@ def test_formations_take_as_little_time_as_can_be(
     write_team(made, tmp_path / "team")
     team = read_team(tmp_path / "team")
     check_team(team)
-    reach = reach_of(choice, Random(seed))
+    reach = reachability_of(choice, Random(seed))
     slots = sorted({cell for variable in made.variables.values() for cell in variable.domain})
     assert len(slots) == 4
     totals = [
@@ -310,7 +313,7 @@ def test_waypoints_are_metres_in_the_frame_of_the_map(tmp_path: Path) -> None:
     path = str(write_map(tmp_path, ROOMS, origin="[-7.3, 4.1, 0]"))
     choice = MapChoice(map=path, agents=2, radius=0)
     team, ground = formation(choice, 1)
-    reach = reach_of(choice, Random(1))
+    reach = reachability_of(choice, Random(1))
     assert ground.first == reach.cells.first != (0, 0)
     for protocol in ("dpop", "central"):
         check_answer(team, reach, answers(team, protocol)[1])
@@ -322,7 +325,7 @@ def test_slots_are_where_the_shape_is(tmp_path: Path) -> None:
     choice = MapChoice(map=path, at="1,1 1,2 1,3 1,4", radius=0, cell=0.5)
 
     cells = Cells(
-        read_occupancy_grid(Path(path)), Fraction(1, 2), room_on(np.ones((20, 20), dtype=np.bool_), Fraction(0))
+        read_occupancy_grid(Path(path)), Fraction(1, 2), free_space(np.ones((20, 20), dtype=np.bool_), Fraction(0))
     )
 
     def slots(shape: str, heading: float = 0.0) -> list[tuple[float, float]]:

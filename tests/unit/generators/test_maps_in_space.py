@@ -17,14 +17,14 @@ from hypothesis import strategies as st
 
 from robochoc.formats import check_team, read_team, write_team
 from robochoc.generators.maps.coverage import coverage
-from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.generators.maps.patrol import patrol
-from robochoc.generators.maps.reach import MapChoice, reach_of
-from robochoc.generators.maps.sight import sight_on
-from robochoc.generators.maps.sizes import cells_of, passable
-from robochoc.generators.maps.travel import UNREACHED, lengths_from
 from robochoc.maps.octomap.voxels import VoxelGrid, read_voxels
+from robochoc.maps.reachability.cell_size import cells_of, passable
+from robochoc.maps.reachability.cells import Cubes
+from robochoc.maps.reachability.line_of_sight import sight_on
+from robochoc.maps.reachability.path_lengths import UNREACHED, lengths_from
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
@@ -170,7 +170,7 @@ def test_robots_reach_what_free_space_leads_to(
         path = write_octomap(Path(folder) / "plan.ot", voxels)
         choice = MapChoice(map=str(path), agents=agents, radius=radius, cell=0.5, speed=0.4, within=within)
         try:
-            reach = reach_of(choice, Random(seed))
+            reach = reachability_of(choice, Random(seed))
         except ValueError as error:
             assert "free" in str(error)  # noqa: PT017 - not always
             return
@@ -263,7 +263,7 @@ def test_formations_are_as_cheap_as_can_be_and_drones_fit_there(tmp_path: Path) 
         write_team(made, tmp_path / f"{seed}")
         team = read_team(tmp_path / f"{seed}")
         check_team(team)
-        reach = reach_of(choice, Random(seed))
+        reach = reachability_of(choice, Random(seed))
         slots = sorted({cell for variable in made.variables.values() for cell in variable.domain})
         totals = [
             sum(reach.seconds[robot][slot] for robot, slot in enumerate(order))
@@ -288,11 +288,14 @@ def test_a_way_to_the_other_storey_leads_through_the_shaft(tmp_path: Path) -> No
     floor_of = {(x, y, 6): OCCUPIED for x in range(20) for y in range(6)}
     path = write_octomap(tmp_path / "closed.bt", voxels | floor_of, "0.25")
     choice = MapChoice(map=str(path), at="0.5,0.75,0.75", radius=0, cell=0.5, speed=0.25)
-    heights = {reach_of(choice, Random(0)).cells.centre(cell)[2] for cell in reach_of(choice, Random(0)).seconds[0]}
+    heights = {
+        reachability_of(choice, Random(0)).cells.centre(cell)[2]
+        for cell in reachability_of(choice, Random(0)).seconds[0]
+    }
     assert heights == {Fraction(1, 2), Fraction(1)}
     shaft = {at: kind for at, kind in floor_of.items() if at[0] < 16}
     write_octomap(path, voxels | shaft, "0.25")
-    reach = reach_of(choice, Random(0))
+    reach = reachability_of(choice, Random(0))
     above = next(
         cell for cell in reach.seconds[0] if reach.cells.centre(cell) == (Fraction(1, 2), Fraction(1, 2), Fraction(2))
     )
@@ -308,7 +311,7 @@ def test_other_teams_on_a_house_are_as_cheap_as_can_be(make: Callable[..., tuple
         check_team(team)
         cost, assignment = answers(team, "dpop")
         assert cost == best(team)
-        reach = reach_of(choice, Random(seed))
+        reach = reachability_of(choice, Random(seed))
         for robot in range(2):
             at = reach.cells.pixel(place_of(team, robot, assignment, reach.cells.side))
             assert at is not None

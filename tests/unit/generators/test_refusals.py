@@ -15,8 +15,8 @@ from robochoc.generators.graphs import grid, scale_free, small_world, tree, unif
 from robochoc.generators.ising import ising
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.map_team import MapChoice
 from robochoc.generators.maps.patrol import patrol
-from robochoc.generators.maps.reach import MapChoice
 from robochoc.generators.meetings import meetings
 from robochoc.generators.queens3d import MAX_N, QueensModel, queens3d
 from robochoc.generators.random_csp import random_csp, random_on
@@ -155,7 +155,7 @@ def test_too_many_constraints(monkeypatch: pytest.MonkeyPatch) -> None:
             (lambda: coverage(MapChoice(map=BUILDING, agents=2, cell=0.5)), "more than 10,000 pairs"),
         ]
     )
-    monkeypatch.setattr("robochoc.generators.maps.sight.MAX_PAIRS", 100)
+    monkeypatch.setattr("robochoc.maps.reachability.line_of_sight.MAX_PAIRS", 100)
     with pytest.raises(ValueError, match="pairs of cells are within the sensing range, more than 100"):
         coverage(MapChoice(map=BUILDING, agents=2))
 
@@ -183,8 +183,8 @@ def test_formations_on_a_map(tmp_path: Path) -> None:
             ({"agents": 101}, {}, "agents is 101; it must be from 1 to 100"),
             ({"at": "1;1"}, {}, "at has '1;1'; expected places in metres"),
             ({"at": "9,9"}, {}, "robot 1 at 9,9 is not on the map"),
-            ({"at": "0.2,1"}, {}, "robot 1 at 0.2,1 stands where it does not fit"),
-            ({"at": "0.7,1", "radius": 0.45}, {}, "robot 1 at 0.7,1 stands where it does not fit"),
+            ({"at": "0.2,1"}, {}, "robot 1 at 0.2,1 does not fit there"),
+            ({"at": "0.7,1", "radius": 0.45}, {}, "robot 1 at 0.7,1 does not fit there"),
             ({"radius": 3}, {}, "no pixel is free for a robot of the radius 3 m"),
             ({"radius": 51}, {}, "radius is 51 m, more than 100 pixels"),
             ({"speed": 0}, {}, "speed is 0"),
@@ -251,7 +251,7 @@ def test_teams_in_space() -> None:
             (lambda: patrol(house(agents=2), visit="1,1 2,2"), "visit has '1,1'; expected X,Y,Z"),
             (lambda: formation(house(at="1,1,1,1")), "at has '1,1,1,1'; expected places in metres"),
             (lambda: formation(house(at="1,1,99")), "robot 1 at 1,1,99 is not on the map"),
-            (lambda: formation(house(at="1,1,2.2")), "robot 1 at 1,1,2.2 stands where it does not fit"),
+            (lambda: formation(house(at="1,1,2.2")), "robot 1 at 1,1,2.2 does not fit there"),
             (lambda: formation(house(agents=2, radius=3)), "no voxel is free for a robot of the radius 3 m"),
             (lambda: formation(house(agents=2, radius=26)), "radius is 26 m, more than 100 pixels"),
             (lambda: formation(house(agents=2, cell=0.005)), "1701 columns, 1301 rows and 1001 levels"),

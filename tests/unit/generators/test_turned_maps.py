@@ -14,14 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.generators.maps.patrol import patrol
-from robochoc.generators.maps.reach import MapChoice, reach_of
-from robochoc.generators.maps.room import room_on
-from robochoc.generators.maps.sight import sight_on
 from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid
+from robochoc.maps.reachability.cells import Cells
+from robochoc.maps.reachability.free_space import free_space
+from robochoc.maps.reachability.line_of_sight import sight_on
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -90,7 +90,7 @@ def test_cells_of_turned_maps_are_squares_of_the_frame(
 ) -> None:
     drawn = drawn_rows(Random(seed), columns, rows, 0.15)
     grid = grid_of(drawn, origin=f"[{corner[0]}, {corner[1]}, {yaw:.12f}]")
-    cells = Cells(grid, Fraction(side), room_on(np.ones_like(grid.free), Fraction(0)))
+    cells = Cells(grid, Fraction(side), free_space(np.ones_like(grid.free), Fraction(0)))
     free, blocked = wanted_cells(drawn, cells, (float(corner[0]), float(corner[1])), float(f"{yaw:.12f}"))
     assert {cell: cell in cells.free for cell in free} == free
     assert {cell: cell in cells.blocked for cell in blocked} == blocked
@@ -114,7 +114,7 @@ def test_quarter_turns_are_those_of_the_image(tmp_path: Path, yaw: str) -> None:
         (tmp_path / folder).mkdir()
         write_map(tmp_path / folder, image, origin=origin)
     one, other = (
-        reach_of(MapChoice(map=str(tmp_path / name / "plan.yaml"), agents=2, radius=0, cell=0.25), Random(1))
+        reachability_of(MapChoice(map=str(tmp_path / name / "plan.yaml"), agents=2, radius=0, cell=0.25), Random(1))
         for name in ("turned", "drawn")
     )
     assert isinstance(one.cells, Cells)
@@ -157,7 +157,9 @@ def test_ways_on_turned_maps_take_the_time_of_the_image(
     with TemporaryDirectory() as folder:
         path = write_map(Path(folder), drawn, origin=f"[1, -2, {yaw:.12f}]")
         try:
-            reach = reach_of(MapChoice(map=str(path), agents=1, radius=radius, cell=0.25, speed=0.4), Random(seed))
+            reach = reachability_of(
+                MapChoice(map=str(path), agents=1, radius=radius, cell=0.25, speed=0.4), Random(seed)
+            )
         except ValueError:
             return
     cells = reach.cells
@@ -183,7 +185,7 @@ def test_lines_of_sight_on_a_turned_map_are_those_of_the_image() -> None:
     rows = ["....." + "#" + "....."] * 4 + ["." * 11] + ["....." + "#" + "....."] * 4
     yaw = 0.4
     grid = grid_of(rows, origin=f"[0, 0, {yaw}]")
-    cells = Cells(grid, Fraction(1, 2), room_on(grid.free, Fraction(0)))
+    cells = Cells(grid, Fraction(1, 2), free_space(grid.free, Fraction(0)))
     sight = sight_on(cells)
     found = sight.seen(Fraction(4))
     through = 0

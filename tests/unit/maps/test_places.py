@@ -10,8 +10,8 @@ import msgspec
 import pytest
 
 from robochoc.generators.maps.coverage import coverage
+from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.generators.maps.patrol import patrol
-from robochoc.generators.maps.reach import MapChoice, reach_of
 from robochoc.maps.ground_map import GroundMap
 from robochoc.maps.places import MapPlaces
 from robochoc.model.constraint import Domain, Variable
@@ -27,7 +27,7 @@ ROWS = ["......", "......", "..##..", "......", "......"]
 def test_they_are_the_centres_of_cells(tmp_path: Path, origin: str) -> None:
     choice = MapChoice(map=str(write_map(tmp_path, ROWS, origin=origin)), agents=2, radius=0, cell=0.5)
     team, ground = coverage(choice, 3)
-    cells = reach_of(choice, Random(3)).cells
+    cells = reachability_of(choice, Random(3)).cells
     places = MapPlaces(team, ground)
     for robot in team.robots:
         for variable in robot.variables:
@@ -39,7 +39,7 @@ def test_they_are_the_centres_of_cells(tmp_path: Path, origin: str) -> None:
 def test_so_they_are_of_later_visits_and_in_three_dimensions(tmp_path: Path) -> None:
     choice = MapChoice(map=str(write_map(tmp_path, ROWS)), agents=2, radius=0, cell=0.5)
     team, ground = patrol(choice, 1, points=4, rounds=2)
-    cells = reach_of(choice, Random(1)).cells
+    cells = reachability_of(choice, Random(1)).cells
     values = {name: variable.domain.ranges[0][0] for name, variable in team.variables.items()}
     assert MapPlaces(team, ground).of(values) == {
         name: tuple(map(float, cells.centre(value))) for name, value in values.items()

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from robochoc.flight.point_index import PointIndex
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.change import apply_changes
 from robochoc.model.expression import Expression, Type, parse
@@ -30,6 +29,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.robots.closed_loop import drones_of
+from robochoc.robots.point_index import PointIndex
 from robochoc.robots.situation import LIES_TIMES, Situation
 from robochoc.robots.source import ReceivedMessage
 from robochoc.ros.report_decoder import ReportDecoder

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from robochoc.flight.layout import Point
-from robochoc.flight.routes.spacing import line_distances
+from robochoc.maps.routes.distances import line_distances
 from robochoc.vehicles.fleet import Fence, Fleet, Link
 from robochoc.vehicles.messages import Target
 from robochoc.vehicles.route_planner import RouteError, RoutePlanner, spacing

@@ -10,8 +10,7 @@ import pytest
 
 from robochoc.flight.layout import Axis
 from robochoc.flight.mission import Mission
-from robochoc.flight.voxel_frame import VoxelFrame
-from robochoc.flight.walls import Walls
+from robochoc.maps.walls import VoxelFrame, Walls
 from robochoc.view.footprints import Flags, few_rectangles, rectangles
 from robochoc.view.quadrotor import prisms
 from robochoc.view.voxel_faces import faces, faces_drawn

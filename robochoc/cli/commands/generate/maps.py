@@ -22,10 +22,10 @@ from robochoc.cli.options.sections import COMMON, SectionedCommand
 from robochoc.cli.options.value_types import Number, WholeNumber
 
 if TYPE_CHECKING:
-    from robochoc.generators.maps.reach import MapChoice
+    from robochoc.generators.maps.map_team import MapChoice
 
 MAX_ROBOTS, MAX_CELLS = 100, 1000
-"""The limits of `generators/maps/reach.py`, repeated since that module is not imported at the start."""
+"""The limits of `generators/maps/map_team.py`, repeated since that module is not imported at the start."""
 ON_MAP = ("--radius", "--speed", "--within", "--cell", "--cells")
 """The options in the section on robots and cells."""
 _MAP_PARAMETERS = ("map", "agents", "at", "radius", "speed", "within", "cell", "cells")
@@ -80,7 +80,7 @@ def map_options(command: Command) -> Command:
 
 def pop_map_choice(options: Options) -> MapChoice:
     """Remove the options of maps from `options`, and return the choice of map, robots and cells."""
-    from robochoc.generators.maps.reach import MapChoice
+    from robochoc.generators.maps.map_team import MapChoice
 
     given = {key: options.pop(key) for key in _MAP_PARAMETERS}
     return MapChoice(**{**given, "map": str(Path(given["map"]))})

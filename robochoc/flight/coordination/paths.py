@@ -25,8 +25,9 @@ from itertools import product
 
 import numpy as np
 
-from robochoc.flight.routes.floor_plan import FloorPlan
-from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, Spacing, norms, segment_distances
+from robochoc.flight.coordination.spacing import Spacing
+from robochoc.maps.routes.distances import SLACK_M, Array, Flags, norms, segment_distances
+from robochoc.maps.routes.floor_plan import FloorPlan
 
 Column = Array
 """The x and the y of a vertical line."""

@@ -16,9 +16,8 @@ from math import lcm
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.generators.maps.cells import Cells
-from robochoc.generators.maps.cubes import Cubes
-from robochoc.generators.maps.sizes import AnyCells, Place
+from robochoc.maps.reachability.cell_size import AnyCells
+from robochoc.maps.reachability.cells import Cells, Cubes, Place
 
 MAX_PAIRS = 100_000
 """The maximum number of pairs of cells within the sensing range."""

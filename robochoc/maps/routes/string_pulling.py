@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from robochoc.flight.routes.spacing import Array, norms
+from robochoc.maps.routes.distances import Array, norms
 
 Sees = Callable[[Array, Array, float], bool]
 """Returns whether a straight line between two points keeps a distance from all walls."""

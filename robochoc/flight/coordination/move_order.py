@@ -8,7 +8,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from robochoc.flight.routes.spacing import Array, Spacing, norms
+from robochoc.flight.coordination.spacing import Spacing
+from robochoc.maps.routes.distances import Array, norms
 from robochoc.system.errors import TransferableError
 
 _Space = TypeVar("_Space", bound=Spacing)

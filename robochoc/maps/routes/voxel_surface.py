@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.routes.spacing import Array, Flags, norms, segment_distances
+from robochoc.maps.routes.distances import Array, Flags, norms, segment_distances
 
 _BLOCK = 4
 """The side of a block."""

@@ -1,7 +1,7 @@
 """Shortest ways on a lattice of points that are far enough from all walls, in the plane or in space.
 
 A* (Hart, Nilsson, Raphael 1968) on the points with eight neighbours, or 26, in integers: steps of 15, 21 and 26 as in
-the travel times of generated teams (`generators/maps/travel.py`), four times as long where walls are far, five times
+the travel times of generated teams (`reachability/path_lengths.py`), four times as long where walls are far, five times
 where they are near. Points whose estimates differ by less than a step are looked at together, and again if a shorter
 way to them is found.
 
@@ -20,8 +20,8 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.routes.spacing import Array, Flags, norms
-from robochoc.maps.occupancy.lattice import quarters
+from robochoc.maps.occupancy.clearance import quarters
+from robochoc.maps.routes.distances import Array, Flags, norms
 
 _LENGTHS = (15, 21, 26)
 """The lengths of steps along one axis, two and three."""

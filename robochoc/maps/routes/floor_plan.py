@@ -3,7 +3,7 @@
 Walls are the pixels of a map that are not free, and all that lies beside the map. A drone keeps `keep` metres between
 its centre and the nearest border of such a pixel, measured exactly: not between centres of pixels.
 
-A way is found on a lattice (`lattice.py`), and then pulled taut (`taut.py`).
+A way is found on a lattice (`lattice.py`), and then pulled taut (`string_pulling.py`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.pixel_frame import PixelFrame
-from robochoc.flight.routes.lattice import Lattice
-from robochoc.flight.routes.spacing import Array, Flags
-from robochoc.flight.routes.taut import taut
-from robochoc.maps.occupancy.lattice import clearances, parts_of
+from robochoc.maps.occupancy.clearance import clearances, parts_of
+from robochoc.maps.routes.distances import Array, Flags
+from robochoc.maps.routes.lattice import Lattice
+from robochoc.maps.routes.string_pulling import taut
+from robochoc.maps.walls import PixelFrame
 
 SPARE_M = 0.1
 """Ways keep so much more than they have to, if that is no detour of more than a quarter."""

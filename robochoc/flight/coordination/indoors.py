@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.routes.move_order import Move, MoveOrder, NoRouteError
-from robochoc.flight.routes.spacing import Array, Flags, Spacing, norms, squashed
-from robochoc.flight.routes.voxel_plan import Resting, VoxelPlan
+from robochoc.flight.coordination.move_order import Move, MoveOrder, NoRouteError
+from robochoc.flight.coordination.spacing import Spacing
+from robochoc.maps.routes.distances import Array, Flags, norms, squashed
+from robochoc.maps.routes.voxel_plan import Resting, VoxelPlan
 
 _ORDERS = 6
 """The number of orders of precedence that are tried."""

@@ -23,14 +23,15 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.routes.indoors import Indoors, moves_indoors
-from robochoc.flight.routes.motion import MotionLimits, Route, RoutePlan
-from robochoc.flight.routes.move_order import Move
-from robochoc.flight.routes.moves import moves_between
-from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, Flags, check_spacing, closest_approach, norms, squashed
-from robochoc.flight.routes.voxel_plan import VoxelPlan
-from robochoc.flight.routes.wall_plan import WallPlan
+from robochoc.flight.coordination.indoors import Indoors, moves_indoors
+from robochoc.flight.coordination.motion import MotionLimits, Route, RoutePlan
+from robochoc.flight.coordination.move_order import Move
+from robochoc.flight.coordination.moves import moves_between
+from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.spacing import check_spacing
+from robochoc.maps.routes.distances import Array, Flags, closest_approach, norms, squashed
+from robochoc.maps.routes.voxel_plan import VoxelPlan
+from robochoc.maps.routes.wall_plan import WallPlan
 
 Steps = NDArray[np.int64]
 

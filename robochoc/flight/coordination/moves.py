@@ -23,9 +23,9 @@ from itertools import count, product, takewhile
 
 import numpy as np
 
-from robochoc.flight.routes.move_order import Move, MoveOrder, NoRouteError
-from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, Flags, norms
+from robochoc.flight.coordination.move_order import Move, MoveOrder, NoRouteError
+from robochoc.flight.coordination.paths import Space
+from robochoc.maps.routes.distances import Array, Flags, norms
 
 _RINGS = 20
 """The most rings of a distance away at which a drone waits in the sky where there are walls."""

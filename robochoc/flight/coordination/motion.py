@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.routes.spacing import Array, norms, squashed
+from robochoc.maps.routes.distances import Array, norms, squashed
 
 PEAK = 15 / 8
 """The greatest speed of minimum-jerk motion over a unit of length in a unit of time; half way."""

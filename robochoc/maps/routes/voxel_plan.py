@@ -2,7 +2,7 @@
 
 Walls are the voxels of a map that are not free, and all that lies outside of the map. A drone keeps `keep` metres
 between its centre and the nearest border of such a voxel. A way is found on a lattice (`lattice.py`), on a finer one
-where the first has none, and then pulled taut (`taut.py`). It may also keep from other drones.
+where the first has none, and then pulled taut (`string_pulling.py`). It may also keep from other drones.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from robochoc.flight.routes.floor_plan import CORNER_M, SPARE_M
-from robochoc.flight.routes.lattice import Lattice, Numbers
-from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, segment_distances, squashed
-from robochoc.flight.routes.taut import taut
-from robochoc.flight.routes.voxel_surface import VoxelSurface
-from robochoc.flight.voxel_frame import VoxelFrame
+from robochoc.maps.routes.distances import SLACK_M, Array, Flags, segment_distances, squashed
+from robochoc.maps.routes.floor_plan import CORNER_M, SPARE_M
+from robochoc.maps.routes.lattice import Lattice, Numbers
+from robochoc.maps.routes.string_pulling import taut
+from robochoc.maps.routes.voxel_surface import VoxelSurface
+from robochoc.maps.walls import VoxelFrame
 
 _FINE = (2, 4)
 """Points of the lattices in the distance that drones keep from walls."""

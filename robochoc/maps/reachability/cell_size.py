@@ -9,11 +9,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robochoc.generators.maps.cells import Cells
-from robochoc.generators.maps.cubes import Cubes
-from robochoc.generators.maps.room import room_on
 from robochoc.maps.map_file import Map
 from robochoc.maps.occupancy.grid import Flags, OccupancyGrid
+from robochoc.maps.reachability.cells import Cells, Cubes
+from robochoc.maps.reachability.free_space import free_space
 
 MAX_RADIUS = 100
 """The maximum radius of a robot, in pixels."""
@@ -21,8 +20,6 @@ MAX_SIDE = 1000
 """The maximum number of columns, of rows, and of levels of cells."""
 
 AnyCells: TypeAlias = Cells | Cubes
-Place: TypeAlias = tuple[Fraction, ...]
-"""The x and the y of a place in metres, and on three-dimensional maps its z."""
 
 
 def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = None) -> AnyCells:
@@ -57,10 +54,10 @@ def _sized(grid: Map, radius: Fraction) -> Callable[[Fraction], AnyCells]:
     """Return what makes the cells of a map, by their side. Raises `ValueError` where a robot fits nowhere."""
     nowhere = f"is free for a robot of the radius {float(radius):g} m; take a smaller radius"
     if isinstance(grid, OccupancyGrid):
-        room = room_on(grid.free, in_pixels(radius, grid.resolution))
-        if not room.points.any():
+        space = free_space(grid.free, in_pixels(radius, grid.resolution))
+        if not space.points.any():
             raise ValueError(f"no pixel {nowhere}")
-        return lambda side: Cells(grid, side, room)
+        return lambda side: Cells(grid, side, space)
     fits = passable(grid.free, grid.resolution, radius)
     if not fits.any():
         raise ValueError(f"no voxel {nowhere}")

@@ -10,10 +10,10 @@ from random import Random
 import numpy as np
 import pytest
 
-from robochoc.flight.pixel_frame import PixelFrame
-from robochoc.flight.routes.floor_plan import FloorPlan
-from robochoc.flight.routes.spacing import Array
-from robochoc.flight.routes.timetable import plan_routes
+from robochoc.flight.coordination.timetable import plan_routes
+from robochoc.maps.routes.distances import Array
+from robochoc.maps.routes.floor_plan import FloorPlan
+from robochoc.maps.walls import PixelFrame
 from tests.support.examples import count
 from tests.support.flights_on_maps import gaps, rooms
 from tests.support.maps import FREE, WALL, drawn_rows

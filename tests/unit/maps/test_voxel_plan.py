@@ -10,12 +10,12 @@ from random import Random
 import numpy as np
 import pytest
 
-from robochoc.flight.routes.move_order import NoRouteError
-from robochoc.flight.routes.spacing import Array
-from robochoc.flight.routes.timetable import plan_routes
-from robochoc.flight.routes.voxel_plan import Resting, VoxelPlan
-from robochoc.flight.voxel_frame import VoxelFrame
+from robochoc.flight.coordination.move_order import NoRouteError
+from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.maps.octomap.voxels import read_voxels
+from robochoc.maps.routes.distances import Array
+from robochoc.maps.routes.voxel_plan import Resting, VoxelPlan
+from robochoc.maps.walls import VoxelFrame
 from tests.support.examples import count
 from tests.support.flights_in_space import gaps_in_space, house
 from tests.support.octomaps import FREE, Voxel, drawn_voxels, write_octomap

@@ -1,7 +1,7 @@
 """Room for robots on a map of the ground: where one of a radius fits, and from which pixel it gets to which.
 
 Distances are measured to the borders of pixels, so that no way leads through a door that is narrower than a robot. What
-fits is found on the lattice on which flights look for their ways (`maps/occupancy/lattice.py`): where two pixels are
+fits is found on the lattice on which flights look for their ways (`maps/occupancy/clearance.py`): where two pixels are
 joined, a flight gets from one to the other.
 """
 
@@ -14,14 +14,14 @@ from math import floor
 
 import numpy as np
 
+from robochoc.maps.occupancy.clearance import clearances, open_points, parts_of
 from robochoc.maps.occupancy.grid import Counts, Flags
-from robochoc.maps.occupancy.lattice import clearances, open_points, parts_of
 
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
+class FreeSpace:
     """Room for a robot. Lengths are in sides of a pixel.
 
     Attributes:
@@ -68,10 +68,10 @@ class Room:
         return self.points.reshape(rows, self.parts, columns, self.parts)
 
 
-def room_on(free: Flags, radius: Fraction) -> Room:
+def free_space(free: Flags, radius: Fraction) -> FreeSpace:
     """Return the room for a robot of a radius in pixels on a map of which some pixels are `free`."""
     solid, parts = ~free, parts_of(float(radius), free.size)
-    return Room(solid, float(radius), parts, _largest_groups(open_points(solid, float(radius), parts), parts))
+    return FreeSpace(solid, float(radius), parts, _largest_groups(open_points(solid, float(radius), parts), parts))
 
 
 def _largest_groups(points: Flags, parts: int) -> Flags:

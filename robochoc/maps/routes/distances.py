@@ -1,43 +1,23 @@
-"""Distances between points, straight lines, and what moves along them.
+"""Distances between points, straight lines and moving points.
 
 Lengths are in metres, arrays are of float64, a point is a row of three.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
-
-from robochoc.system.errors import TransferableError
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SLACK_M = 1e-10
-"""Rounding: nearer than the distance by no more than this is not too near."""
+"""The tolerance for rounding: points that are nearer than the distance by no more than this are not too near."""
 
 
 def squashed(points: Array, downwash: float) -> Array:
     """Return `points` (..., 3) with their heights divided by `downwash`: balls around them are tall ellipsoids here."""
     return np.asarray(points / np.array([1.0, 1.0, downwash]))
-
-
-class TooCloseError(TransferableError, ValueError):
-    """Two drones, or a drone and a standing point, would rest nearer to each other than the distance.
-
-    `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether
-    they are too close before they fly (`start`) or would be after it (`goal`).
-    """
-
-    def __init__(self, first: int, second: int, distance_m: float, where: Literal["start", "goal"]) -> None:
-        self.first = first
-        self.second = second
-        self.distance_m = distance_m
-        self.where = where
-        super().__init__(f"the {where}s of drones {first} and {second} are only {distance_m:.3g} m apart")
 
 
 def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
@@ -93,36 +73,3 @@ def closest_approach(apart: Array, later: Array) -> Array:
     share = -np.einsum("...c,...c->...", apart, change) / squared
     np.clip(share, 0, 1, out=share)
     return norms(apart + share[..., None] * change)
-
-
-def check_spacing(points: Array, standing: Array, distance: float, where: Literal["start", "goal"]) -> None:
-    """Raise `TooCloseError` for the nearest two of `points` and `standing`, one of `points` at least, if too near."""
-    count = len(points)
-    if not count:
-        return
-    everything = np.vstack((points, standing))
-    apart = norms(points[:, None] - everything[None])
-    apart[np.tril_indices(count, m=len(everything))] = np.inf
-    first, second = divmod(int(apart.argmin()), len(everything))
-    if apart[first, second] < distance - SLACK_M:
-        raise TooCloseError(first, second, float(apart[first, second]), where)
-
-
-@dataclass(frozen=True)
-class Spacing:
-    """The `distance` that drones keep from points at rest."""
-
-    distance: float
-
-    @property
-    def least(self) -> float:
-        """The distance, less rounding."""
-        return self.distance - SLACK_M
-
-    def near(self, origins: Array, ends: Array, points: Array) -> Flags:
-        """Return whether (K, P) straight lines come too near to `points` (P, 3)."""
-        return segment_distances(origins, ends, points) < self.least
-
-    def is_clear(self, path: Array, points: Array) -> bool:
-        """Return whether a path keeps the distance from `points`."""
-        return not self.near(path[:-1], path[1:], points).any()

@@ -1,0 +1,1 @@
+"""Routes of one robot through the free pixels or voxels of a map."""

@@ -1,0 +1,121 @@
+"""The walls of a mission's map, as data: what drones fly around, and how fast they are to be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.maps.ground_map import GroundMap, WallPixels
+from robochoc.maps.occupancy.packed import unpacked
+
+_Array = npt.NDArray[np.float64]
+
+
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """Walls, and the robots that fly around them. Lengths are in metres.
+
+    Attributes:
+        solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first. On a map in three
+            dimensions the voxels, by z, then y, then x.
+        occupied: Those of them that are occupied. Of the others nobody knows.
+        frame: Where they lie.
+        radius: The robots' radius.
+        speed: The mean speed of which the team was told, in m/s.
+    """
+
+    solid: Flags
+    occupied: Flags
+    frame: PixelFrame | VoxelFrame
+    radius: float
+    speed: float
+
+    def moved(self, by: Sequence[float] | npt.NDArray[np.float64], factor: float = 1.0) -> Walls:
+        """Return the walls with all lengths multiplied by `factor`, and then moved by an x, a y and a z."""
+        frame = self.frame.moved(by, factor)
+        return Walls(self.solid, self.occupied, frame, factor * self.radius, factor * self.speed)
+
+    @property
+    def unknown(self) -> Flags:
+        """The pixels, or voxels, that are neither free nor occupied."""
+        return self.solid & ~self.occupied
+
+
+def walls_of(ground: GroundMap | None) -> Walls | None:
+    """Return the walls on a map, if it has some."""
+    found = (ground.volume.walls if ground.volume else ground.walls) if ground else None
+    if found is None:
+        return None
+    shape = (found.rows, found.columns) if isinstance(found, WallPixels) else (found.levels, found.rows, found.columns)
+    free, occupied = (unpacked(content, *shape) for content in (found.free, found.occupied))
+    frame: PixelFrame | VoxelFrame
+    if isinstance(found, WallPixels):
+        frame = PixelFrame(found.resolution, found.corner, found.yaw)
+    else:
+        frame = VoxelFrame(found.resolution, found.corner)
+    return Walls(~free, occupied & ~free, frame, found.radius, found.speed)
+
+
+@dataclass(frozen=True)
+class PixelFrame:
+    """The place of a map's pixels. Lengths are in metres.
+
+    Attributes:
+        size: The side of a pixel.
+        corner: The x and the y of the lower left corner of the lower left pixel.
+        yaw: The counterclockwise angle, in radians, by which the pixels are turned around `corner`.
+    """
+
+    size: float
+    corner: tuple[float, float] = (0.0, 0.0)
+    yaw: float = 0.0
+
+    def moved(self, by: Sequence[float] | _Array, factor: float = 1.0) -> PixelFrame:
+        """Return the frame with all lengths multiplied by `factor`, and then moved by an x and a y."""
+        x, y = self.corner
+        return PixelFrame(factor * self.size, (factor * x + float(by[0]), factor * y + float(by[1])), self.yaw)
+
+    def in_pixels(self, points: _Array) -> _Array:
+        """Return points (K, 2), or (K, 3), in pixels (K, 2) from the lower left corner on."""
+        x, y = points[:, 0] - self.corner[0], points[:, 1] - self.corner[1]
+        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
+        return np.column_stack((cosine * x + sine * y, cosine * y - sine * x)) / self.size
+
+    def in_metres(self, places: _Array) -> _Array:
+        """Return points (K, 2) that are given in pixels."""
+        x, y = self.size * places[:, 0], self.size * places[:, 1]
+        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
+        return np.column_stack((cosine * x - sine * y + self.corner[0], sine * x + cosine * y + self.corner[1]))
+
+
+@dataclass(frozen=True)
+class VoxelFrame:
+    """The place of a map's voxels. Lengths are in metres.
+
+    Attributes:
+        size: The side of a voxel.
+        corner: The x, y and z of the lowest corner of the first voxel.
+    """
+
+    size: float
+    corner: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def moved(self, by: Sequence[float] | _Array, factor: float = 1.0) -> VoxelFrame:
+        """Return the frame with all lengths multiplied by `factor`, and then moved by an x, a y and a z."""
+        x, y, z = (factor * own + float(part) for own, part in zip(self.corner, by, strict=True))
+        return VoxelFrame(factor * self.size, (x, y, z))
+
+    def in_voxels(self, points: _Array) -> _Array:
+        """Return points (K, 3) in voxels from the lowest corner on."""
+        return np.asarray((points - np.array(self.corner)) / self.size)
+
+    def in_metres(self, places: _Array) -> _Array:
+        """Return points (K, 3) that are given in voxels."""
+        return np.asarray(places * self.size + np.array(self.corner))
