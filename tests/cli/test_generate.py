@@ -126,7 +126,7 @@ def test_what_does_not_fit_is_wrong_usage(tmp_path: Path) -> None:
             ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),
             ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
             ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
-            (f"formation --map {BUILDING}", "agents is missing, as at names no places"),
+            (f"formation --map {BUILDING}", "agents is missing: give the number of robots, or their places with at"),
             (
                 f"formation --map {BUILDING} --agents 2 --anchor 80,2.5",
                 "the anchor 80,2.5 is not on the map, which lies between -0.25,-0.25 and 10.25,6.25",

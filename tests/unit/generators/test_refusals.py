@@ -179,7 +179,7 @@ def test_formations_on_a_map(tmp_path: Path) -> None:
     with cases() as each:
         for how, shape, said in (
             ({"agents": None}, {}, "agents is missing"),
-            ({"agents": 3, "at": "1,1 2,1"}, {}, "agents is 3, and at has 2 places"),
+            ({"agents": 3, "at": "1,1 2,1"}, {}, "agents is 3, but at has 2 places"),
             ({"agents": 101}, {}, "agents is 101; it must be from 1 to 100"),
             ({"at": "1;1"}, {}, "at has '1;1'; expected places in metres"),
             ({"at": "9,9"}, {}, "robot 1 at 9,9 is not on the map"),
