@@ -14,7 +14,7 @@ from measure import FailedError
 
 from robochoc.formats import write_team
 from robochoc.formats.dialects.dialect import ExportOptions
-from robochoc.formats.dialects.registry import dialect_called
+from robochoc.formats.dialects.registry import find_dialect
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.constraint import INFINITE, Constraint, Domain, Predicate, Relation, Semantics
@@ -130,7 +130,7 @@ def _forbidden(constraint: Constraint, domains: Mapping[str, Domain]) -> Iterato
 
 
 def _exported(team: Team, name: str) -> bytes:
-    dialect = dialect_called(name)
+    dialect = find_dialect(name)
     if dialect is None or dialect.write is None:
         raise FailedError(f"no export to {name}")
     (content,) = dialect.write(team, ExportOptions()).files.values()

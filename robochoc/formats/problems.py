@@ -13,7 +13,7 @@ from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
 
 if TYPE_CHECKING:
-    from robochoc.formats.dialects.dialect import Note
+    from robochoc.formats.dialects.dialect import ConversionNote
 
 
 class ReadProblem(NamedTuple):
@@ -24,13 +24,13 @@ class ReadProblem(NamedTuple):
         names: The original names of its robots and variables.
         foreign: Whether it is known by these alone: it is in a file of another tool.
         notes: What reading such a file has changed.
-        bound: What its format takes for no solution; see `Imported`.
+        bound: What its format takes for no solution; see `ImportResult`.
     """
 
     team: Team
     names: Mapping[str, str]
     foreign: bool
-    notes: tuple[Note, ...] = ()
+    notes: tuple[ConversionNote, ...] = ()
     bound: Fraction | None = None
 
 
@@ -56,10 +56,10 @@ def read_problem(
         InvalidInputError: with the mistakes of the files, and for options of a file where there is a folder.
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
-    from robochoc.formats.dialects.registry import read_foreign, recognise, recognised  # noqa: PLC0415 - as above
+    from robochoc.formats.dialects.registry import read_foreign, recognise, recognise_or_raise  # noqa: PLC0415 - as above
     from robochoc.formats.names_file import original_names  # noqa: PLC0415 - as above
 
-    if place.is_file() and (dialect or more or recognised(place)):
+    if place.is_file() and (dialect or more or recognise_or_raise(place)):
         options = ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code)
         imported = read_foreign([place, *more], options, dialect)
         check_team(imported.team)

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.dialect import Names
+from robochoc.formats.dialects.dialect import NameMap
 from robochoc.formats.dialects.xcsp3.objective import split
 from robochoc.formats.dialects.xcsp3.posting import Posting
-from robochoc.formats.dialects.xcsp3.scheduling import Task, post_tasks
+from robochoc.formats.dialects.xcsp3.scheduling import ScheduledTask, post_tasks
 from robochoc.formats.dialects.xcsp3.tables import choose
-from robochoc.formats.dialects.xcsp3.terms import INVERSE, TRUE, Condition, some
+from robochoc.formats.dialects.xcsp3.terms import INVERSE, TRUE, Xcsp3Condition, disjunction
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
@@ -108,7 +108,7 @@ class _Robots:
     """
 
     def __init__(self, owned: Mapping[str, str]) -> None:
-        self.names = Names()
+        self.names = NameMap()
         self._owned = owned
         self._further: dict[str, str] = {}
         self._owner = ""
@@ -119,22 +119,24 @@ class _Robots:
 
     def add(self, variable: Any, posting: Posting) -> Expression:  # noqa: ANN401 - CPMpy's expressions
         """Add a further variable to `posting`, and return it."""
-        made = posting.add_variable(self.names.of(_pretty(variable.name)), _values(variable), "part of a decomposition")
+        made = posting.add_variable(
+            self.names.allowed(_pretty(variable.name)), _values(variable), "part of a decomposition"
+        )
         self._further[made.name] = self._owner
         return made
 
     def variables(self, posting: Posting) -> dict[str, list[Variable]]:
         """Return the variables of each robot."""
-        names = Names()
+        names = NameMap()
         robots: dict[str, list[Variable]] = {}
         robot_names: dict[str, str] = {}
         for original, ours in posting.names.items():
             robot = self._owned[original]
-            robot_names.setdefault(robot, names.of(ours if robot == original else robot))
+            robot_names.setdefault(robot, names.allowed(ours if robot == original else robot))
             domain = Domain(f"d_{ours}", (_as_range(posting.values[original]),))
             robots.setdefault(robot_names[robot], []).append(Variable(ours, domain))
         for ours, robot in self._further.items():
-            domain = Domain(f"d_{ours}", (_as_range(posting.extra[ours].values),))
+            domain = Domain(f"d_{ours}", (_as_range(posting.auxiliaries[ours].values),))
             robots[robot_names[robot]].append(Variable(ours, domain))
         return robots
 
@@ -169,12 +171,12 @@ def _as_range(values: Sequence[int]) -> range:
     return range(values[0], values[-1] + 1)
 
 
-def _posting(own: Mapping[str, Any], names: Names) -> Posting:
+def _posting(own: Mapping[str, Any], names: NameMap) -> Posting:
     """Return the variables of a CPMpy model, without constraints."""
     values = {name: _values(variable) for name, variable in own.items()}
     pretty = {name: _pretty(name) for name in own}
     clear = len(set(pretty.values())) == len(pretty)
-    ours = {name: names.of(pretty[name] if clear else name) for name in own}
+    ours = {name: names.allowed(pretty[name] if clear else name) for name in own}
     domains = {name: (part,) for name, part in values.items()}
     return Posting(Variables(dict(domains)), {name: tuple(part) for name, part in values.items()}, {}, ours)
 
@@ -192,7 +194,7 @@ def _post_definitions(translation: Translation) -> None:
             _post(constraint, translation)
         else:
             undefined = Apply("not", (defined,))
-            translation.posting.post(some([undefined, translation.boolean(constraint)]))
+            translation.posting.post(disjunction([undefined, translation.boolean(constraint)]))
 
 
 def _post(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
@@ -248,7 +250,7 @@ def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: A
     if not _is_element(left):
         return False
     indexes, cells = translation.cells(left.args)
-    choose(translation.posting, indexes, cells, Condition(operator, translation.integer(right)))
+    choose(translation.posting, indexes, cells, Xcsp3Condition(operator, translation.integer(right)))
     return True
 
 
@@ -272,7 +274,7 @@ def _post_cumulative(constraint: Any, translation: Translation) -> bool:  # noqa
     if ends and ends[0] is not None:
         for start, duration, end in zip(columns[0], columns[1], translation.integers(_flat(ends[0])), strict=True):
             posting.post(translation.sum_is(start, duration, end))
-    post_tasks(list(map(Task, *columns)), Condition("le", translation.integer(capacity)), posting)
+    post_tasks(list(map(ScheduledTask, *columns)), Xcsp3Condition("le", translation.integer(capacity)), posting)
     return True
 
 

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.xcsp3.kinds import distinct
+from robochoc.formats.dialects.xcsp3.constraints import distinct
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.terms import (
     FALSE,
@@ -23,10 +23,10 @@ from robochoc.formats.dialects.xcsp3.terms import (
     as_boolean,
     as_integer,
     compare,
-    every,
-    inside,
+    conjunction,
+    disjunction,
+    is_one_of,
     plus,
-    some,
     times,
     total,
 )
@@ -138,7 +138,7 @@ class Translation:
         if term.name in _BOOLEANS:
             return _BOOLEANS[term.name](self, term.args)
         if hasattr(term, "decompose") and term.is_bool():
-            return every(self.booleans(self.decomposed(term)))
+            return conjunction(self.booleans(self.decomposed(term)))
         if is_variable(term) or term.name in _INTEGERS or hasattr(term, "decompose"):
             return compare("ne", self.integer(term), Constant(0))
         raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "rewrite it with other operators")
@@ -208,7 +208,7 @@ class Translation:
         indexes, cells = self.cells(terms)
         chosen = []
         for place, cell in cells.items():
-            here = every([compare("eq", *pair) for pair in zip(indexes, map(Constant, place), strict=True)])
+            here = conjunction([compare("eq", *pair) for pair in zip(indexes, map(Constant, place), strict=True)])
             chosen.append(times(as_integer(here), cell))
         return total([part for part in chosen if part != Constant(0)])
 
@@ -220,14 +220,16 @@ class Translation:
         for index, size in zip(indexes, shape, strict=True):
             low, high = self.limits(index)
             if low < 0 or high >= size:
-                self.has_value_if(inside(index, range(size)))
+                self.has_value_if(is_one_of(index, range(size)))
         return indexes, dict(zip(itertools.product(*map(range, shape)), members, strict=True))
 
     def table(self, terms: Sequence[Any]) -> Expression:
         """Return the condition that a list of terms equals a row of a table."""
         members = self.integers(terms[0])
         rows = [[Constant(integer_of(value)) for value in row] for row in terms[1]]
-        return some([every([compare("eq", *pair) for pair in zip(members, row, strict=True)]) for row in rows])
+        return disjunction(
+            [conjunction([compare("eq", *pair) for pair in zip(members, row, strict=True)]) for row in rows]
+        )
 
     def pairs(self, terms: Iterable[Any]) -> Iterable[tuple[Expression, Expression]]:
         """Return all pairs of elements of a list."""
@@ -255,7 +257,7 @@ def _guarded(conditions: Sequence[Expression], found: Expression) -> Expression:
         value = Apply("if", (condition, value, Constant(0)))
     always = [one for one in conditions if not may_be_undefined(one)]
     if always:
-        value = Apply("if", (every(always), value, Constant(0)))
+        value = Apply("if", (conjunction(always), value, Constant(0)))
     return as_boolean(value)
 
 
@@ -276,7 +278,7 @@ def _negated(expression: Expression) -> Expression:
 
 
 def _domain(translation: Translation, terms: Sequence[Any]) -> Expression:
-    return inside(translation.integer(terms[0]), [integer_of(value) for value in terms[1]])
+    return is_one_of(translation.integer(terms[0]), [integer_of(value) for value in terms[1]])
 
 
 _INTEGERS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
@@ -300,21 +302,21 @@ _INTEGERS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
 _BOOLEANS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
     **{name: _compared(operator) for name, operator in COMPARISONS.items()},
     "boolval": lambda _, args: TRUE if bool(args[0]) else FALSE,
-    "and": lambda t, args: every(t.booleans(args)),
-    "or": lambda t, args: some(t.booleans(args)),
-    "->": lambda t, args: some([_negated(t.boolean(args[0])), t.boolean(args[1])]),
+    "and": lambda t, args: conjunction(t.booleans(args)),
+    "or": lambda t, args: disjunction(t.booleans(args)),
+    "->": lambda t, args: disjunction([_negated(t.boolean(args[0])), t.boolean(args[1])]),
     "not": lambda t, args: _negated(t.boolean(args[0])),
     "xor": lambda t, args: compare(
         "eq", Apply("mod", (total([as_integer(one) for one in t.booleans(args)]), Constant(2))), Constant(1)
     ),
-    "ite": lambda t, args: every(
+    "ite": lambda t, args: conjunction(
         [
-            some([_negated(t.boolean(args[0])), t.boolean(args[1])]),
-            some([t.boolean(args[0]), t.boolean(args[2])]),
+            disjunction([_negated(t.boolean(args[0])), t.boolean(args[1])]),
+            disjunction([t.boolean(args[0]), t.boolean(args[2])]),
         ]
     ),
-    "alldifferent": lambda t, args: every([compare("ne", *pair) for pair in t.pairs(args)]),
-    "allequal": lambda t, args: every([compare("eq", *pair) for pair in itertools.pairwise(t.integers(args))]),
+    "alldifferent": lambda t, args: conjunction([compare("ne", *pair) for pair in t.pairs(args)]),
+    "allequal": lambda t, args: conjunction([compare("eq", *pair) for pair in itertools.pairwise(t.integers(args))]),
     "table": lambda t, args: t.table(args),
     "negative_table": lambda t, args: _negated(t.table(args)),
     "indomain": _domain,

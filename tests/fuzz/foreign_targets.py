@@ -10,8 +10,8 @@ from random import Random
 
 from robochoc.cli.reports.notes import note_lines
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions
-from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, ImportOptions, ImportResult
+from robochoc.formats.dialects.registry import find_dialect, read_foreign, recognise
 from robochoc.formats.names_file import NAMES_FILE, names_json, original_names
 from robochoc.model.problem import Team
 from robochoc.solver.errors import UnsupportedError
@@ -53,7 +53,7 @@ def _written(dialect: Dialect, team: Team) -> dict[str, bytes]:
 @cache
 def exported(name: str, *shown: str) -> Sequence[bytes]:
     """Files in the dialect called `name`: those that are `shown`, and what some random problems make."""
-    dialect = dialect_called(name)
+    dialect = find_dialect(name)
     assert dialect is not None, f"there is no dialect {name}"
     chance = Random(3)
     made = [text.encode() for text in shown]
@@ -82,7 +82,7 @@ def check_several(content: bytes) -> bool:
         return _checked(lambda: read_foreign(paths, OPTIONS[0], "frodo")) is not None
 
 
-def _checked(read: Callable[[], Imported]) -> Team | None:
+def _checked(read: Callable[[], ImportResult]) -> Team | None:
     """Return the team that is read, which others can read from its files; None where it is refused."""
     try:
         imported = read()

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from robochoc.formats import InvalidInputError, check_team
-from robochoc.formats.dialects.dialect import ExportOptions, Imported, ImportOptions
-from robochoc.formats.dialects.registry import dialect_called, read_foreign
+from robochoc.formats.dialects.dialect import ExportOptions, ImportOptions, ImportResult
+from robochoc.formats.dialects.registry import find_dialect, read_foreign
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import INFINITE, Constraint, Domain, Function, Predicate, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits, common_units
@@ -69,7 +69,7 @@ def optimum(team: Team) -> Fraction | None:
     return best
 
 
-def imported(text: str, folder: Path, name: str = "problem.xml", **options: Any) -> Imported:  # noqa: ANN401
+def imported(text: str, folder: Path, name: str = "problem.xml", **options: Any) -> ImportResult:  # noqa: ANN401
     """What is imported of a file with this text."""
     path = folder / name
     path.write_text(text, encoding="utf-8")
@@ -86,7 +86,7 @@ def refused(text: str, folder: Path, name: str = "problem.xml", **options: Any) 
 
 def written(name: str, team: Team, *, intension: bool = False) -> Mapping[str, bytes]:
     """The files of `team` in the format `name`."""
-    dialect = dialect_called(name)
+    dialect = find_dialect(name)
     assert dialect
     assert dialect.write
     return dialect.write(team, ExportOptions(intension=intension)).files

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import InvalidInputError
-from robochoc.formats.dialects.dialect import Imported, ImportOptions
+from robochoc.formats.dialects.dialect import ImportOptions, ImportResult
 from robochoc.formats.dialects.registry import read_foreign
 
 LIST = """robots:
@@ -26,7 +26,7 @@ distance: streets
 """
 
 
-def imported(text: str, folder: Path, infinity: int | None = None) -> Imported:
+def imported(text: str, folder: Path, infinity: int | None = None) -> ImportResult:
     path = folder / "tasks.yaml"
     path.write_text(text)
     return read_foreign([path], ImportOptions(infinity=infinity))

@@ -16,7 +16,7 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.formats import Diagnostic, InvalidInputError, read_team, write_team
 from robochoc.formats.diagnostics import invalid_input
 from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.registry import beginning_of, read_foreign, recognise, unknown_format
+from robochoc.formats.dialects.registry import first_bytes, read_foreign, recognise, unknown_format_error
 from robochoc.formats.team_writer import SKETCH_FILE
 from robochoc.model.problem import Team
 from robochoc.system.temporary_files import PrivateFolder
@@ -86,7 +86,7 @@ def opened(path: Path, *more: Path) -> Sketch | ForeignTeam:
     if path.is_dir() and not more:
         return _folder(path)
     for file in (path, *more):
-        if beginning_of(file) is None:
+        if first_bytes(file) is None:
             raise invalid_input(file, "this is not a readable file", "choose a team's folder, or a file")
         if file.stat().st_size > MAX_BYTES:
             raise _too_large(file)
@@ -95,7 +95,7 @@ def opened(path: Path, *more: Path) -> Sketch | ForeignTeam:
     if recognise(path) is None:
         if path.suffix.lower() == ".xml":
             raise invalid_input(path, "the XML format is unknown", "to open a robot's file, open the team's folder")
-        raise unknown_format(path)
+        raise unknown_format_error(path)
     imported = read_foreign([path, *more], ImportOptions())
     return ForeignTeam(path, imported.team, notes=tuple(note.text for note in imported.notes))
 

@@ -12,7 +12,7 @@ from robochoc.cli.options.problems import WRITTEN, ProblemPath, reading_options
 from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures
 
 if TYPE_CHECKING:
-    from robochoc.formats.dialects.dialect import ExportOptions, Written
+    from robochoc.formats.dialects.dialect import ExportOptions, ExportResult
     from robochoc.model.problem import Team
 
 
@@ -68,12 +68,12 @@ def export(folder: Path, kind: str, output: Path | None, intension: bool, **read
         click.echo(f"  {kind_of_note}: {text}", err=output is None)
 
 
-def _written(team: Team, kind: str, options: ExportOptions) -> Written:
+def _written(team: Team, kind: str, options: ExportOptions) -> ExportResult:
     """Return the files of `team` in the format `kind`."""
     from robochoc.formats.dialects.dialect import notes_on_absence
-    from robochoc.formats.dialects.registry import dialect_called
+    from robochoc.formats.dialects.registry import find_dialect
 
-    dialect = dialect_called(kind)
+    dialect = find_dialect(kind)
     if dialect is None or dialect.write is None:
         raise Failure(USAGE, f"this version cannot write {kind}")
     written = dialect.write(team, options)

@@ -18,7 +18,7 @@ from robochoc.cli.reports.failures import INVALID, Failure
 from robochoc.cli.reports.notes import note_lines
 
 if TYPE_CHECKING:
-    from robochoc.formats.dialects.dialect import Imported, ImportOptions
+    from robochoc.formats.dialects.dialect import ImportOptions, ImportResult
 
 
 class _Source(NamedTuple):
@@ -140,13 +140,13 @@ def _problems_below(folder: Path, dialect: str | None) -> Iterator[tuple[Path, l
 
 def _split(files: list[Path], name: str | None) -> tuple[list[Path], list[Path]]:
     """Return the files that are complete problems, and the files that are parts of one problem."""
-    from robochoc.formats.dialects.registry import beginning_of, dialect_called, recognise
+    from robochoc.formats.dialects.registry import find_dialect, first_bytes, recognise
 
     problems: list[Path] = []
     parts: list[Path] = []
     for file in files:
-        dialect = dialect_called(name) if name else recognise(file)
-        beginning = beginning_of(file)
+        dialect = find_dialect(name) if name else recognise(file)
+        beginning = first_bytes(file)
         if dialect is None or beginning is None:
             continue
         (parts if dialect.is_part and dialect.is_part(file, beginning) else problems).append(file)
@@ -180,7 +180,7 @@ def _import(
     return entry | {"imported": True, "team": encodable(str(source.folder)), **_contents(imported)}
 
 
-def _contents(imported: Imported) -> dict[str, Any]:
+def _contents(imported: ImportResult) -> dict[str, Any]:
     team = imported.team
     return {
         "format": imported.dialect,
@@ -195,7 +195,7 @@ def _contents(imported: Imported) -> dict[str, Any]:
 
 def _print_entry(entry: dict[str, Any]) -> None:
     from robochoc.formats import on_one_line
-    from robochoc.formats.dialects.dialect import Note
+    from robochoc.formats.dialects.dialect import ConversionNote
 
     if not entry["imported"]:
         Failure(INVALID, "\n".join(entry["errors"])).show()
@@ -204,7 +204,7 @@ def _print_entry(entry: dict[str, Any]) -> None:
     counts = ", ".join(f"{number:,} {what if number != 1 else what[:-1]}" for what, number in sizes.items())
     folder = on_one_line(entry["team"])
     click.echo(f"{folder}: {counts}, from {entry['format']}; {next_step(folder, sizes['robots'])}")
-    for line in note_lines([Note(**note) for note in entry["notes"]], "--report lists them"):
+    for line in note_lines([ConversionNote(**note) for note in entry["notes"]], "--report lists them"):
         click.echo(line)
 
 

@@ -14,7 +14,7 @@ from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInputError
-    from robochoc.formats.dialects.dialect import Note
+    from robochoc.formats.dialects.dialect import ConversionNote
     from robochoc.model.problem import Robot
 
 
@@ -57,13 +57,13 @@ def validate(
 def _report(place: Path, reading: Mapping[str, Any]) -> dict[str, Any]:
     """Return the report on one team, or on one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
-    from robochoc.formats.dialects.registry import dialect_called, recognised
+    from robochoc.formats.dialects.registry import find_dialect, recognise_or_raise
     from robochoc.formats.problems import read_problem
 
-    notes: tuple[Note, ...] = ()
+    notes: tuple[ConversionNote, ...] = ()
     try:
-        named = dialect_called(reading["dialect"] or "") if place.is_file() else None
-        dialect = named or recognised(place)
+        named = find_dialect(reading["dialect"] or "") if place.is_file() else None
+        dialect = named or recognise_or_raise(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
@@ -116,7 +116,7 @@ def _print_json(report: dict[str, Any]) -> None:
 def _print(report: dict[str, Any]) -> None:
     from robochoc.cli.reports.notes import difference_lines
     from robochoc.formats import on_one_line
-    from robochoc.formats.dialects.dialect import Note
+    from robochoc.formats.dialects.dialect import ConversionNote
 
     path = on_one_line(report["path"])
     if report["valid"]:
@@ -131,7 +131,7 @@ def _print(report: dict[str, Any]) -> None:
             click.echo(
                 f"  this is {report['title']}: 'robochoc solve' reads it, 'robochoc import' converts it to a team"
             )
-            for line in difference_lines([Note(**note) for note in report["notes"]]):
+            for line in difference_lines([ConversionNote(**note) for note in report["notes"]]):
                 click.echo(line)
         return
     errors = report["errors"]

@@ -146,13 +146,13 @@ def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | Non
     Raises `Failure`, which names every path without a team.
     """
     from robochoc.formats import InvalidInputError, find_teams
-    from robochoc.formats.dialects.registry import recognised
+    from robochoc.formats.dialects.registry import recognise_or_raise
 
     folders: dict[Path, None] = {}
     errors = []
     for path in paths:
         try:
-            if foreign and ((dialect and path.is_file()) or recognised(path)):
+            if foreign and ((dialect and path.is_file()) or recognise_or_raise(path)):
                 folders[path] = None
             else:
                 folders.update(dict.fromkeys(find_teams(path)))

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from robochoc.model.cost_units import Cost, cost_shown
 
 if TYPE_CHECKING:
-    from robochoc.formats.dialects.dialect import Note
+    from robochoc.formats.dialects.dialect import ConversionNote
     from robochoc.formats.problems import ReadProblem
 
 _SHOWN = 3
 """The maximum number of notes of one kind that are shown."""
 
 
-def note_lines(notes: Iterable[Note], more: str) -> Iterator[str]:
+def note_lines(notes: Iterable[ConversionNote], more: str) -> Iterator[str]:
     """Yield a line for each note, up to three of one kind.
 
     Args:
@@ -34,7 +34,7 @@ def note_lines(notes: Iterable[Note], more: str) -> Iterator[str]:
             yield f"  {kind}: and {len(texts) - _SHOWN:,} more ({more})"
 
 
-def difference_lines(notes: Iterable[Note]) -> Iterator[str]:
+def difference_lines(notes: Iterable[ConversionNote]) -> Iterator[str]:
     """Yield a line for each note on a difference between the team and the file."""
     from robochoc.formats.dialects.dialect import OTHER_PROBLEM
 

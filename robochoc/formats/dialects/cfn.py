@@ -15,11 +15,18 @@ from pathlib import Path
 
 from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
 from robochoc.formats.diagnostics import shortened, suggestion
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
-from robochoc.formats.dialects.tables import Amount, CostTable
-from robochoc.formats.dialects.tabulation import decimal, maximises
-from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, TeamCosts, imported, team_costs
-from robochoc.formats.dialects.toulbar2.text import Reader, Words, has_suffix, read_with, read_words
+from robochoc.formats.dialects.dialect import (
+    ConversionNote,
+    Dialect,
+    ExportOptions,
+    ExportResult,
+    ImportOptions,
+    ImportResult,
+)
+from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable
+from robochoc.formats.dialects.tabulation import decimal, is_maximised
+from robochoc.formats.dialects.toulbar2.network import CostFunction, CostFunctionNetwork, TeamCosts, team_costs, to_team
+from robochoc.formats.dialects.toulbar2.text import WordReader, Words, has_suffix, read_file, read_words
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import Team
 from robochoc.system.plain_text import counted
@@ -32,15 +39,15 @@ def recognises(path: Path, beginning: bytes) -> bool:
     return has_suffix(path, ".cfn") and beginning.lstrip()[:1] in (b"{", b"[", b"#", b"\x1f", b"\xfd")
 
 
-def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     """Return the problem in a file. Raises `InvalidInputError`."""
-    return read_with(paths, options, _read_text)
+    return read_file(paths, options, _read_text)
 
 
-def _read_text(text: str, stem: str, options: ImportOptions) -> Imported:
+def _read_text(text: str, stem: str, options: ImportOptions) -> ImportResult:
     """Return the problem in the `text` of a file. Raises `MistakeError`."""
     network = read_words(_words(text), lambda source: _CfnReader(source, stem).network())
-    return imported(network, options, "cfn")
+    return to_team(network, options, "cfn")
 
 
 def _words(text: str) -> Words:
@@ -51,20 +58,20 @@ def _words(text: str) -> Words:
 
 
 class _CfnReader:
-    def __init__(self, reader: Reader, stem: str) -> None:
+    def __init__(self, reader: WordReader, stem: str) -> None:
         self._in = reader
         self._stem = stem
         self._tagged = False
         self._variables: dict[str, int | tuple[str, ...]] = {}
         self._names: list[str] = []
         self._known: dict[str, int] = {}
-        self._tables: dict[str, CostTable] = {}
+        self._tables: dict[str, ExactCostTable] = {}
         self._functions: list[CostFunction] = []
         self._shared: list[tuple[int, str]] = []
         self._places = 0
         self._truncated = False
 
-    def network(self) -> Network:
+    def network(self) -> CostFunctionNetwork:
         """Return the network in the file. Raises `MistakeError`."""
         name, bound, maximize = self._header()
         self._read_variables()
@@ -75,12 +82,12 @@ class _CfnReader:
         if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 may omit it
             self._in.refuse(f"'{shortened(last)}' where the problem should end", "write } or ]")
         for place, wanted in self._shared:
-            self._functions[place] = self._sharing(self._functions[place], wanted)
-        notes: tuple[Note, ...] = ()
+            self._functions[place] = self._with_shared_costs(self._functions[place], wanted)
+        notes: tuple[ConversionNote, ...] = ()
         if self._truncated:
             text = f"costs are cut to {counted(self._places, 'decimal place')} as mustbe has, which toulbar2 does too"
-            notes = (Note("truncated", text),)
-        return Network(_title(name, self._stem), self._variables, self._functions, bound, maximize, notes)
+            notes = (ConversionNote("truncated", text),)
+        return CostFunctionNetwork(_title(name, self._stem), self._variables, self._functions, bound, maximize, notes)
 
     def _header(self) -> tuple[str, Amount, bool]:
         self._open("the problem")
@@ -150,10 +157,10 @@ class _CfnReader:
             word = self._in.word("costs")
         if _opens(word):
             rows = self._dense(scope, sized) if default is None else self._sparse(scope)
-            table = CostTable(name, rows, default or 0, sized)
+            table = ExactCostTable(name, rows, default or 0, sized)
         else:
             self._shared.append((len(self._functions), word))
-            table = CostTable(name, {}, 0, sized)
+            table = ExactCostTable(name, {}, 0, sized)
         self._functions.append(CostFunction(scope, table, line))
         self._tables.setdefault(name, table)
         closing = self._in.word("'}'")
@@ -241,7 +248,7 @@ class _CfnReader:
         self._truncated |= cut != amount
         return cut
 
-    def _sharing(self, function: CostFunction, wanted: str) -> CostFunction:
+    def _with_shared_costs(self, function: CostFunction, wanted: str) -> CostFunction:
         self._in.line = function.line
         table = self._tables.get(wanted)
         if table is None:
@@ -278,7 +285,7 @@ def _closes(word: str) -> bool:
     return word in ("}", "]")
 
 
-def write(team: Team, options: ExportOptions) -> Written:
+def write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the `.cfn` of `team`. Its bound is one that no finite sum reaches.
 
     Forbidden tuples cost three times the bound, since toulbar2 1.1 does not read `inf`: even with the least cost of all
@@ -288,14 +295,14 @@ def write(team: Team, options: ExportOptions) -> Written:
         UnsupportedError: if costs or a constraint's table are too large, or the team changes over time.
     """
     del options
-    return Written({f"{team.name}.cfn": ("\n".join(_cfn(team, team_costs(team))) + "\n").encode()})
+    return ExportResult({f"{team.name}.cfn": ("\n".join(_cfn(team, team_costs(team))) + "\n").encode()})
 
 
 def _cfn(team: Team, network: TeamCosts) -> Iterator[str]:
     tables, constant, places, bound = network
-    sign = -1 if maximises(team) else 1
+    sign = -1 if is_maximised(team) else 1
     mustbe = f"{'>' if sign < 0 else '<'}{decimal(sign * bound, places)}"
-    forbidding = decimal(sign * 3 * bound, places)
+    forbidden_cost = decimal(sign * 3 * bound, places)
     names = {name: _names(variable.domain) for name, variable in team.variables.items()}
     yield "{"
     yield f'  "problem": {{"name": "{team.name}", "mustbe": "{mustbe}"}},'
@@ -307,28 +314,30 @@ def _cfn(team: Team, network: TeamCosts) -> Iterator[str]:
     for number, one in enumerate(tables):
         scope = ", ".join(f'"{name}"' for name in one.scope)
         costs = ", ".join(
-            ", ".join([*(f'"{names[name][value]}"' for name, value in zip(one.scope, values, strict=True)), told])
-            for values, told in ((values, _cost(cost, places, forbidding)) for values, cost in one.table.rows.items())
+            ", ".join([*(f'"{names[name][value]}"' for name, value in zip(one.scope, values, strict=True)), cost_word])
+            for values, cost_word in (
+                (values, _cost(cost, places, forbidden_cost)) for values, cost in one.table.rows.items()
+            )
         )
-        default = _cost(one.table.default, places, forbidding)
+        default = _cost(one.table.default, places, forbidden_cost)
         functions.append(f'    "f{number}": {{"scope": [{scope}], "defaultcost": {default}, "costs": [{costs}]}}')
     yield ",\n".join(functions)
     yield "  }"
     yield "}"
 
 
-def _cost(cost: Amount, places: int, forbidding: str) -> str:
-    return forbidding if cost == INFINITE else decimal(cost, places)
+def _cost(cost: Amount, places: int, forbidden_cost: str) -> str:
+    return forbidden_cost if cost == INFINITE else decimal(cost, places)
 
 
-def _counted(domain: Domain) -> bool:
+def _is_zero_based(domain: Domain) -> bool:
     """Return whether the values are 0, 1, ..., which need no names."""
     return not domain.symbols and len(domain.ranges) == 1 and domain.ranges[0].start == 0
 
 
 def _names(domain: Domain) -> dict[int, str]:
     """Return what the values are called: names begin with no digit and no sign."""
-    if _counted(domain):
+    if _is_zero_based(domain):
         return {value: str(value) for value in domain}
     names = {}
     for value in domain:
@@ -341,7 +350,7 @@ def _names(domain: Domain) -> dict[int, str]:
 
 
 def _cfn_domain(domain: Domain, names: Mapping[int, str]) -> str:
-    if _counted(domain):
+    if _is_zero_based(domain):
         return str(len(domain))
     return f"[{', '.join(f'{chr(34)}{name}{chr(34)}' for name in names.values())}]"
 

@@ -17,9 +17,16 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.dialects import xdiscsp
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Note, Written
-from robochoc.formats.dialects.tables import Amount
-from robochoc.formats.dialects.tabulation import Exported, amounts, exported, held_constraints, magnitude, maximises
+from robochoc.formats.dialects.dialect import ConversionNote, Dialect, ExportOptions, ExportResult
+from robochoc.formats.dialects.exact_costs import Amount
+from robochoc.formats.dialects.tabulation import (
+    TabulatedConstraint,
+    amounts,
+    held_constraints,
+    is_maximised,
+    magnitude,
+    tabulate,
+)
 from robochoc.formats.dialects.xdiscsp import FORMAT
 from robochoc.model.constraint import INFINITE
 from robochoc.model.problem import Team
@@ -34,7 +41,7 @@ _PAIR = 2
 _Pair = tuple[str, str]
 
 
-def _write(team: Team, options: ExportOptions) -> Written:
+def _write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the file.
 
     Raises:
@@ -42,7 +49,7 @@ def _write(team: Team, options: ExportOptions) -> Written:
     """
     del options
     _check(team)
-    tables, constant = exported(team)
+    tables, constant = tabulate(team)
     if any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in {constant, *amounts(tables)}):
         raise UnsupportedError(f"{TITLE} requires integer costs of 0 or more; --format frodo and pydcop allow others")
     bound = magnitude(tables, constant)
@@ -52,13 +59,13 @@ def _write(team: Team, options: ExportOptions) -> Written:
     costs = {pair: _costs(team, pair, parts) for pair, parts in by_pair.items()}
     first = next(iter(costs))
     costs[first] = {values: cost + int(constant) for values, cost in costs[first].items()}
-    return Written({f"{team.name}.xml": _document(team, costs, bound)}, tuple(_notes(team)))
+    return ExportResult({f"{team.name}.xml": _document(team, costs, bound)}, tuple(_notes(team)))
 
 
 def _check(team: Team) -> None:
     if team.dynamic:
         raise UnsupportedError(f"{TITLE} does not support problems that change over time: leave scenario.xml out")
-    if maximises(team):
+    if is_maximised(team):
         raise UnsupportedError(f"{TITLE} does not support utilities: costs are minimised")
     for robot in team.robots:
         if len(robot.variables) > 1:
@@ -69,10 +76,10 @@ def _check(team: Team) -> None:
         raise UnsupportedError(f"{TITLE} requires two agents or more")
 
 
-def _by_pair(team: Team, tables: list[Exported]) -> dict[_Pair, list[Exported]]:
+def _by_pair(team: Team, tables: list[TabulatedConstraint]) -> dict[_Pair, list[TabulatedConstraint]]:
     """Return the tables of each pair of variables in the order of the agents; all variables are connected by pairs."""
     place = {name: number for number, name in enumerate(team.variables)}
-    pairs: dict[_Pair, list[Exported]] = defaultdict(list)
+    pairs: dict[_Pair, list[TabulatedConstraint]] = defaultdict(list)
     unary = []
     for one in tables:
         if len(one.scope) > _PAIR:
@@ -112,7 +119,7 @@ def _missing_links(team: Team, pairs: Mapping[_Pair, object]) -> Iterator[_Pair]
                 waiting += near[name]
 
 
-def _costs(team: Team, pair: _Pair, parts: list[Exported]) -> dict[tuple[int, int], Amount]:
+def _costs(team: Team, pair: _Pair, parts: list[TabulatedConstraint]) -> dict[tuple[int, int], Amount]:
     found: dict[tuple[int, int], Amount] = {}
     domains = [team.variables[name].domain for name in pair]
     for one, other in itertools.product(*(enumerate(domain, 1) for domain in domains)):
@@ -142,10 +149,10 @@ def _document(team: Team, costs: Mapping[_Pair, Mapping[tuple[int, int], Amount]
         etree.SubElement(sections["agents"], "agent", name=robot.name, id=str(number), description=robot.name)
         size = len(variable.domain)
         if _is_renamed(team, variable.name):
-            told = ", ".join(
+            labels = ", ".join(
                 f"{place} is {variable.domain.label(value)}" for place, value in enumerate(variable.domain, 1)
             )
-            sections["domains"].append(etree.Comment(f" {variable.name}: {told} ".replace("--", "- -")))
+            sections["domains"].append(etree.Comment(f" {variable.name}: {labels} ".replace("--", "- -")))
         domain = etree.SubElement(sections["domains"], "domain", name=f"D{number}", nbValues=str(size))
         domain.text = f"1..{size}"
         stated = {"agent": robot.name, "name": variable.name, "id": "1", "domain": f"D{number}"}
@@ -169,12 +176,12 @@ def _is_renamed(team: Team, name: str) -> bool:
     return bool(domain.symbols) or list(domain) != [*range(1, len(domain) + 1)]
 
 
-def _notes(team: Team) -> Iterator[Note]:
+def _notes(team: Team) -> Iterator[ConversionNote]:
     if renamed := [name for name in team.variables if _is_renamed(team, name)]:
         text = f"the values of {len(renamed)} variables are numbered from 1 on; comments in the file name them"
-        yield Note("values", text)
+        yield ConversionNote("values", text)
     if any(one.private_part for one in held_constraints(team)):
-        yield Note(
+        yield ConversionNote(
             "known to more", "both agents of a constraint know it: DCOPSolver does not support partial knowledge (PKC)"
         )
 

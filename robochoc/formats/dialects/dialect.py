@@ -35,7 +35,7 @@ class ImportOptions:
     name: str | None = None
 
 
-class Note(NamedTuple):
+class ConversionNote(NamedTuple):
     """A change that an import has made: a keyword for scripts, and a sentence for people."""
 
     kind: str
@@ -50,7 +50,7 @@ OTHER_PROBLEM = {
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportResult:
     """A problem of another tool, as a team.
 
     Attributes:
@@ -65,7 +65,7 @@ class Imported:
     team: Team
     dialect: str
     names: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[Note, ...] = ()
+    notes: tuple[ConversionNote, ...] = ()
     bound: Fraction | None = None
 
 
@@ -80,7 +80,7 @@ class ExportOptions:
     intension: bool = False
 
 
-class Written(NamedTuple):
+class ExportResult(NamedTuple):
     """A team in the format of another tool.
 
     Attributes:
@@ -89,7 +89,7 @@ class Written(NamedTuple):
     """
 
     files: Mapping[str, bytes]
-    notes: tuple[Note, ...] = ()
+    notes: tuple[ConversionNote, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,19 +110,19 @@ class Dialect:
     name: str
     title: str
     recognises: Callable[[Path, bytes], bool]
-    read: Callable[[Sequence[Path], ImportOptions], Imported]
-    write: Callable[[Team, ExportOptions], Written] | None = None
+    read: Callable[[Sequence[Path], ImportOptions], ImportResult]
+    write: Callable[[Team, ExportOptions], ExportResult] | None = None
     is_part: Callable[[Path, bytes], bool] | None = None
 
 
-class Names:
+class NameMap:
     """Names that are allowed here, for names of other tools: the same one where it is allowed, and each only once."""
 
     def __init__(self) -> None:
         self._taken: dict[str, str] = {}
         self._given: dict[str, str] = {}
 
-    def of(self, original: str) -> str:
+    def allowed(self, original: str) -> str:
         """Return the name for `original`. The same original always gets the same one."""
         if original not in self._given:
             self._given[original] = self._free(original)
@@ -165,13 +165,17 @@ def owners_by(pattern: str, names: Iterable[str]) -> dict[str, str]:
     return owners
 
 
-def notes_on_names(changed: Collection[tuple[str, str]]) -> list[Note]:
+def notes_on_names(changed: Collection[tuple[str, str]]) -> list[ConversionNote]:
     """Return a note for each pair of a name and its original."""
-    return [Note("renamed", f"{original} is {name}") for name, original in changed]
+    return [ConversionNote("renamed", f"{original} is {name}") for name, original in changed]
 
 
-def notes_on_absence(team: Team) -> list[Note]:
+def notes_on_absence(team: Team) -> list[ConversionNote]:
     """Return a note on the chosen meanings of constraints for absent robots, which other formats do not have."""
     first, *more = [*dict.fromkeys(one.name for one in team.constraints() if one.when_absent is not None), ""]
     others = f" and {counted(len(more) - 1, 'other constraint')}" if len(more) > 1 else ""
-    return [Note("left out", f"when_absent of {first}{others}: the format has no absent robots")] if first else []
+    return (
+        [ConversionNote("left out", f"when_absent of {first}{others}: the format has no absent robots")]
+        if first
+        else []
+    )

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Written
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, ExportResult, ImportOptions, ImportResult
 from robochoc.formats.dialects.graph import pseudo_tree, shared_constraints
 from robochoc.model.problem import Team
 from robochoc.solver.errors import UnsupportedError
@@ -14,7 +14,7 @@ from robochoc.solver.errors import UnsupportedError
 NAME = "dot"
 
 
-def _write(team: Team, options: ExportOptions) -> Written:
+def _write(team: Team, options: ExportOptions) -> ExportResult:
     del options
     tree = pseudo_tree(team)
     shared: Counter[frozenset[str]] = Counter()
@@ -37,7 +37,7 @@ def _write(team: Team, options: ExportOptions) -> Written:
         if tree[one] != other and tree[other] != one:
             edge = f"{_quoted(one)} -- {_quoted(other)}"
             lines.append(f"  {edge} [style=dashed, constraint=false{_label(number)}];")
-    return Written({f"{team.name}.dot": "\n".join([*lines, "}", ""]).encode()})
+    return ExportResult({f"{team.name}.dot": "\n".join([*lines, "}", ""]).encode()})
 
 
 def _label(number: int) -> str:
@@ -49,7 +49,7 @@ def _quoted(name: str) -> str:
     return f'"{escaped}"'
 
 
-def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     del options
     raise UnsupportedError(f"{paths[0]}: graphs are written, not read")
 

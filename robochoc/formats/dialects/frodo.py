@@ -14,13 +14,35 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.diagnostics import shortened
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
-from robochoc.formats.dialects.tables import Amount, Scale
-from robochoc.formats.dialects.tabulation import Exported, HeldConstraint, amounts, constant_table, decimal, magnitude
-from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, plain
-from robochoc.formats.dialects.xcsp21.instance import UNIT, ForeignConstraint, Formula, Instance, Sides, Table, refuse
-from robochoc.formats.dialects.xcsp21.reader import PUBLIC, Beginning, read_instance
-from robochoc.formats.dialects.xcsp21.team import as_team
+from robochoc.formats.dialects.dialect import (
+    ConversionNote,
+    Dialect,
+    ExportOptions,
+    ExportResult,
+    ImportOptions,
+    ImportResult,
+)
+from robochoc.formats.dialects.exact_costs import Amount, Scale
+from robochoc.formats.dialects.tabulation import (
+    HeldConstraint,
+    TabulatedConstraint,
+    amounts,
+    constant_table,
+    decimal,
+    magnitude,
+)
+from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, in_xcsp21_operators
+from robochoc.formats.dialects.xcsp21.instance import (
+    UNIT,
+    AsymmetricTable,
+    ForeignConstraint,
+    ForeignTable,
+    Formula,
+    Instance,
+    refuse,
+)
+from robochoc.formats.dialects.xcsp21.reader import PUBLIC, FileHead, read_instance
+from robochoc.formats.dialects.xcsp21.team import to_team
 from robochoc.formats.element_view import ElementView
 from robochoc.formats.global_constraints import PREFIX, write_global
 from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
@@ -48,7 +70,7 @@ _FORMS = {
 
 
 def _recognises(_path: Path, beginning: bytes) -> bool:
-    found = Beginning(beginning)
+    found = FileHead(beginning)
     if not found.is_instance or "XDisCSP" in found.format:
         return False
     return found.format.startswith("XCSP 2") or (not found.format and found.has_agents) or found.is_network
@@ -58,19 +80,19 @@ def _is_part(_path: Path, beginning: bytes) -> bool:
     return _SELF.search(beginning) is not None
 
 
-def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
-    instances = [read_instance(path, options, _knower) for path in paths]
-    whole = merged(instances)
-    whole.name = paths[0].stem if len(paths) == 1 else paths[0].absolute().parent.name
-    return as_team(whole, NAME, options)
+def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
+    instances = [read_instance(path, options, _private_agent) for path in paths]
+    result = merge(instances)
+    result.name = paths[0].stem if len(paths) == 1 else paths[0].absolute().parent.name
+    return to_team(result, NAME, options)
 
 
-def _knower(element: ElementView, _instance: Instance) -> str:
+def _private_agent(element: ElementView, _instance: Instance) -> str:
     agent = element.attribute("agent")
     return "" if agent == PUBLIC else agent
 
 
-def merged(instances: Sequence[Instance]) -> Instance:
+def merge(instances: Sequence[Instance]) -> Instance:
     """Return the problem of all files of a team of agents.
 
     Constraints of the same name, scope and contents in several files are one. Variables that several files hold are
@@ -79,37 +101,37 @@ def merged(instances: Sequence[Instance]) -> Instance:
     Raises:
         InvalidInputError: if the files do not belong together, or one is missing.
     """
-    whole = replace(instances[0], self_agent="", agents=[], variables={}, constraints=[], notes=[])
+    result = replace(instances[0], self_agent="", agents=[], variables={}, constraints=[], notes=[])
     if len(instances) > 1:
         _check_members(instances)
     _check_complete(instances)
     known: dict[tuple[str, frozenset[str]], ForeignConstraint] = {}
     for one in instances:
-        whole.agents += [name for name in one.agents if name not in whole.agents]
-        whole.notes += [note for note in one.notes if note not in whole.notes]
-        _add_variables(whole, one)
+        result.agents += [name for name in one.agents if name not in result.agents]
+        result.notes += [note for note in one.notes if note not in result.notes]
+        _add_variables(result, one)
         for constraint in one.constraints:
             if len(instances) == 1:
-                whole.constraints.append(constraint)
+                result.constraints.append(constraint)
                 continue
             key = constraint.name, frozenset(constraint.scope)
             first = known.setdefault(key, constraint)
             if first is constraint:
-                whole.constraints.append(constraint)
+                result.constraints.append(constraint)
             elif not _same(first, constraint):
                 if not (is_hard(first) and is_hard(constraint)):
                     hint = f"constraints of one name are copies; it also stands in {first.file}:{first.line}"
                     refuse(
                         one.file, constraint.line, f"constraint '{shortened(constraint.name)}' costs otherwise", hint
                     )
-                whole.constraints.append(constraint)
-    return whole
+                result.constraints.append(constraint)
+    return result
 
 
 def is_hard(constraint: ForeignConstraint) -> bool:
     """Return whether a constraint only allows and forbids."""
     match constraint.content:
-        case Table(costs=costs, default=default):
+        case ForeignTable(costs=costs, default=default):
             return {default, *costs.values()} <= {0, INFINITE}
         case Formula(definition=Predicate(), cost=cost):
             return cost is None
@@ -141,9 +163,9 @@ def _check_complete(instances: Sequence[Instance]) -> None:
                 refuse(one.file, variable.line, f"{what} is not here", "give all agents' files, or their folder")
 
 
-def _add_variables(whole: Instance, one: Instance) -> None:
+def _add_variables(result: Instance, one: Instance) -> None:
     for variable in one.variables.values():
-        first = whole.variables.setdefault(variable.name, variable)
+        first = result.variables.setdefault(variable.name, variable)
         if (first.ranges, first.owner) != (variable.ranges, variable.owner):
             what = f"variable '{shortened(variable.name)}' has another domain or agent than in another file"
             refuse(one.file, variable.line, what, "let the files agree")
@@ -151,9 +173,9 @@ def _add_variables(whole: Instance, one: Instance) -> None:
 
 def _same(one: ForeignConstraint, other: ForeignConstraint) -> bool:
     match one.content, other.content:
-        case Table() as left, Table() as right:
+        case ForeignTable() as left, ForeignTable() as right:
             return (one.scope, left.costs, left.default) == (other.scope, right.costs, right.default)
-        case Sides() as left, Sides() as right:
+        case AsymmetricTable() as left, AsymmetricTable() as right:
             return (one.scope, left.first.costs, left.second.costs) == (
                 other.scope,
                 right.first.costs,
@@ -166,22 +188,22 @@ def _same(one: ForeignConstraint, other: ForeignConstraint) -> bool:
             return False
 
 
-def frodo_file(team: Team, options: ExportOptions) -> Written:
+def _write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the file, in which all agents of a constraint's variables know it.
 
     Raises:
         UnsupportedError: if the team has what FRODO has not.
     """
-    writer = _Writer(FlatTeam(team, TITLE), intension=options.intension)
-    return Written({f"{team.name}.xml": writer.content()}, tuple(writer.notes()))
+    writer = _FrodoWriter(FlatTeam(team, TITLE), intension=options.intension)
+    return ExportResult({f"{team.name}.xml": writer.content()}, tuple(writer.notes()))
 
 
-class _Writer:
+class _FrodoWriter:
     def __init__(self, flat: FlatTeam, *, intension: bool) -> None:
         self._flat = flat
         hint = "" if intension else f" ({KEEPS_FORMULAS})"
         self._contents = [(intension and self._in_intension(one)) or flat.table(one, hint) for one in flat.held]
-        tables = [content for content in self._contents if isinstance(content, Exported)]
+        tables = [content for content in self._contents if isinstance(content, TabulatedConstraint)]
         if flat.constant:
             tables.append(constant_table(flat.team, flat.constant))
         self._places = Scale(amounts(tables)).places
@@ -206,7 +228,7 @@ class _Writer:
                 domain = flat.domain_of[variable.name]
                 etree.SubElement(document.variables, "variable", name=variable.name, domain=domain, agent=robot.name)
         for one, content in zip(flat.held, self._contents, strict=True):
-            if isinstance(content, Exported):
+            if isinstance(content, TabulatedConstraint):
                 self._add(content)
             else:
                 self._add_formula(one, content)
@@ -214,16 +236,18 @@ class _Writer:
             self._add(constant_table(flat.team, flat.constant))
         return document.content()
 
-    def notes(self) -> Iterator[Note]:
+    def notes(self) -> Iterator[ConversionNote]:
         """Yield the differences from the team."""
         if self._places:
-            yield Note("scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits")
+            yield ConversionNote(
+                "scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits"
+            )
         if any(one.private_part for one in self._flat.held):
             text = "all agents of a constraint know it: FRODO cannot keep partially known (PKC) constraints apart"
-            yield Note("known to more", text)
-        if kept := sum(not isinstance(content, Exported) for content in self._contents):
+            yield ConversionNote("known to more", text)
+        if kept := sum(not isinstance(content, TabulatedConstraint) for content in self._contents):
             text = f"{counted(kept, 'constraint')} in intension, which only FRODO's JaCoP parser reads"
-            yield Note("intension", text)
+            yield ConversionNote("intension", text)
 
     @property
     def _unit(self) -> str:
@@ -247,7 +271,7 @@ class _Writer:
             return None
         if isinstance(definition, GlobalPredicate) and cost == INFINITE and _is_known_form(definition):
             return definition
-        body = plain(definition.body)
+        body = in_xcsp21_operators(definition.body)
         if body is None:
             return None
         if isinstance(definition, Predicate) and cost == INFINITE:
@@ -274,14 +298,14 @@ class _Writer:
         element = self._document.constraint(constraint.name, constraint.variables, reference)
         etree.SubElement(element, "parameters").text = " ".join(map(str, constraint.parameters))
 
-    def _add(self, table: Exported) -> None:
+    def _add(self, table: TabulatedConstraint) -> None:
         """Write a soft relation, the only kind that all of FRODO reads."""
         key = id(table.table)
         if key not in self._references:
             self._references[key] = self._relation(table)
         self._document.constraint(table.name, table.scope, self._references[key])
 
-    def _relation(self, table: Exported) -> str:
+    def _relation(self, table: TabulatedConstraint) -> str:
         by_cost: dict[Amount, list[str]] = {}
         for values, cost in table.table.rows.items():
             by_cost.setdefault(cost, []).append(" ".join(map(str, values)))
@@ -290,8 +314,8 @@ class _Writer:
         return self._document.relation(table, attributes, tuples)
 
     def _number(self, cost: Amount) -> str:
-        whole = cost if cost == INFINITE else cost * 10**self._places
-        return cost_text(whole, forbidden=self._forbidden)
+        result = cost if cost == INFINITE else cost * 10**self._places
+        return cost_text(result, forbidden=self._forbidden)
 
 
 def _is_known_form(predicate: GlobalPredicate) -> bool:
@@ -299,4 +323,4 @@ def _is_known_form(predicate: GlobalPredicate) -> bool:
     return _FORMS[predicate.name.removeprefix(PREFIX)].fullmatch(predicate.form) is not None
 
 
-DIALECT = Dialect(NAME, TITLE, _recognises, _read, frodo_file, is_part=_is_part)
+DIALECT = Dialect(NAME, TITLE, _recognises, _read, _write, is_part=_is_part)

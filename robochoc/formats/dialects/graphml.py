@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Written
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, ExportResult, ImportOptions, ImportResult
 from robochoc.formats.dialects.graph import shared_constraints
 from robochoc.model.problem import Team
 from robochoc.solver.errors import UnsupportedError
@@ -18,7 +18,7 @@ _NAMESPACE = "http://graphml.graphdrawing.org/xmlns"
 _KEYS = (("robot", "node", "string"), ("values", "node", "int"), ("constraints", "edge", "int"))
 
 
-def _write(team: Team, options: ExportOptions) -> Written:
+def _write(team: Team, options: ExportOptions) -> ExportResult:
     del options
     root = etree.Element("graphml", xmlns=_NAMESPACE)
     for name, what, kind in _KEYS:
@@ -32,10 +32,10 @@ def _write(team: Team, options: ExportOptions) -> Written:
         edge = etree.SubElement(graph, "edge", source=one, target=other)
         etree.SubElement(edge, "data", key="constraints").text = str(number)
     body = etree.tostring(root, pretty_print=True, encoding="unicode")
-    return Written({f"{team.name}.graphml": f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()})
+    return ExportResult({f"{team.name}.graphml": f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()})
 
 
-def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     del options
     raise UnsupportedError(f"{paths[0]}: graphs are written, not read")
 

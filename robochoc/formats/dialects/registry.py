@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, Imported, ImportOptions
+from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, ImportOptions, ImportResult
 
 NAMES = ("frodo", "xdiscsp", "dcopsolver", "tasks", "pydcop", "xcsp3", "cfn", "wcsp", "dot", "graphml")
 """The names of all dialects, in the order in which they are asked whether a file is in them."""
@@ -22,7 +22,7 @@ _BEGINNING = 64 * 1024
 """The bytes of a file by which it is recognised."""
 
 
-def dialect_called(name: str) -> Dialect | None:
+def find_dialect(name: str) -> Dialect | None:
     """Return the dialect called `name`. None: this version has none of that name."""
     module = f"{__package__}.{name}"
     if name not in NAMES:
@@ -39,19 +39,19 @@ def dialect_called(name: str) -> Dialect | None:
 def dialects() -> Iterator[Dialect]:
     """Yield all dialects."""
     for name in NAMES:
-        if dialect := dialect_called(name):
+        if dialect := find_dialect(name):
             yield dialect
 
 
 def recognise(path: Path) -> Dialect | None:
     """Return the dialect that the file at `path` is in. None: it is in none, or is no file that can be read."""
-    beginning = beginning_of(path)
+    beginning = first_bytes(path)
     if beginning is None:
         return None
     return next((dialect for dialect in dialects() if dialect.recognises(path, beginning)), None)
 
 
-def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None = None) -> Imported:
+def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None = None) -> ImportResult:
     """Return the problem in the files `paths` of another tool.
 
     Args:
@@ -62,10 +62,10 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
     Raises:
         InvalidInputError: if a file is in no dialect that is read here, the files are in several, or they are invalid.
     """
-    found = [dialect_called(name) if name else recognise(path) for path in paths]
+    found = [find_dialect(name) if name else recognise(path) for path in paths]
     for path, dialect in zip(paths, found, strict=True):
         if dialect is None:
-            raise unknown_format(path)
+            raise unknown_format_error(path)
         if dialect is not found[0]:
             first = found[0].title if found[0] else ""
             raise _invalid(path, f"is {dialect.title}, and {paths[0]} is {first}", "import them one by one")
@@ -76,7 +76,7 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
     return found[0].read(paths, options)
 
 
-def beginning_of(path: Path) -> bytes | None:
+def first_bytes(path: Path) -> bytes | None:
     """Return the first bytes of a regular file; None where there is none. A FIFO is not waited for."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
@@ -90,7 +90,7 @@ def beginning_of(path: Path) -> bytes | None:
         os.close(descriptor)
 
 
-def recognised(path: Path) -> Dialect | None:
+def recognise_or_raise(path: Path) -> Dialect | None:
     """Return the dialect that the file at `path` is in. None: it is no file, or may be that of a robot.
 
     Raises:
@@ -98,17 +98,17 @@ def recognised(path: Path) -> Dialect | None:
     """
     dialect = recognise(path)
     if dialect is None and path.is_file() and (_is_wide(path) or path.suffix.lower() not in {"", ".xml"}):
-        raise unknown_format(path)
+        raise unknown_format_error(path)
     return dialect
 
 
 def _is_wide(path: Path) -> bool:
     """Return whether a file begins as a text in UTF-16 or UTF-32 does: by its mark, or with zeros."""
-    first = (beginning_of(path) or b"")[:4]
+    first = (first_bytes(path) or b"")[:4]
     return first.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in first
 
 
-def unknown_format(path: Path) -> InvalidInputError:
+def unknown_format_error(path: Path) -> InvalidInputError:
     """Return the error of a file that is in no dialect, or not there."""
     if not path.exists():
         return _invalid(path, "does not exist", "check its name")

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from robochoc.formats.definitions import MAX_TUPLES
-from robochoc.formats.dialects.tables import Amount, CostTable
+from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable
 from robochoc.model.constraint import (
     INFINITE,
     Constraint,
@@ -37,7 +37,7 @@ class HeldConstraint(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Exported:
+class TabulatedConstraint:
     """The costs of some variables.
 
     Attributes:
@@ -48,7 +48,7 @@ class Exported:
 
     name: str
     scope: tuple[str, ...]
-    table: CostTable
+    table: ExactCostTable
 
 
 def held_constraints(team: Team) -> Iterator[HeldConstraint]:
@@ -66,9 +66,9 @@ class Tabulator:
 
     def __init__(self, team: Team) -> None:
         self._domains = {name: variable.domain for name, variable in team.variables.items()}
-        self._known: dict[object, CostTable] = {}
+        self._known: dict[object, ExactCostTable] = {}
 
-    def table(self, one: HeldConstraint, name: str = "", most: int = MAX_TUPLES) -> Exported | None:
+    def table(self, one: HeldConstraint, name: str = "", most: int = MAX_TUPLES) -> TabulatedConstraint | None:
         """Return the costs of a constraint. None: they need more than `most` tuples."""
         constraint = one.constraint
         scope, definition = constraint.variables, constraint.definition
@@ -82,13 +82,13 @@ class Tabulator:
         key = same, pattern, tuple(domain.ranges for domain in domains), constraint.cost, places
         if key not in self._known:
             if isinstance(definition, Relation):
-                self._known[key] = _listed(definition, pattern, domains, places, size)
+                self._known[key] = _relation_table(definition, pattern, domains, places, size)
             else:
-                self._known[key] = _evaluated(_price(definition, constraint.cost, places), pattern, domains, size)
-        return Exported(name or constraint.name, scope, self._known[key])
+                self._known[key] = _evaluated_table(_price(definition, constraint.cost, places), pattern, domains, size)
+        return TabulatedConstraint(name or constraint.name, scope, self._known[key])
 
 
-def exported(team: Team) -> tuple[list[Exported], Fraction]:
+def tabulate(team: Team) -> tuple[list[TabulatedConstraint], Fraction]:
     """Return the costs of a team that has not been normalised, and the constant among them.
 
     Raises:
@@ -120,10 +120,10 @@ def constant_of(team: Team) -> Fraction:
     return sum((Fraction(one.costs.constant, 10**one.costs.places) for one in team.robots), Fraction(0))
 
 
-def constant_table(team: Team, constant: Fraction) -> Exported:
+def constant_table(team: Team, constant: Fraction) -> TabulatedConstraint:
     """Return a constant cost as the cost of all values of the first variable."""
     variable = next(iter(team.variables.values()))
-    return Exported(CONSTANT, (variable.name,), CostTable(CONSTANT, {}, constant, len(variable.domain)))
+    return TabulatedConstraint(CONSTANT, (variable.name,), ExactCostTable(CONSTANT, {}, constant, len(variable.domain)))
 
 
 def too_large(team: Team, constraint: Constraint) -> str:
@@ -133,12 +133,12 @@ def too_large(team: Team, constraint: Constraint) -> str:
     return f"{what}; a table has at most {MAX_TUPLES:,}"
 
 
-def maximises(team: Team) -> bool:
+def is_maximised(team: Team) -> bool:
     """Return whether the costs of `team` are maximised."""
     return any(robot.costs.maximize for robot in team.robots)
 
 
-def magnitude(tables: Sequence[Exported], constant: Fraction) -> int:
+def magnitude(tables: Sequence[TabulatedConstraint], constant: Fraction) -> int:
     """Return an integer that no sum of finite costs reaches, nor its negative."""
     distinct = {id(one.table): one.table for one in tables}
     most = {
@@ -148,7 +148,7 @@ def magnitude(tables: Sequence[Exported], constant: Fraction) -> int:
     return math.floor(sum((most[id(one.table)] for one in tables), abs(constant))) + 1
 
 
-def amounts(tables: Sequence[Exported]) -> set[Amount]:
+def amounts(tables: Sequence[TabulatedConstraint]) -> set[Amount]:
     """Return the costs that occur in tables."""
     return set().union(*(table.amounts() for table in {id(one.table): one.table for one in tables}.values()))
 
@@ -177,19 +177,21 @@ def _price(definition: Predicate | Function, cost: float, places: int) -> Callab
     return lambda values: 0 if definition.holds(values) else broken
 
 
-def _evaluated(
+def _evaluated_table(
     price: Callable[[Sequence[int]], Amount], pattern: _Pattern, domains: Sequence[Domain], size: int
-) -> CostTable:
+) -> ExactCostTable:
     """Return the table of a predicate or function; its most frequent cost is the default."""
     costs = {
         values: price([values[term] if isinstance(term, int) else term[0] for term in pattern])
         for values in itertools.product(*domains)
     }
     ((default, _),) = Counter(costs.values()).most_common(1)
-    return CostTable("", {values: cost for values, cost in costs.items() if cost != default}, default, size)
+    return ExactCostTable("", {values: cost for values, cost in costs.items() if cost != default}, default, size)
 
 
-def _listed(relation: Relation, pattern: _Pattern, domains: Sequence[Domain], places: int, size: int) -> CostTable:
+def _relation_table(
+    relation: Relation, pattern: _Pattern, domains: Sequence[Domain], places: int, size: int
+) -> ExactCostTable:
     """Return the table of a relation over its distinct variables; tuples with values outside domains are left out."""
     listed, other = relation.prices
     known = [frozenset(domain) for domain in domains]
@@ -205,7 +207,7 @@ def _listed(relation: Relation, pattern: _Pattern, domains: Sequence[Domain], pl
             row = tuple(found[place] for place in range(len(domains)))
             if all(value in domain for value, domain in zip(row, known, strict=True)):
                 rows[row] = _amount(cost, places)
-    return CostTable("", rows, _amount(other, places), size)
+    return ExactCostTable("", rows, _amount(other, places), size)
 
 
 def _amount(cost: float, places: int) -> Amount:

@@ -11,11 +11,18 @@ from pathlib import Path
 
 from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
 from robochoc.formats.diagnostics import shortened
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
-from robochoc.formats.dialects.tables import Amount, CostTable
-from robochoc.formats.dialects.tabulation import amounts, maximises
-from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, TeamCosts, imported, team_costs
-from robochoc.formats.dialects.toulbar2.text import Reader, Words, has_suffix, read_with, read_words
+from robochoc.formats.dialects.dialect import (
+    ConversionNote,
+    Dialect,
+    ExportOptions,
+    ExportResult,
+    ImportOptions,
+    ImportResult,
+)
+from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable
+from robochoc.formats.dialects.tabulation import amounts, is_maximised
+from robochoc.formats.dialects.toulbar2.network import CostFunction, CostFunctionNetwork, TeamCosts, team_costs, to_team
+from robochoc.formats.dialects.toulbar2.text import WordReader, Words, has_suffix, read_file, read_words
 from robochoc.model.constraint import INFINITE
 from robochoc.model.problem import Team
 from robochoc.solver.errors import UnsupportedError
@@ -29,15 +36,15 @@ def recognises(path: Path, beginning: bytes) -> bool:
     return has_suffix(path, ".wcsp") and bool(beginning)
 
 
-def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     """Return the problem in a file. Raises `InvalidInputError`."""
-    return read_with(paths, options, _read_text)
+    return read_file(paths, options, _read_text)
 
 
-def _read_text(text: str, stem: str, options: ImportOptions) -> Imported:
+def _read_text(text: str, stem: str, options: ImportOptions) -> ImportResult:
     """Return the problem in the `text` of a file. Raises `MistakeError`."""
     network = read_words(_words(text), lambda source: _WcspReader(source, stem).network())
-    return imported(network, options, "wcsp")
+    return to_team(network, options, "wcsp")
 
 
 def _words(text: str) -> Words:
@@ -47,13 +54,13 @@ def _words(text: str) -> Words:
 
 
 class _WcspReader:
-    def __init__(self, reader: Reader, stem: str) -> None:
+    def __init__(self, reader: WordReader, stem: str) -> None:
         self._in = reader
         self._stem = stem
         self._sizes: list[int] = []
-        self._shared: list[CostTable] = []
+        self._shared: list[ExactCostTable] = []
 
-    def network(self) -> Network:
+    def network(self) -> CostFunctionNetwork:
         """Return the network in the file. Raises `MistakeError`."""
         name = re.sub(r"[^A-Za-z0-9_.-]+", "_", self._in.word("the name"))[:100].strip("._-")
         count = self._count("the number of variables")
@@ -68,16 +75,16 @@ class _WcspReader:
                 self._in.refuse(f"a domain of {size} values", f"from 1 to {MAX_VALUES}")
             self._sizes.append(size)
         found: list[CostFunction] = []
-        notes: tuple[Note, ...] = ()
+        notes: tuple[ConversionNote, ...] = ()
         for number in range(functions):
             word = self._in.more()
             if word is None:
                 text = f"the file announces {functions} cost functions, and has {number}"
-                notes = (Note("count", text),)
+                notes = (ConversionNote("count", text),)
                 break
             found.append(self._function(self._in.as_integer(word, "the arity of a function"), number))
         variables: dict[str, int | tuple[str, ...]] = {f"x{place}": size for place, size in enumerate(self._sizes)}
-        return Network(name or self._stem, variables, found, bound, notes=notes)
+        return CostFunctionNetwork(name or self._stem, variables, found, bound, notes=notes)
 
     def _count(self, what: str) -> int:
         number = self._in.integer(what)
@@ -99,7 +106,7 @@ class _WcspReader:
             self._shared.append(table)
         return CostFunction(scope, table, line)
 
-    def _table(self, name: str, scope: tuple[int, ...], default: int) -> CostTable:
+    def _table(self, name: str, scope: tuple[int, ...], default: int) -> ExactCostTable:
         size = math.prod(self._sizes[place] for place in scope)
         count = self._in.integer("the number of tuples")
         if count < 0:
@@ -117,7 +124,7 @@ class _WcspReader:
             cost = self._cost(self._in.integer("a cost"))
             if rows.setdefault(values, cost) != cost:
                 self._in.refuse(f"the tuple {' '.join(map(str, values))} with two costs", "delete one of them")
-        return CostTable(name, rows, self._cost(default), size)
+        return ExactCostTable(name, rows, self._cost(default), size)
 
     def _place(self) -> int:
         place = self._in.integer("a variable")
@@ -137,7 +144,7 @@ class _WcspReader:
         return cost
 
 
-def write(team: Team, options: ExportOptions) -> Written:
+def write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the `.wcsp` of `team`, without any names.
 
     Raises:
@@ -147,9 +154,9 @@ def write(team: Team, options: ExportOptions) -> Written:
     del options
     network = team_costs(team)
     costs = {network.constant, *amounts(network.tables)}
-    if maximises(team) or any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in costs):
+    if is_maximised(team) or any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in costs):
         raise UnsupportedError("a wcsp has integer costs of 0 or more that are minimised; a cfn can say this one")
-    return Written({f"{team.name}.wcsp": ("\n".join(_wcsp(team, network)) + "\n").encode()})
+    return ExportResult({f"{team.name}.wcsp": ("\n".join(_wcsp(team, network)) + "\n").encode()})
 
 
 def _wcsp(team: Team, network: TeamCosts) -> Iterator[str]:
@@ -165,13 +172,13 @@ def _wcsp(team: Team, network: TeamCosts) -> Iterator[str]:
         yield f"0 {constant} 0"
     for one in tables:
         scope = " ".join(str(place[name]) for name in one.scope)
-        yield f"{len(one.scope)} {scope} {_whole(one.table.default, bound)} {len(one.table.rows)}"
+        yield f"{len(one.scope)} {scope} {_cost_number(one.table.default, bound)} {len(one.table.rows)}"
         for values, cost in one.table.rows.items():
             coded = " ".join(str(codes[name][value]) for name, value in zip(one.scope, values, strict=True))
-            yield f"{coded} {_whole(cost, bound)}"
+            yield f"{coded} {_cost_number(cost, bound)}"
 
 
-def _whole(cost: Amount, bound: int) -> int:
+def _cost_number(cost: Amount, bound: int) -> int:
     return bound if cost == INFINITE else int(cost)
 
 

@@ -17,13 +17,20 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Note, Written
-from robochoc.formats.dialects.tables import Amount, CostTable
-from robochoc.formats.dialects.tabulation import Exported, HeldConstraint
-from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, plain
-from robochoc.formats.dialects.xcsp21.instance import ForeignConstraint, Formula, Instance, Table, refuse
-from robochoc.formats.dialects.xcsp21.reader import Beginning, read_instance
-from robochoc.formats.dialects.xcsp21.team import as_team
+from robochoc.formats.dialects.dialect import (
+    ConversionNote,
+    Dialect,
+    ExportOptions,
+    ExportResult,
+    ImportOptions,
+    ImportResult,
+)
+from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable
+from robochoc.formats.dialects.tabulation import HeldConstraint, TabulatedConstraint
+from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, in_xcsp21_operators
+from robochoc.formats.dialects.xcsp21.instance import ForeignConstraint, ForeignTable, Formula, Instance, refuse
+from robochoc.formats.dialects.xcsp21.reader import FileHead, read_instance
+from robochoc.formats.dialects.xcsp21.team import to_team
 from robochoc.formats.element_view import ElementView
 from robochoc.model.constraint import INFINITE, Predicate, Semantics
 from robochoc.model.problem import Team
@@ -37,22 +44,22 @@ _ONE = Decimal(1)
 
 
 def _recognises(_path: Path, beginning: bytes) -> bool:
-    found = Beginning(beginning)
+    found = FileHead(beginning)
     return found.is_instance and found.has_agents and "XDisCSP" in found.format
 
 
-def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     if len(paths) > 1:
         refuse(paths[1], 0, "is a whole problem by itself", "import one such file at a time, or their folder")
-    instance = read_instance(paths[0], options, _knower)
+    instance = read_instance(paths[0], options, _private_agent)
     instance.name = paths[0].stem
     if instance.type == MAX_DISCSP:
         _cost_one(instance)
-        instance.notes.append(Note("MaxDisCSP", "each violated constraint costs 1"))
-    return as_team(instance, NAME, options)
+        instance.notes.append(ConversionNote("MaxDisCSP", "each violated constraint costs 1"))
+    return to_team(instance, NAME, options)
 
 
-def _knower(element: ElementView, instance: Instance) -> str:
+def _private_agent(element: ElementView, instance: Instance) -> str:
     """Return the agent that alone knows a constraint. Raises `MistakeError` where a partially known one names none."""
     model = element.attribute("model") or instance.constraint_model
     owner = element.attribute("ownerId")
@@ -66,13 +73,13 @@ def _knower(element: ElementView, instance: Instance) -> str:
 
 def _cost_one(instance: Instance) -> None:
     """Let every hard constraint cost 1 where it is violated."""
-    tables: dict[int, Table] = {}
+    tables: dict[int, ForeignTable] = {}
 
     def costing_one(one: ForeignConstraint) -> ForeignConstraint:
         match one.content:
             case Formula(definition=Predicate()) as formula:
                 return replace(one, content=replace(formula, cost=_ONE))
-            case Table() as table:
+            case ForeignTable() as table:
                 return replace(one, content=tables.setdefault(id(table), _with_ones(table)))
             case _:
                 return one
@@ -80,28 +87,28 @@ def _cost_one(instance: Instance) -> None:
     instance.constraints = list(map(costing_one, instance.constraints))
 
 
-def _with_ones(table: Table) -> Table:
+def _with_ones(table: ForeignTable) -> ForeignTable:
     costs = {values: _ONE if cost == INFINITE else cost for values, cost in table.costs.items()}
     return replace(table, costs=costs, default=_ONE if table.default == INFINITE else table.default)
 
 
-def xdiscsp_file(team: Team, options: ExportOptions) -> Written:
+def _write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the file: a DisCSP, a DCOP, or an ADCOP where two robots have costs of their own for one constraint.
 
     Raises:
         UnsupportedError: if the team has what XDisCSP has not: utilities, decimal or negative costs, a scenario.
     """
     del options
-    return Written({f"{team.name}.xml": _Writer(FlatTeam(team, FORMAT)).content()})
+    return ExportResult({f"{team.name}.xml": _XdiscspWriter(FlatTeam(team, FORMAT)).content()})
 
 
-class _Writer:
+class _XdiscspWriter:
     def __init__(self, flat: FlatTeam) -> None:
         self._flat = flat
         if flat.maximize:
             raise UnsupportedError(f"{FORMAT} has no utilities: costs are minimised")
-        self._asymmetric = flat.weighted and any(one.private_part for one in flat.held)
-        kind = "ADCOP" if self._asymmetric else "DCOP" if flat.weighted else "DisCSP"
+        self._asymmetric = flat.is_weighted and any(one.private_part for one in flat.held)
+        kind = "ADCOP" if self._asymmetric else "DCOP" if flat.is_weighted else "DisCSP"
         partly = any(one.private_part for one in flat.held)
         presentation = {
             "name": flat.team.name,
@@ -140,7 +147,7 @@ class _Writer:
         if one.private_part:
             model = {"model": "PKC", "ownerId": self._ids[one.robot.name]}
         hard = isinstance(definition, Predicate) and constraint.cost == INFINITE
-        body = plain(definition.body) if hard and isinstance(definition, Predicate) else None
+        body = in_xcsp21_operators(definition.body) if hard and isinstance(definition, Predicate) else None
         if body is not None and isinstance(definition, Predicate):
             reference = self._document.formula(definition, body)
             element = self._document.constraint(constraint.name, constraint.variables, reference, **model)
@@ -149,15 +156,15 @@ class _Writer:
         table = self._flat.table(one)
         self._document.constraint(constraint.name, table.scope, self._relation(table, one), **model)
 
-    def _relation(self, exported: Exported, one: HeldConstraint) -> str:
-        table, name = exported.table, one.constraint.name
+    def _relation(self, tabulated: TabulatedConstraint, one: HeldConstraint) -> str:
+        table, name = tabulated.table, one.constraint.name
         listed = {" ".join(map(str, values)): cost for values, cost in table.rows.items()}
-        if not self._flat.weighted:
+        if not self._flat.is_weighted:
             semantics = Semantics.CONFLICTS if table.default == 0 else Semantics.SUPPORTS
-            return self._document.relation(exported, {"semantics": semantics}, "|".join(listed))
+            return self._document.relation(tabulated, {"semantics": semantics}, "|".join(listed))
         attributes = {"semantics": "soft", "defaultCost": self._cost(table.default, name)}
         tuples = "|".join(f"{self._cost(cost, name)}:{values}" for values, cost in listed.items())
-        return self._document.relation(exported, attributes, tuples)
+        return self._document.relation(tabulated, attributes, tuples)
 
     def _is_side(self, one: HeldConstraint) -> bool:
         """Return whether a constraint becomes one side of an asymmetric one. Raises `UnsupportedError`."""
@@ -171,7 +178,7 @@ class _Writer:
 
     def _add_sides(self) -> None:
         """Write both sides of each pair of variables as one relation with two costs a tuple."""
-        sides: dict[tuple[str, ...], dict[str, list[Exported]]] = defaultdict(lambda: defaultdict(list))
+        sides: dict[tuple[str, ...], dict[str, list[TabulatedConstraint]]] = defaultdict(lambda: defaultdict(list))
         for one in self._flat.held:
             if self._is_side(one):
                 table = self._flat.table(one)
@@ -186,7 +193,9 @@ class _Writer:
                 costs[values] = INFINITE
                 words = " ".join(self._cost(cost, " ".join(pair)) for cost in both)
                 written.append(f"{words}:{' '.join(map(str, values))}")
-            table = Exported("_".join(pair), pair, CostTable("_".join(pair), costs, INFINITE, len(costs)))
+            table = TabulatedConstraint(
+                "_".join(pair), pair, ExactCostTable("_".join(pair), costs, INFINITE, len(costs))
+            )
             attributes = {"semantics": "soft", "defaultCost": "infinity"}
             reference = self._document.relation(table, attributes, "|".join(written))
             self._document.constraint("_".join(pair), pair, reference, model="TKC")
@@ -197,11 +206,11 @@ class _Writer:
         return cost_text(cost)
 
 
-def _total(parts: list[Exported], assignment: Mapping[str, int]) -> Amount:
+def _total(parts: list[TabulatedConstraint], assignment: Mapping[str, int]) -> Amount:
     total: Amount = 0
     for part in parts:
         total += part.table.rows.get(tuple(assignment[name] for name in part.scope), part.table.default)
     return total
 
 
-DIALECT = Dialect(NAME, "XDisCSP 1.0", _recognises, _read, xdiscsp_file)
+DIALECT = Dialect(NAME, "XDisCSP 1.0", _recognises, _read, _write)

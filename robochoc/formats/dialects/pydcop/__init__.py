@@ -7,7 +7,7 @@ from pathlib import Path
 from robochoc.formats.dialects.dialect import Dialect
 from robochoc.formats.dialects.pydcop.files import sections
 from robochoc.formats.dialects.pydcop.reader import read
-from robochoc.formats.dialects.pydcop.writer import written
+from robochoc.formats.dialects.pydcop.writer import write
 
 _BEGINS = {"objective", "domains"}
 _SECTIONS = {"domains", "variables", "constraints", "objective", "distribution", "events", "agents", "replica_dist"}
@@ -21,4 +21,4 @@ def recognises(path: Path, beginning: bytes) -> bool:
     return not beginning.lstrip().startswith((b"<", b"{")) and found >= _BEGINS
 
 
-DIALECT = Dialect("pydcop", "pyDCOP's YAML", recognises, read, written)
+DIALECT = Dialect("pydcop", "pyDCOP's YAML", recognises, read, write)

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from robochoc.formats.definitions import MAX_TUPLES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.pydcop.domains import Values
+from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable, apply_infinity
+from robochoc.formats.dialects.pydcop.domains import DomainValues
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.pydcop.python_values import NoValueError, Value
-from robochoc.formats.dialects.pydcop.translation import Known, Violated, translated
-from robochoc.formats.dialects.tables import Amount, CostTable, forbidding
+from robochoc.formats.dialects.pydcop.translation import VariableInfo, ViolationCost, translate
 from robochoc.formats.yaml_tree import Node, Scalar, shown
 from robochoc.model.expression import Expression
 from robochoc.model.expression.bounds import Interval, bounds
@@ -26,7 +26,7 @@ MAX_CELLS = 5_000_000
 
 
 @dataclass(frozen=True)
-class Costs:
+class ParsedConstraint:
     """The costs of a constraint of the file.
 
     Attributes:
@@ -38,7 +38,7 @@ class Costs:
 
     name: str
     scope: tuple[str, ...]
-    what: CostTable | Violated | Expression
+    what: ExactCostTable | ViolationCost | Expression
     line: int
 
 
@@ -55,7 +55,7 @@ class ConstraintReader:
         incomplete: The constraints whose tables leave tuples out.
     """
 
-    values: Mapping[str, Values]
+    values: Mapping[str, DomainValues]
     fixed: Mapping[str, Scalar]
     infinity: int | None
     maximize: bool
@@ -64,7 +64,7 @@ class ConstraintReader:
     _cells: int = 0
     _sources: dict[str, Mapping[str, Callable[..., Value]]] = field(default_factory=dict)
 
-    def read(self, name: str, node: Node) -> Costs:
+    def read(self, name: str, node: Node) -> ParsedConstraint:
         """Return the constraint in `node`. Raises `MistakeError`."""
         if not node.is_mapping:
             raise MistakeError("is no mapping", "write type: and function:, or variables: and values:")
@@ -79,26 +79,28 @@ class ConstraintReader:
             case other:
                 raise MistakeError(f"is of the type '{shortened(str(other))}'", "intention and extensional are known")
 
-    def function(self, name: str, node: Node, variables: Collection[str], sources: Node | None = None) -> Costs:
+    def function(
+        self, name: str, node: Node, variables: Collection[str], sources: Node | None = None
+    ) -> ParsedConstraint:
         """Return the costs that the function in `node` says for some of `variables`."""
         if isinstance(node.scalar, (bool, int, Fraction, float)):
-            return Costs(name, (), CostTable(name, {}, self._amount(node.scalar), 1), node.line)
+            return ParsedConstraint(name, (), ExactCostTable(name, {}, self._amount(node.scalar), 1), node.line)
         if not isinstance(node.scalar, str):
             raise MistakeError("has no function", "write function: and a Python expression", node.line)
-        function = PythonFunction(node.scalar, variables, self.fixed, self._outside(sources))
-        known = {one: Known(self.values[one].domain, self.values[one].kind) for one in function.scope}
-        simple = translated(function.body, function.scope, known, self.fixed) if len(function.scope) > 1 else None
+        function = PythonFunction(node.scalar, variables, self.fixed, self._source_functions(sources))
+        known = {one: VariableInfo(self.values[one].domain, self.values[one].kind) for one in function.scope}
+        simple = translate(function.body, function.scope, known, self.fixed) if len(function.scope) > 1 else None
         if simple is not None and self._is_bounded(simple, function.scope):
-            if isinstance(simple, Violated):
-                simple = Violated(simple.body, self._amount(simple.cost))
-            return Costs(name, function.scope, simple, node.line)
-        return Costs(name, function.scope, self._tabulated(name, function), node.line)
+            if isinstance(simple, ViolationCost):
+                simple = ViolationCost(simple.body, self._amount(simple.cost))
+            return ParsedConstraint(name, function.scope, simple, node.line)
+        return ParsedConstraint(name, function.scope, self._tabulate(name, function), node.line)
 
-    def _intention(self, name: str, node: Node) -> Costs:
+    def _intention(self, name: str, node: Node) -> ParsedConstraint:
         function = node.needed("function", "it", "write function: and a Python expression")
         return self.function(name, function, self.values, node.get("source"))
 
-    def _outside(self, node: Node | None) -> Mapping[str, Callable[..., Value]]:
+    def _source_functions(self, node: Node | None) -> Mapping[str, Callable[..., Value]]:
         if node is None:
             return {}
         if self.folder is None:
@@ -106,12 +108,12 @@ class ConstraintReader:
             raise MistakeError(what, "import it with --allow-code if you trust it", node.line)
         path = str(node.scalar)
         if path not in self._sources:
-            self._sources[path] = functions_of(self.folder / path)
+            self._sources[path] = load_functions(self.folder / path)
         return self._sources[path]
 
-    def _is_bounded(self, simple: Violated | Expression, scope: Sequence[str]) -> bool:
+    def _is_bounded(self, simple: ViolationCost | Expression, scope: Sequence[str]) -> bool:
         """Return whether no cost of an expression can reach the infinity."""
-        if isinstance(simple, Violated) or self.infinity is None:
+        if isinstance(simple, ViolationCost) or self.infinity is None:
             return True
         limits = {}
         for place, one in enumerate(scope):
@@ -120,7 +122,7 @@ class ConstraintReader:
         low, high = bounds(simple, limits)
         return -low < self.infinity if self.maximize else high < self.infinity
 
-    def _tabulated(self, name: str, function: PythonFunction) -> CostTable:
+    def _tabulate(self, name: str, function: PythonFunction) -> ExactCostTable:
         size = self._size(function.scope)
         self._cells += size
         if size > MAX_TUPLES or self._cells > MAX_CELLS:
@@ -139,10 +141,10 @@ class ConstraintReader:
                 raise MistakeError(f"has a function that gives {value!r:.40}", "costs are numbers")
             rows[codes] = self._amount(value)
         if not function.scope:
-            return CostTable(name, {}, rows[()], 1)
-        return CostTable(name, rows, 0, size)
+            return ExactCostTable(name, {}, rows[()], 1)
+        return ExactCostTable(name, rows, 0, size)
 
-    def _extensional(self, name: str, node: Node) -> Costs:
+    def _extensional(self, name: str, node: Node) -> ParsedConstraint:
         line, hint = node.line, "write values: and, below, COST: v w | v w"
         scope = self._scope(node.needed("variables", "it", "write variables: [v1, v2]"), line)
         values = node.needed("values", "it", hint)
@@ -165,7 +167,7 @@ class ConstraintReader:
             amount = self._amount(default.scalar)
         else:
             raise MistakeError("has a default that is no number", "write default: 100", default.line)
-        return Costs(name, scope, CostTable(name, rows, amount, self._size(scope)), line)
+        return ParsedConstraint(name, scope, ExactCostTable(name, rows, amount, self._size(scope)), line)
 
     def _scope(self, node: Node, line: int) -> tuple[str, ...]:
         parts = [node] if node.is_scalar else node.items
@@ -195,7 +197,9 @@ class ConstraintReader:
                 raise MistakeError(what, suggestion(bad, list(self.values[where].codes), "values"), place) from None
 
     def _amount(self, amount: Amount) -> Amount:
-        return forbidding(int(amount) if isinstance(amount, bool) else amount, self.infinity, maximize=self.maximize)
+        return apply_infinity(
+            int(amount) if isinstance(amount, bool) else amount, self.infinity, maximize=self.maximize
+        )
 
     def _size(self, scope: Sequence[str]) -> int:
         return math.prod(len(self.values[one].scalars) for one in scope)
@@ -214,7 +218,7 @@ def _tuple_words(scope: Sequence[str], node: Node) -> Iterator[tuple[int, list[s
             yield one.line, [shown(one.scalar)]
 
 
-def functions_of(path: Path) -> dict[str, Callable[..., Value]]:
+def load_functions(path: Path) -> dict[str, Callable[..., Value]]:
     """Execute the Python file at `path`, and return its functions.
 
     Raises:
@@ -229,10 +233,10 @@ def functions_of(path: Path) -> dict[str, Callable[..., Value]]:
     except Exception as error:  # noqa: BLE001 - whatever the user's code raises
         what = f"the source {shortened(str(path))} fails: {type(error).__name__}: {shortened(str(error))}"
         raise MistakeError(what, "mend the Python file") from None
-    return {name: _guarded(thing) for name, thing in vars(module).items() if callable(thing)}
+    return {name: _with_exact_numbers(thing) for name, thing in vars(module).items() if callable(thing)}
 
 
-def _guarded(function: Callable[..., object]) -> Callable[..., Value]:
+def _with_exact_numbers(function: Callable[..., object]) -> Callable[..., Value]:
     """Return `function` of Python's own numbers as one of exact ones."""
 
     def call(*arguments: Value) -> Value:

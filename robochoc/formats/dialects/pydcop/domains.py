@@ -8,8 +8,8 @@ from functools import cached_property
 
 from robochoc.formats.definitions import MAX_VALUES, check_domain
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.dialect import Names
-from robochoc.formats.dialects.tables import word
+from robochoc.formats.dialects.dialect import NameMap
+from robochoc.formats.dialects.exact_costs import xml_name
 from robochoc.formats.names import check_integer
 from robochoc.formats.yaml_tree import Node, Scalar, shown
 from robochoc.model.constraint import Domain
@@ -18,7 +18,7 @@ _HINT = "write values: [R, G] or [0..4]"
 
 
 @dataclass(frozen=True)
-class Values:
+class DomainValues:
     """The values of a domain, as the file has them, and as integers.
 
     Attributes:
@@ -47,7 +47,7 @@ class Domains:
     def __init__(self, nodes: Mapping[str, Node]) -> None:
         """Read domains, by their names. Raises `MistakeError`."""
         scalars = {name: _scalars(name, node) for name, node in nodes.items()}
-        self._symbols = Names()
+        self._symbols = NameMap()
         symbolic = {name for name, values in scalars.items() if not _are_integers(values)}
         labels = dict.fromkeys(self._label(value) for name in scalars if name in symbolic for value in scalars[name])
         self._places = {label: place for place, label in enumerate(labels)}
@@ -62,22 +62,22 @@ class Domains:
         return self._symbols.changed.items()
 
     def _label(self, value: Scalar) -> str:
-        return self._symbols.of(shown(value))
+        return self._symbols.allowed(shown(value))
 
-    def _named(self, name: str, values: Iterable[Scalar]) -> Values:
+    def _named(self, name: str, values: Iterable[Scalar]) -> DomainValues:
         scalars = {self._places[self._label(value)]: value for value in values}
         ranges = tuple(range(code, code + 1) for code in sorted(scalars))
-        return Values(Domain(word(name), ranges, tuple(self._places)), scalars)
+        return DomainValues(Domain(xml_name(name), ranges, tuple(self._places)), scalars)
 
 
-def _numbers(name: str, values: Iterable[Scalar], line: int) -> Values:
+def _numbers(name: str, values: Iterable[Scalar], line: int) -> DomainValues:
     numbers = sorted({value for value in values if isinstance(value, int)})
-    domain = Domain(word(name), tuple(range(value, value + 1) for value in numbers))
+    domain = Domain(xml_name(name), tuple(range(value, value + 1) for value in numbers))
     try:
         check_domain(domain)
     except MistakeError as mistake:
         raise MistakeError(mistake.message, mistake.hint, line) from None
-    return Values(domain, {value: value for value in numbers})
+    return DomainValues(domain, {value: value for value in numbers})
 
 
 def _are_integers(values: Iterable[Scalar]) -> bool:

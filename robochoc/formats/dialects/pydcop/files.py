@@ -16,7 +16,7 @@ _PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "exter
 
 
 @dataclass(frozen=True)
-class Part:
+class SourceText:
     """Files that are read as one text.
 
     Attributes:
@@ -29,11 +29,11 @@ class Part:
 
     def read(self, read: Callable[[Node], Read], repeated: Repeated) -> Read:
         """Return the result of `read` for the files. Raises `InvalidInputError` for a part that `read` does not use."""
-        with self.blamed():
+        with self.located():
             return read_yaml(self.text, read, repeated=repeated)
 
     @contextmanager
-    def blamed(self) -> Iterator[None]:
+    def located(self) -> Iterator[None]:
         """Turn a `MistakeError` raised inside into an `InvalidInputError` with the file and its line."""
         try:
             yield
@@ -48,7 +48,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Parts:
+class ProblemFiles:
     """The files of a problem.
 
     Attributes:
@@ -57,9 +57,9 @@ class Parts:
         scenario: What happens.
     """
 
-    problem: Part
-    distribution: Part | None
-    scenario: Part | None
+    problem: SourceText
+    distribution: SourceText | None
+    scenario: SourceText | None
 
 
 def sections(text: str) -> set[str]:
@@ -75,7 +75,7 @@ def _is_in_braces(text: str) -> bool:
     return False
 
 
-def read_parts(paths: Sequence[Path]) -> Parts:
+def read_files(paths: Sequence[Path]) -> ProblemFiles:
     """Return the files at `paths` in their parts. Raises `InvalidInputError`."""
     texts: dict[str, list[tuple[Path, str]]] = {"problem": [], "distribution": [], "scenario": []}
     total = 0
@@ -94,10 +94,10 @@ def read_parts(paths: Sequence[Path]) -> Parts:
     for kind in ("distribution", "scenario"):
         if len(texts[kind]) > 1:
             raise _invalid(texts[kind][1][0], f"is a second {kind}", "name one")
-    return Parts(
-        _joined(texts["problem"]),
-        _joined(texts["distribution"]) if texts["distribution"] else None,
-        _joined(texts["scenario"]) if texts["scenario"] else None,
+    return ProblemFiles(
+        _join(texts["problem"]),
+        _join(texts["distribution"]) if texts["distribution"] else None,
+        _join(texts["scenario"]) if texts["scenario"] else None,
     )
 
 
@@ -111,14 +111,14 @@ def _kind(text: str) -> str:
     return "problem"
 
 
-def _joined(texts: Sequence[tuple[Path, str]]) -> Part:
+def _join(texts: Sequence[tuple[Path, str]]) -> SourceText:
     files, lines, parts = [], 0, []
     for path, text in texts:
         ended = text if text.endswith("\n") else f"{text}\n"
         files.append((path, lines))
         parts.append(ended)
         lines += ended.count("\n")
-    return Part(tuple(files), "".join(parts))
+    return SourceText(tuple(files), "".join(parts))
 
 
 def file_text(path: Path) -> str:

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from heapq import heapify, heapreplace
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.dialect import Note, owners_by
+from robochoc.formats.dialects.dialect import ConversionNote, owners_by
 from robochoc.formats.yaml_tree import Node, Scalar
 
 
 @dataclass
-class Hosting:
+class VariableOwners:
     """The variables that each agent owns.
 
     Attributes:
@@ -27,14 +27,14 @@ class Hosting:
     variables: Sequence[str]
     constraints: Collection[str]
     owners: dict[str, str] = field(default_factory=dict)
-    notes: list[Note] = field(default_factory=list)
+    notes: list[ConversionNote] = field(default_factory=list)
 
-    def by_pattern(self, pattern: str) -> None:
+    def assign_by_pattern(self, pattern: str) -> None:
         """Let variables belong together that `pattern` finds the same in: its first group, or all of its match."""
         self.owners = owners_by(pattern, self.variables)
         self.agents = list(dict.fromkeys(self.owners.values()))
 
-    def by_agent(self, node: Node, what: str) -> None:
+    def assign_by_agent(self, node: Node, what: str) -> None:
         """Take the owners from a mapping of agents to what they host. Those that are known stay."""
         if not node.is_mapping:
             raise MistakeError(f"the {what} is no mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
@@ -55,7 +55,7 @@ class Hosting:
         for name, agent in found.items():
             self.owners.setdefault(name, agent)
 
-    def rest(self) -> None:
+    def assign_remaining(self) -> None:
         """Give what nobody owns to the agents that own least, in their order; without agents, each gets its own."""
         left = [name for name in self.variables if name not in self.owners]
         if not left:
@@ -63,7 +63,7 @@ class Hosting:
         if not self.agents:
             self.agents = list(self.variables)
             self.owners.update((name, name) for name in left)
-            self.notes.append(Note("owner", "there are no agents: each variable is a robot's of its own"))
+            self.notes.append(ConversionNote("owner", "there are no agents: each variable is a robot's of its own"))
             return
         load = dict.fromkeys(self.agents, 0)
         for agent in self.owners.values():
@@ -75,7 +75,7 @@ class Hosting:
             self.owners[name] = agent
             heapreplace(least, (number + 1, place, agent))
         text = f"the file says no owner of {len(left)} variables: agents that had least took them, in their order"
-        self.notes.append(Note("owner", text))
+        self.notes.append(ConversionNote("owner", text))
 
     def robots(self) -> dict[str, list[str]]:
         """Return the variables of each agent that owns some. The others are left out, and noted."""
@@ -84,7 +84,7 @@ class Hosting:
             owned[self.owners[name]].append(name)
         idle = [agent for agent, names in owned.items() if not names]
         if idle:
-            self.notes.append(Note("dropped", f"agents that own no variable: {shortened(' '.join(idle))}"))
+            self.notes.append(ConversionNote("dropped", f"agents that own no variable: {shortened(' '.join(idle))}"))
         return {agent: names for agent, names in owned.items() if names}
 
 
@@ -103,17 +103,17 @@ def agent_names(node: Node | None) -> list[str]:
 
 def _named(node: Node) -> Iterator[tuple[str, Node]]:
     for key, one in node.named():
-        yield text_of(key, one.line), one
+        yield name_text(key, one.line), one
 
 
 def _names(node: Node) -> Iterator[str]:
     if node.is_empty:
         return
     for one in node.items if node.items is not None else [node]:
-        yield text_of(one.scalar, one.line)
+        yield name_text(one.scalar, one.line)
 
 
-def text_of(key: Scalar, line: int) -> str:
+def name_text(key: Scalar, line: int) -> str:
     """Return a name. Raises `MistakeError` unless it is one: YAML takes `no` and `on` for truth values."""
     if isinstance(key, int) and not isinstance(key, bool):
         return str(key)

@@ -13,14 +13,14 @@ from typing import NoReturn
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.pydcop.python_values import (
+    AGGREGATES,
     ARITHMETIC,
     COMPARISONS,
     FUNCTIONS,
     MAX_ITEMS,
-    OF_MEMBERS,
     SIGNS,
-    Entries,
-    Items,
+    BoundedDict,
+    BoundedTuple,
     NoValueError,
     Value,
     bounded,
@@ -46,19 +46,19 @@ operation reads.
 _NODES_A_STEP = 10
 """The number of operators and terms of a loop's body that are done in one step."""
 
-Outside = Callable[..., Value]
+SourceFunction = Callable[..., Value]
 """A function that is called by its name."""
 
 _Names = dict[str, Value]
 _Closure = Callable[[_Names], Value]
-_Statement = Callable[[_Names], "Value | _Nothing"]
+_Statement = Callable[[_Names], "Value | _NoReturn"]
 
 
-class _Nothing:
+class _NoReturn:
     """What a statement gives that is no `return`."""
 
 
-_GOES_ON = _Nothing()
+_CONTINUE = _NoReturn()
 
 
 class PythonFunction:
@@ -74,7 +74,7 @@ class PythonFunction:
         source: str,
         variables: Collection[str],
         fixed: Mapping[str, Value] = MappingProxyType({}),
-        outside: Mapping[str, Outside] = MappingProxyType({}),
+        source_functions: Mapping[str, SourceFunction] = MappingProxyType({}),
     ) -> None:
         """Read a function, as pyDCOP does: an expression, or statements with `return`.
 
@@ -82,7 +82,7 @@ class PythonFunction:
             source: The text.
             variables: The names that variables have.
             fixed: Names that stand for values.
-            outside: Functions of a Python file, which the text calls `source.NAME`. They are executed.
+            source_functions: Functions of a Python file, which the text calls `source.NAME`. They are executed.
 
         Raises:
             MistakeError: if it is no Python, is too long, or has what is not allowed.
@@ -94,7 +94,7 @@ class PythonFunction:
         self.scope = tuple(dict.fromkeys(name for name in loaded if name in variables and name not in stored))
         # Only names that appear: a problem has as many functions as variables.
         constants = {name: fixed[name] for name in loaded if name in fixed and name not in stored}
-        compiler = _Compiler(variables, stored, constants, outside)
+        compiler = _Compiler(variables, stored, constants, source_functions)
         self._compiler = compiler
         self._steps = _steps_of(self.body) // _NODES_A_STEP
         self._run: _Statement = (
@@ -116,7 +116,7 @@ class PythonFunction:
             self._refuse(str(error), arguments)
         except (ArithmeticError, TypeError, LookupError, ValueError) as error:
             self._refuse(f"{type(error).__name__}: {error}", arguments)
-        if isinstance(result, _Nothing) or result is None:
+        if isinstance(result, _NoReturn) or result is None:
             self._refuse("it returns nothing", arguments)
         return result
 
@@ -174,24 +174,24 @@ class _Compiler:
         variables: Collection[str],
         stored: Collection[str],
         fixed: Mapping[str, Value],
-        outside: Mapping[str, Outside],
+        source_functions: Mapping[str, SourceFunction],
     ) -> None:
         self._variables = variables
         self._stored = stored
         self._fixed = fixed
-        self._outside = outside
+        self._source_functions = source_functions
         self._steps = MAX_STEPS
 
     def block(self, body: Sequence[ast.stmt]) -> _Statement:
         """Return statements that run one after the other, until one returns."""
         parts = [self._statement(one) for one in body]
 
-        def run(names: _Names) -> Value | _Nothing:
+        def run(names: _Names) -> Value | _NoReturn:
             for part in parts:
                 result = part(names)
-                if result is not _GOES_ON:
+                if result is not _CONTINUE:
                     return result
-            return _GOES_ON
+            return _CONTINUE
 
         return run
 
@@ -200,7 +200,7 @@ class _Compiler:
             case ast.Return(value=ast.expr() as value):
                 return self.expression(value)
             case ast.Pass() | ast.Expr(value=ast.Constant()):
-                return lambda _: _GOES_ON
+                return lambda _: _CONTINUE
             case ast.If(test=test, body=body, orelse=otherwise):
                 condition, then, other = self.expression(test), self.block(body), self.block(otherwise)
                 return lambda names: then(names) if condition(names) else other(names)
@@ -220,14 +220,14 @@ class _Compiler:
     def _loop(self, name: str, over: _Closure, statements: Sequence[ast.stmt]) -> _Statement:
         body, steps = self.block(statements), _steps_of(statements)
 
-        def run(names: _Names) -> Value | _Nothing:
+        def run(names: _Names) -> Value | _NoReturn:
             for one in self._items(over(names)):
                 self.step(steps)
                 names[name] = one
                 result = body(names)
-                if result is not _GOES_ON:
+                if result is not _CONTINUE:
                     return result
-            return _GOES_ON
+            return _CONTINUE
 
         return run
 
@@ -239,7 +239,7 @@ class _Compiler:
             case ast.Name(id=name):
                 return self._name(name)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
-                return _of_two(ARITHMETIC[type(op)], self.expression(left), self.expression(right))
+                return _binary(ARITHMETIC[type(op)], self.expression(left), self.expression(right))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 denied = self.expression(operand)
                 return lambda names: not denied(names)
@@ -247,21 +247,21 @@ class _Compiler:
                 sign, signed = SIGNS[type(op)], self.expression(operand)
                 return lambda names: sign(number(signed(names)))
             case ast.BoolOp(op=op, values=values):
-                return _of_truth([self.expression(one) for one in values], is_and=isinstance(op, ast.And))
+                return _short_circuit([self.expression(one) for one in values], is_and=isinstance(op, ast.And))
             case ast.Compare(left=left, ops=ops, comparators=others):
-                return self._comparison(left, ops, others)
+                return self._compile_comparison(left, ops, others)
             case ast.IfExp(test=test, body=body, orelse=otherwise):
                 condition, then, other = map(self.expression, (test, body, otherwise))
                 return lambda names: then(names) if condition(names) else other(names)
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 return self._call(name, FUNCTIONS, arguments)
             case ast.Call(func=ast.Attribute(value=ast.Name(id="source"), attr=name), args=arguments, keywords=[]) if (
-                self._outside
+                self._source_functions
             ):
-                return self._call(name, self._outside, arguments)
+                return self._call(name, self._source_functions, arguments)
             case ast.Tuple(elts=parts) | ast.List(elts=parts):
                 made = [self.expression(one) for one in parts]
-                return lambda names: Items([one(names) for one in made])
+                return lambda names: BoundedTuple([one(names) for one in made])
             case ast.Dict(keys=keys, values=values) if None not in keys:
                 return _entries([self.expression(key) for key in keys if key], [*map(self.expression, values)])
             case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Slice):
@@ -291,14 +291,14 @@ class _Compiler:
             raise MistakeError(f"the function has '{shortened(name)}', which is no variable", hint)
         return lambda names: names[name]
 
-    def _call(self, name: str, functions: Mapping[str, Outside], arguments: Sequence[ast.expr]) -> _Closure:
+    def _call(self, name: str, functions: Mapping[str, SourceFunction], arguments: Sequence[ast.expr]) -> _Closure:
         called = functions.get(name)
         if called is None:
             allowed = f"these are allowed: {shortened(' '.join(functions))}"
             raise MistakeError(f"the function calls '{shortened(name)}'", allowed)
         if any(isinstance(one, ast.Starred) for one in arguments):
             _refuse(arguments[0])
-        read = self._members if name in OF_MEMBERS and len(arguments) == 1 else self.expression
+        read = self._members if name in AGGREGATES and len(arguments) == 1 else self.expression
         made = [read(one) for one in arguments]
 
         def call(names: _Names) -> Value:
@@ -321,7 +321,7 @@ class _Compiler:
 
         return members
 
-    def _comparison(self, left: ast.expr, ops: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> _Closure:
+    def _compile_comparison(self, left: ast.expr, ops: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> _Closure:
         first = self.expression(left)
         rest = [
             (COMPARISONS[type(op)], (self._members if isinstance(op, ast.In | ast.NotIn) else self.expression)(other))
@@ -360,7 +360,7 @@ class _Compiler:
                     size += max(1, size_of(found[-1]))
                     if size > MAX_ITEMS:
                         break
-            return Items(found)
+            return BoundedTuple(found)
 
         return collect
 
@@ -392,24 +392,24 @@ def _entries(keys: Sequence[_Closure], values: Sequence[_Closure]) -> _Closure:
     def entries(names: _Names) -> Value:
         found = [key(names) for key in keys]
         distinct(found)
-        return Entries(dict(zip(found, [one(names) for one in values], strict=True)))
+        return BoundedDict(dict(zip(found, [one(names) for one in values], strict=True)))
 
     return entries
 
 
 def _assignment(name: str, value: _Closure) -> _Statement:
-    def assign(names: _Names) -> _Nothing:
+    def assign(names: _Names) -> _NoReturn:
         names[name] = value(names)
-        return _GOES_ON
+        return _CONTINUE
 
     return assign
 
 
-def _of_two(meaning: Callable[..., Value], left: _Closure, right: _Closure) -> _Closure:
+def _binary(meaning: Callable[..., Value], left: _Closure, right: _Closure) -> _Closure:
     return lambda names: bounded(meaning(number(left(names)), number(right(names))))
 
 
-def _of_truth(parts: Sequence[_Closure], *, is_and: bool) -> _Closure:
+def _short_circuit(parts: Sequence[_Closure], *, is_and: bool) -> _Closure:
     """Return what `and` or `or` gives: the first value that decides, or the last."""
 
     def decide(names: _Names) -> Value:

@@ -3,8 +3,8 @@
 Numbers are integers and fractions: `0.1 + 0.2` is 0.3 here. Only infinities are floats.
 
 Each operation is one call of C code, which nothing can interrupt. Its cost is therefore bounded by the size of its
-operands: numbers have at most `MAX_BITS` bits, and lists and dictionaries are `Items` and `Entries`, whose size
-counts nested members as often as they can be reached.
+operands: numbers have at most `MAX_BITS` bits, and lists and dictionaries are `BoundedTuple` and `BoundedDict`, whose
+size counts nested members as often as they can be reached.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 
 Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict["Value", "Value"]
-"""The value of an expression. Lists and dictionaries are always `Items` and `Entries`."""
+"""The value of an expression. Lists and dictionaries are always `BoundedTuple` and `BoundedDict`."""
 
 MAX_BITS = 1024
 """The maximum size of a number, and of its denominator."""
@@ -47,7 +47,7 @@ class _Sized:
         size = nesting = 0
         for member in members:
             size += max(1, size_of(member))
-            if isinstance(member, (Items, Entries)):
+            if isinstance(member, (BoundedTuple, BoundedDict)):
                 nesting = max(nesting, member.nesting)
             if size > MAX_ITEMS:
                 raise NoValueError(f"a list has more than {MAX_ITEMS} members, those of its members included")
@@ -56,14 +56,14 @@ class _Sized:
         self.size, self.nesting = size, nesting + 1
 
 
-class Items(tuple["Value", ...], _Sized):  # noqa: SLOT001 - a tuple cannot have any
+class BoundedTuple(tuple["Value", ...], _Sized):  # noqa: SLOT001 - a tuple cannot have any
     """A list or tuple. Raises `NoValueError` if it is too large."""
 
     def __init__(self, members: Iterable[Value]) -> None:  # noqa: ARG002 - `tuple` has read them
         self._measure(self)
 
 
-class Entries(dict["Value", "Value"], _Sized):
+class BoundedDict(dict["Value", "Value"], _Sized):
     """A dictionary. Raises `NoValueError` if it is too large, or if its keys are chosen to collide."""
 
     def __init__(self, entries: Mapping[Value, Value]) -> None:
@@ -73,7 +73,7 @@ class Entries(dict["Value", "Value"], _Sized):
 
 def size_of(value: Value) -> int:
     """Return the number of steps for one operation on `value`: 0 for a value without members."""
-    if isinstance(value, (Items, Entries)):
+    if isinstance(value, (BoundedTuple, BoundedDict)):
         return value.size
     return len(value) if isinstance(value, str) else 0
 
@@ -107,7 +107,7 @@ def literal(value: object) -> Value:
     raise NoValueError(f"the constant {value!r:.60}")
 
 
-def divided(left: Fraction | float, right: Fraction | float) -> Value:
+def divide(left: Fraction | float, right: Fraction | float) -> Value:
     """Return the quotient, exactly."""
     if isinstance(left, float) or isinstance(right, float):
         return float(left) / float(right)
@@ -133,7 +133,7 @@ ARITHMETIC: dict[type[ast.operator], Callable[..., Value]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
-    ast.Div: divided,
+    ast.Div: divide,
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
     ast.Pow: power,
@@ -194,7 +194,7 @@ def _range(*ends: Value) -> Value:
     values = range(*[int(number(end)) for end in ends])
     if len(values[: MAX_ITEMS + 1]) > MAX_ITEMS:  # `len` of a range has at most 63 bits
         raise NoValueError("a range is too long")
-    return Items(values)
+    return BoundedTuple(values)
 
 
 def _power(base: Value, exponent: Value) -> Value:
@@ -224,11 +224,11 @@ FUNCTIONS: dict[str, Callable[..., Value]] = {
     "sum": _sum,
 }
 """Python's functions that may be called."""
-OF_MEMBERS = frozenset({"all", "any", "len", "max", "min", "sum"})
+AGGREGATES = frozenset({"all", "any", "len", "max", "min", "sum"})
 """Those that ask a set for its members alone, in whatever order they are."""
 
 
-def distinct(values: Iterable[Value]) -> Items:
+def distinct(values: Iterable[Value]) -> BoundedTuple:
     """Return each of `values` once. Raises `NoValueError` for values that cannot be in a set."""
     by_hash: dict[int, list[Value]] = {}
     try:
@@ -240,7 +240,7 @@ def distinct(values: Iterable[Value]) -> Items:
                 raise NoValueError("too many members of a set or keys of a dictionary have the same hash")
     except TypeError:
         raise NoValueError("a member of a set is a dictionary") from None
-    return Items(dict.fromkeys(values))
+    return BoundedTuple(dict.fromkeys(values))
 
 
 def items(value: Value) -> tuple[Value, ...]:

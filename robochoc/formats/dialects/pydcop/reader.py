@@ -11,14 +11,14 @@ from pathlib import Path
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
-from robochoc.formats.dialects.pydcop.constraints import ConstraintReader, Costs
-from robochoc.formats.dialects.pydcop.domains import Domains, Values
-from robochoc.formats.dialects.pydcop.files import Part, Parts, read_parts
-from robochoc.formats.dialects.pydcop.hosting import Hosting, agent_names, text_of
+from robochoc.formats.dialects.dialect import ConversionNote, ImportOptions, ImportResult, NameMap, notes_on_names
+from robochoc.formats.dialects.exact_costs import ExactCostTable, Scale, definition_name, relation, xml_name
+from robochoc.formats.dialects.pydcop.constraints import ConstraintReader, ParsedConstraint
+from robochoc.formats.dialects.pydcop.domains import Domains, DomainValues
+from robochoc.formats.dialects.pydcop.files import ProblemFiles, SourceText, read_files
+from robochoc.formats.dialects.pydcop.hosting import VariableOwners, agent_names, name_text
 from robochoc.formats.dialects.pydcop.scenario import read_scenario
-from robochoc.formats.dialects.pydcop.translation import Violated
-from robochoc.formats.dialects.tables import CostTable, Scale, definition_name, relation, word
+from robochoc.formats.dialects.pydcop.translation import ViolationCost
 from robochoc.formats.yaml_tree import Node, Scalar, shown
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import (
@@ -39,7 +39,7 @@ _REMARKS = ("description", "inputs")
 """Sections with remarks for people, or about the programs that wrote the file."""
 _WISHES = ("host_with", "may_host")
 """Distribution hints that do not affect owners."""
-_OF_DISTRIBUTE = ("inputs", "status", "cost", "duration", "communication_cost", "hosting_cost")
+_DISTRIBUTE_REMARKS = ("inputs", "status", "cost", "duration", "communication_cost", "hosting_cost")
 _OBJECTIVE = "write objective: min, or objective: max"
 _DROPPED = {
     "routes": "routes between agents",
@@ -49,32 +49,34 @@ _DROPPED = {
 }
 
 
-def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     """Return the problem in pyDCOP's files `paths`.
 
     Raises:
         InvalidInputError: with the first mistake.
     """
-    parts, notes = read_parts(paths), []
+    parts, notes = read_files(paths), []
 
     def repeated(line: int, key: str) -> None:
         path, number = parts.problem.place(line)
-        notes.append(Note("repeated", f"{path}:{number}: duplicate key {shortened(key)}; the later value counts"))
+        notes.append(
+            ConversionNote("repeated", f"{path}:{number}: duplicate key {shortened(key)}; the later value counts")
+        )
 
-    return parts.problem.read(lambda root: _Reader(parts, options, root, notes).imported(), repeated)
+    return parts.problem.read(lambda root: _PydcopReader(parts, options, root, notes).imported(), repeated)
 
 
-class _Reader:
-    def __init__(self, parts: Parts, options: ImportOptions, root: Node, notes: list[Note]) -> None:
+class _PydcopReader:
+    def __init__(self, parts: ProblemFiles, options: ImportOptions, root: Node, notes: list[ConversionNote]) -> None:
         self._parts = parts
         self._options = options
         self._root = _mapping(root, "the problem")
         self._notes = notes
-        self._variable_names, self._robot_names = Names(), Names()
+        self._variable_names, self._robot_names = NameMap(), NameMap()
 
-    def imported(self) -> Imported:
+    def imported(self) -> ImportResult:
         """Return the problem. Raises `MistakeError`."""
-        self._note_what_is_left_out()
+        self._note_dropped_sections()
         maximize = self._maximize()
         nodes = dict(_section(self._root, "variables"))
         if not nodes:
@@ -86,23 +88,23 @@ class _Reader:
         reader = ConstraintReader(values, self._external(domains), self._infinity(), maximize, self._folder())
         costs = list(self._costs(reader, nodes))
         if reader.incomplete:
-            text = f"tuples that a table without default leaves out are forbidden: {_some(reader.incomplete)}"
-            self._notes.append(Note("default", text))
+            text = f"tuples that a table without default leaves out are forbidden: {_first_names(reader.incomplete)}"
+            self._notes.append(ConversionNote("default", text))
         robots = self._robots(list(values))
         team = self._team(values, costs, robots, maximize=maximize)
         team = replace(team, scenario=self._scenario(team))
         changed = {**self._variable_names.changed, **self._robot_names.changed}
         self._notes += notes_on_names(list(changed.items()))
-        return Imported(team, "pydcop", changed, tuple(self._notes))
+        return ImportResult(team, "pydcop", changed, tuple(self._notes))
 
-    def _note_what_is_left_out(self) -> None:
+    def _note_dropped_sections(self) -> None:
         for key in _REMARKS:
             if remark := self._root.get(key):
                 remark.skip()
         for key, what in _DROPPED.items():
             if dropped := self._root.get(key):
                 dropped.skip()
-                self._notes.append(Note("dropped", what))
+                self._notes.append(ConversionNote("dropped", what))
 
     def _maximize(self) -> bool:
         node = self._root.get("objective")
@@ -110,10 +112,10 @@ class _Reader:
         if node is None or known is None:
             raise MistakeError("has no objective", _OBJECTIVE, node.line if node else 0)
         if known not in ("min", "max"):
-            word = str(known)
-            meant = next((short for short in ("min", "max") if word.strip().lower().startswith(short)), None)
+            text = str(known)
+            meant = next((short for short in ("min", "max") if text.strip().lower().startswith(short)), None)
             hint = f"write objective: {meant}" if meant else _OBJECTIVE
-            raise MistakeError(f"has the objective '{shortened(word)}'", hint, node.line)
+            raise MistakeError(f"has the objective '{shortened(text)}'", hint, node.line)
         return known == "max"
 
     def _infinity(self) -> int | None:
@@ -125,7 +127,7 @@ class _Reader:
             return self._options.infinity
         if isinstance(node.scalar, bool) or not isinstance(node.scalar, int) or node.scalar < 1:
             raise MistakeError("has an infinity that is no number", "write infinity: 10000", node.line)
-        self._notes.append(Note("infinity", f"costs from {node.scalar} on forbid, as the file says"))
+        self._notes.append(ConversionNote("infinity", f"costs from {node.scalar} on forbid, as the file says"))
         return node.scalar
 
     def _folder(self) -> Path | None:
@@ -140,52 +142,54 @@ class _Reader:
                 raise MistakeError(what, "write initial_value: and a value of its domain", node.line)
             fixed[name] = initial.scalar
         if fixed:
-            self._notes.append(Note("external", f"external variables keep their initial values: {_some(fixed)}"))
+            self._notes.append(
+                ConversionNote("external", f"external variables keep their initial values: {_first_names(fixed)}")
+            )
         return fixed
 
-    def _costs(self, reader: ConstraintReader, variables: Mapping[str, Node]) -> Iterator[Costs]:
+    def _costs(self, reader: ConstraintReader, variables: Mapping[str, Node]) -> Iterator[ParsedConstraint]:
         parts: dict[str, list[str]] = {"noise_level": [], "initial_value": [], "partial": []}
         for name, node in variables.items():
             for part in ("noise_level", "initial_value", "partial"):
                 _leave_out(node, part, name, parts)
             if function := node.get("cost_function"):
-                with _named(f"the cost_function of {shortened(name)}", function.line):
+                with _error_context(f"the cost_function of {shortened(name)}", function.line):
                     yield reader.function(f"cost_{name}", function, (name,))
         for name, node in self._constraints.items():
             _leave_out(node, "partial", name, parts)
-            with _named(f"the constraint {shortened(name)}", node.line):
+            with _error_context(f"the constraint {shortened(name)}", node.line):
                 yield reader.read(name, node)
         for part, found in parts.items():
             if found:
-                self._notes.append(Note("dropped", f"{part} of {_some(found)}"))
+                self._notes.append(ConversionNote("dropped", f"{part} of {_first_names(found)}"))
 
     def _robots(self, variables: Sequence[str]) -> dict[str, list[str]]:
-        hosting = Hosting(agent_names(self._root.get("agents")), variables, self._constraints)
+        hosting = VariableOwners(agent_names(self._root.get("agents")), variables, self._constraints)
         hints, own = self._root.get("distribution_hints"), self._root.get("distribution")
         must = hints.get("must_host") if hints else None
         for wish in filter(None, (hints.get(key) if hints else None for key in _WISHES)):
             wish.skip()
         if self._options.owner is not None:
-            hosting.by_pattern(self._options.owner)
+            hosting.assign_by_pattern(self._options.owner)
             for other in filter(None, (own, must)):
                 other.skip()
         elif self._parts.distribution is not None:
-            self._parts.distribution.read(lambda root: _distribute(root, hosting), _pass_over)
+            self._parts.distribution.read(lambda root: _read_distribution(root, hosting), _ignore_duplicate_key)
             if own:
                 own.skip()
         elif own is not None:
-            hosting.by_agent(own, "distribution")
+            hosting.assign_by_agent(own, "distribution")
         if self._options.owner is None and must is not None:
-            hosting.by_agent(must, "must_host")
-        hosting.rest()
+            hosting.assign_by_agent(must, "must_host")
+        hosting.assign_remaining()
         robots = hosting.robots()
         self._notes += hosting.notes
         return robots
 
     def _team(
         self,
-        values: Mapping[str, Values],
-        costs: Sequence[Costs],
+        values: Mapping[str, DomainValues],
+        costs: Sequence[ParsedConstraint],
         robots: Mapping[str, Sequence[str]],
         *,
         maximize: bool,
@@ -193,18 +197,18 @@ class _Reader:
         scale = Scale(_amounts(costs))
         if scale.rounds:
             text = f"some costs have more than {scale.places} decimal places, and were rounded to that many"
-            self._notes.append(Note("rounded", text))
+            self._notes.append(ConversionNote("rounded", text))
         places = self._variable_names
         variables = {
-            self._robot_names.of(agent): [Variable(places.of(name), values[name].domain) for name in names]
+            self._robot_names.allowed(agent): [Variable(places.allowed(name), values[name].domain) for name in names]
             for agent, names in robots.items()
         }
-        maker = _Maker(places, scale)
-        constraints = [made for one in costs if (made := maker.constraint(one)) is not None]
+        builder = _ConstraintBuilder(places, scale)
+        constraints = [made for one in costs if (made := builder.constraint(one)) is not None]
         name = self._options.name or self._name()
-        if not maker.constant and not any(map(_is_soft, constraints)):
+        if not builder.constant and not any(map(_is_soft, constraints)):
             return assemble(name, variables, constraints)
-        units = CostUnits(maximize, scale.places, maker.constant)
+        units = CostUnits(maximize, scale.places, builder.constant)
         return assemble(name, variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
 
     def _name(self) -> str:
@@ -213,34 +217,34 @@ class _Reader:
         return re.sub(r"[^A-Za-z0-9_.-]+", "_", found)[:100].strip("._-") or "team"
 
     def _scenario(self, team: Team) -> tuple[ScenarioEvent, ...]:
-        part: Part | None = self._parts.scenario
+        part: SourceText | None = self._parts.scenario
         if part is None:
             return ()
         agents = agent_names(self._root.get("agents"))
         return part.read(
             lambda root: read_scenario(root, team, self._robot_names, agents, self._notes),
             lambda _, key: self._notes.append(
-                Note("repeated", f"duplicate key {shortened(key)}; the later value counts")
+                ConversionNote("repeated", f"duplicate key {shortened(key)}; the later value counts")
             ),
         )
 
 
-class _Maker:
+class _ConstraintBuilder:
     """Makes constraints of costs. Equal predicates and functions are one object."""
 
-    def __init__(self, names: Names, scale: Scale) -> None:
+    def __init__(self, names: NameMap, scale: Scale) -> None:
         self._names = names
         self._scale = scale
         self._made: dict[tuple[str, Expression], Predicate | Function] = {}
         self.constant = 0
 
-    def constraint(self, costs: Costs) -> Constraint | None:
+    def constraint(self, costs: ParsedConstraint) -> Constraint | None:
         """Return a constraint. None: it is a constant, which has been added. Raises `MistakeError`."""
-        scope = tuple(map(self._names.of, costs.scope))
-        name = word(costs.name)
-        with _named(f"the constraint {shortened(costs.name)}", costs.line):
+        scope = tuple(map(self._names.allowed, costs.scope))
+        name = xml_name(costs.name)
+        with _error_context(f"the constraint {shortened(costs.name)}", costs.line):
             match costs.what:
-                case CostTable() as table:
+                case ExactCostTable() as table:
                     made = relation(table, len(scope), self._scale)
                     if isinstance(made, int):
                         self.constant += made
@@ -249,7 +253,7 @@ class _Maker:
                         raise MistakeError("forbids everything", "delete it, and the problem has a solution")
                     scope = scope[: made.arity]
                     return Constraint(name, made, scope, scope, ConstraintModel.TKC, line=costs.line)
-                case Violated(body, cost):
+                case ViolationCost(body, cost):
                     predicate = self._predicate(name, scope, body)
                     units = self._scale.units(cost)
                     return Constraint(name, predicate, scope, scope, ConstraintModel.TKC, units, costs.line)
@@ -259,7 +263,7 @@ class _Maker:
 
     def _predicate(self, name: str, scope: Sequence[str], body: Expression) -> Predicate | Function:
         for known in PREDEFINED.values():
-            if _on_xs(known.body) == body and len(scope) == len(known.parameters):
+            if _over_formals(known.body) == body and len(scope) == len(known.parameters):
                 return known
         return self._definition(Predicate, name, scope, body)
 
@@ -272,7 +276,7 @@ class _Maker:
         return self._made[key]
 
 
-def _on_xs(body: Expression) -> Expression:
+def _over_formals(body: Expression) -> Expression:
     """Return a predefined predicate's body over X0 and X1."""
     match body:
         case Apply(operator, (Name("X"), Name("Y"))):
@@ -281,12 +285,12 @@ def _on_xs(body: Expression) -> Expression:
             return body
 
 
-def _amounts(costs: Iterable[Costs]) -> Iterator[int | Fraction | float]:
+def _amounts(costs: Iterable[ParsedConstraint]) -> Iterator[int | Fraction | float]:
     for one in costs:
         match one.what:
-            case CostTable() as table:
+            case ExactCostTable() as table:
                 yield from table.amounts()
-            case Violated(_, cost):
+            case ViolationCost(_, cost):
                 yield cost
             case _:
                 pass
@@ -302,7 +306,7 @@ def _is_soft(constraint: Constraint) -> bool:
             return True
 
 
-def _values(name: str, node: Node, domains: Domains) -> Values:
+def _values(name: str, node: Node, domains: Domains) -> DomainValues:
     domain = _mapping(node, f"the variable '{shortened(name)}'").get("domain")
     wanted = shown(domain.scalar) if domain is not None else ""
     if wanted not in domains.all:
@@ -316,7 +320,7 @@ def _section(root: Node, name: str) -> Iterator[tuple[str, Node]]:
     if node is None or node.is_empty:
         return
     for key, one in _mapping(node, name).named():
-        yield text_of(key, one.line), one
+        yield name_text(key, one.line), one
 
 
 def _mapping(node: Node, what: str) -> Node:
@@ -331,20 +335,20 @@ def _leave_out(node: Node, part: str, name: str, found: Mapping[str, list[str]])
         found[part].append(name)
 
 
-def _distribute(root: Node, hosting: Hosting) -> None:
+def _read_distribution(root: Node, hosting: VariableOwners) -> None:
     """Read a distribution; leave out the remarks that pyDCOP's `distribute` adds."""
-    for key in _OF_DISTRIBUTE:
+    for key in _DISTRIBUTE_REMARKS:
         if told := root.get(key):
             told.skip()
-    hosting.by_agent(root.needed("distribution", "the file"), "distribution")
+    hosting.assign_by_agent(root.needed("distribution", "the file"), "distribution")
 
 
-def _pass_over(_line: int, _key: str) -> None:
+def _ignore_duplicate_key(_line: int, _key: str) -> None:
     """Use the later of two equal keys, as pyDCOP does."""
 
 
 @contextmanager
-def _named(what: str, line: int) -> Iterator[None]:
+def _error_context(what: str, line: int) -> Iterator[None]:
     """Say of a `MistakeError` raised inside what it is about, and where that stands."""
     try:
         yield
@@ -352,6 +356,6 @@ def _named(what: str, line: int) -> Iterator[None]:
         raise MistakeError(f"{what}: {mistake.message}", mistake.hint, mistake.line or line) from None
 
 
-def _some(names: Collection[str]) -> str:
+def _first_names(names: Collection[str]) -> str:
     first = list(names)[:5]
     return f"{' '.join(map(shortened, first))}{f' and {len(names) - 5} more' if len(names) > 5 else ''}"  # noqa: PLR2004

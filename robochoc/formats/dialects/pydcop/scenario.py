@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.dialect import Names, Note
-from robochoc.formats.dialects.pydcop.hosting import text_of
+from robochoc.formats.dialects.dialect import ConversionNote, NameMap
+from robochoc.formats.dialects.pydcop.hosting import name_text
 from robochoc.formats.yaml_tree import Node
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.system.plain_text import counted
 
 
 def read_scenario(
-    root: Node, team: Team, names: Names, agents: Collection[str], notes: list[Note]
+    root: Node, team: Team, names: NameMap, agents: Collection[str], notes: list[ConversionNote]
 ) -> tuple[ScenarioEvent, ...]:
     """Return the events of a scenario.
 
@@ -35,12 +35,12 @@ def read_scenario(
         raise MistakeError("has no events", "write events: and a list of them", root.line)
     for event in listed.items:
         delay, name = event.get("delay"), event.get("id")
-        for left_aside in filter(None, (delay, name)):
-            left_aside.skip()
+        for ignored in filter(None, (delay, name)):
+            ignored.skip()
         delays += delay is not None
         changes: list[RemoveAgent] = []
         for action in _actions(event, is_delay=delay is not None):
-            robot = _leaving(action, names, agents)
+            robot = _removed_robot(action, names, agents)
             if robot is None:
                 left_out += 1
             elif robot in there:
@@ -54,14 +54,16 @@ def read_scenario(
     return tuple(events)
 
 
-def _notes(events: int, delays: int, left_out: int) -> Iterator[Note]:
+def _notes(events: int, delays: int, left_out: int) -> Iterator[ConversionNote]:
     if events:
         text = "with pyDCOP other agents take the variables of one that leaves; here they leave with their robot"
-        yield Note("scenario", text)
+        yield ConversionNote("scenario", text)
     if delays:
-        yield Note("scenario", f"{counted(delays, 'delay')} in seconds: events happen once what was before is solved")
+        yield ConversionNote(
+            "scenario", f"{counted(delays, 'delay')} in seconds: events happen once what was before is solved"
+        )
     if left_out:
-        yield Note("dropped", f"{left_out} actions that remove no agent, which pyDCOP passes over, too")
+        yield ConversionNote("dropped", f"{left_out} actions that remove no agent, which pyDCOP passes over, too")
 
 
 def _actions(event: Node, *, is_delay: bool) -> list[Node]:
@@ -71,15 +73,15 @@ def _actions(event: Node, *, is_delay: bool) -> list[Node]:
     return (actions.items if actions else None) or []
 
 
-def _leaving(action: Node, names: Names, agents: Collection[str]) -> str | None:
+def _removed_robot(action: Node, names: NameMap, agents: Collection[str]) -> str | None:
     """Return the robot that an action removes. None: it does something else."""
     kind = action.get("type")
     if kind is None or kind.scalar != "remove_agent":
         action.skip()
         return None
     agent = action.get("agent")
-    name = text_of(agent.scalar if agent else None, action.line)
+    name = name_text(agent.scalar if agent else None, action.line)
     if name not in agents:
         what = f"removes the agent '{shortened(name)}', which the problem has not"
         raise MistakeError(what, suggestion(name, agents, "agents"), action.line)
-    return names.of(name)
+    return names.allowed(name)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
+from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.formats.dialects.pydcop.python_values import NoValueError, Value, literal
-from robochoc.formats.dialects.tables import Amount
 from robochoc.model.constraint import Domain
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.expression.bounds import Interval, bounds
@@ -18,14 +18,14 @@ from robochoc.model.expression.parser import MAX_DEPTH
 _LARGEST = 2**62
 """No result on the way may lie beyond it: ours are undefined from 2**63 on, Python's are not."""
 _MAX_PARTS = 1000
-_DENIAL = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
+_NEGATION = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 _COMPARISONS = {ast.Eq: "eq", ast.NotEq: "ne", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 _CALLS = {"abs": (1, 1), "min": (2, 99), "max": (2, 99)}
 
 
 @dataclass(frozen=True)
-class Known:
+class VariableInfo:
     """What is known of a variable: its domain here, and the kind of its values in the file.
 
     Attributes:
@@ -37,20 +37,20 @@ class Known:
     kind: type | None
 
 
-class Violated(NamedTuple):
+class ViolationCost(NamedTuple):
     """A predicate, and what it costs where it does not hold."""
 
     body: Expression
     cost: Amount
 
 
-class _NotSimpleError(Exception):
+class _NotTranslatableError(Exception):
     """It has no counterpart here."""
 
 
-def translated(
-    body: Sequence[ast.stmt], scope: Sequence[str], variables: Mapping[str, Known], fixed: Mapping[str, Value]
-) -> Violated | Expression | None:
+def translate(
+    body: Sequence[ast.stmt], scope: Sequence[str], variables: Mapping[str, VariableInfo], fixed: Mapping[str, Value]
+) -> ViolationCost | Expression | None:
     """Return what the statements of a function say, over formal parameters X0, X1, ... in the order of `scope`.
 
     Returns:
@@ -58,7 +58,7 @@ def translated(
     """
     try:
         return _Translator(scope, variables, fixed).cost(_as_expression(body))
-    except (_NotSimpleError, NoValueError):
+    except (_NotTranslatableError, NoValueError):
         return None
 
 
@@ -70,11 +70,11 @@ def _as_expression(body: Sequence[ast.stmt]) -> ast.expr:
         case [ast.If(test=test, body=then, orelse=otherwise), *rest]:
             return ast.IfExp(test, _as_expression(then), _as_expression([*otherwise, *rest]))
         case _:
-            raise _NotSimpleError
+            raise _NotTranslatableError
 
 
 class _Translator:
-    def __init__(self, scope: Sequence[str], variables: Mapping[str, Known], fixed: Mapping[str, Value]) -> None:
+    def __init__(self, scope: Sequence[str], variables: Mapping[str, VariableInfo], fixed: Mapping[str, Value]) -> None:
         self._fixed = fixed
         self._variables = variables
         self._formal = {name: f"X{place}" for place, name in enumerate(scope)}
@@ -84,15 +84,15 @@ class _Translator:
             self._limits[formal] = Interval(ranges[0][0], ranges[-1][-1])
         self._parts = 0
 
-    def cost(self, node: ast.expr) -> Violated | Expression:
+    def cost(self, node: ast.expr) -> ViolationCost | Expression:
         """Return a predicate with its cost where one of two costs is 0, and an integer expression otherwise."""
         match node:
             case ast.IfExp(test=test, body=then, orelse=otherwise):
                 first, second = _amount(then), _amount(otherwise)
                 if first == 0 and second is not None:
-                    return Violated(self.boolean(test), second)
+                    return ViolationCost(self.boolean(test), second)
                 if second == 0 and first is not None:
-                    return Violated(_denied(self.boolean(test)), first)
+                    return ViolationCost(_negate(self.boolean(test)), first)
             case _:
                 pass
         return self.integer(node)
@@ -103,13 +103,13 @@ class _Translator:
             case ast.Constant(value=bool(value)):
                 return Constant(int(value))
             case ast.Constant(value=int(value)):
-                return self._made(Constant(value))
+                return self._checked(Constant(value))
             case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int(value))):
-                return self._made(Constant(-value))
+                return self._checked(Constant(-value))
             case ast.Name(id=name) if type(fixed := self._fixed.get(name)) is int:
-                return self._made(Constant(int(fixed)))
+                return self._checked(Constant(int(fixed)))
             case ast.Name(id=name) if self._kind(name) is int:
-                return self._made(Name(self._formal[name]))
+                return self._checked(Name(self._formal[name]))
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return self._apply("neg", [operand])
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -121,39 +121,39 @@ class _Translator:
                 if least <= len(arguments) <= most:
                     return self._apply(name, arguments)
             case ast.IfExp(test=test, body=then, orelse=otherwise):
-                return self._chosen(self.boolean(test), self.integer(then), self.integer(otherwise))
+                return self._conditional(self.boolean(test), self.integer(then), self.integer(otherwise))
             case ast.Compare() | ast.UnaryOp(op=ast.Not()):
-                return self._chosen(self.boolean(node), Constant(1), Constant(0))
+                return self._conditional(self.boolean(node), Constant(1), Constant(0))
             case _:
                 pass
-        raise _NotSimpleError
+        raise _NotTranslatableError
 
     def boolean(self, node: ast.expr) -> Expression:
         """Return a Boolean expression."""
         match node:
             case ast.Compare(left=left, ops=ops, comparators=others):
                 terms = [left, *others]
-                parts = [self._compared(*three) for three in zip(ops, terms, others, strict=False)]
-                return parts[0] if len(parts) == 1 else self._made(Apply("and", tuple(parts)))
+                parts = [self._comparison_of(*three) for three in zip(ops, terms, others, strict=False)]
+                return parts[0] if len(parts) == 1 else self._checked(Apply("and", tuple(parts)))
             case ast.BoolOp(op=op, values=values):
                 name = "and" if isinstance(op, ast.And) else "or"
-                return self._made(Apply(name, tuple([self.boolean(one) for one in values])))
+                return self._checked(Apply(name, tuple([self.boolean(one) for one in values])))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return _denied(self.boolean(operand))
+                return _negate(self.boolean(operand))
             case _:
-                raise _NotSimpleError
+                raise _NotTranslatableError
 
-    def _compared(self, op: ast.cmpop, left: ast.expr, right: ast.expr) -> Expression:
+    def _comparison_of(self, op: ast.cmpop, left: ast.expr, right: ast.expr) -> Expression:
         name = _COMPARISONS.get(type(op))
         if name is None:
-            raise _NotSimpleError
+            raise _NotTranslatableError
         match left, right:
-            case ast.Name(id=one), ast.Name(id=other) if name in ("eq", "ne") and self._alike(one, other):
-                return self._made(Apply(name, (Name(self._formal[one]), Name(self._formal[other]))))
+            case ast.Name(id=one), ast.Name(id=other) if name in ("eq", "ne") and self._have_equal_codes(one, other):
+                return self._checked(Apply(name, (Name(self._formal[one]), Name(self._formal[other]))))
             case _:
-                return self._made(Apply(name, (self.integer(left), self.integer(right))))
+                return self._checked(Apply(name, (self.integer(left), self.integer(right))))
 
-    def _alike(self, one: str, other: str) -> bool:
+    def _have_equal_codes(self, one: str, other: str) -> bool:
         """Return whether equal codes of two variables are equal values."""
         kind = self._kind(one)
         return kind is not None and kind is self._kind(other)
@@ -165,17 +165,17 @@ class _Translator:
         made = [self.integer(one) for one in arguments]
         if operator in ("add", "mul") and isinstance(made[0], Apply) and made[0].operator == operator:
             made = [*made[0].arguments, *made[1:]]  # a long sum is one sum, not a deep tree
-        return self._made(Apply(operator, tuple(made)))
+        return self._checked(Apply(operator, tuple(made)))
 
-    def _chosen(self, condition: Expression, then: Expression, otherwise: Expression) -> Expression:
-        return self._made(Apply("if", (condition, then, otherwise)))
+    def _conditional(self, condition: Expression, then: Expression, otherwise: Expression) -> Expression:
+        return self._checked(Apply("if", (condition, then, otherwise)))
 
-    def _made(self, expression: Expression) -> Expression:
-        """Return `expression`. Raises `_NotSimpleError` where it is too long or its value too large."""
+    def _checked(self, expression: Expression) -> Expression:
+        """Return `expression`. Raises `_NotTranslatableError` where it is too long or its value too large."""
         self._parts += 1
         low, high = bounds(expression, self._limits)
         if self._parts > _MAX_PARTS or low < -_LARGEST or high > _LARGEST or _depth(expression) > MAX_DEPTH // 2:
-            raise _NotSimpleError
+            raise _NotTranslatableError
         return expression
 
 
@@ -198,10 +198,10 @@ def _amount(node: ast.expr) -> Amount | None:
             return None
 
 
-def _denied(expression: Expression) -> Expression:
+def _negate(expression: Expression) -> Expression:
     match expression:
         case Apply("not", (inner,)):
             return inner
-        case Apply(operator, arguments) if operator in _DENIAL:
-            return Apply(_DENIAL[operator], arguments)
+        case Apply(operator, arguments) if operator in _NEGATION:
+            return Apply(_NEGATION[operator], arguments)
     return Apply("not", (expression,))

@@ -14,16 +14,16 @@ import json
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
-from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
-from robochoc.formats.dialects.tables import Amount
+from robochoc.formats.dialects.dialect import ConversionNote, ExportOptions, ExportResult
+from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.formats.dialects.tabulation import (
-    Exported,
+    TabulatedConstraint,
     amounts,
     constant_table,
     decimal,
-    exported,
+    is_maximised,
     magnitude,
-    maximises,
+    tabulate,
 )
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import RemoveAgent, Team
@@ -37,7 +37,7 @@ LEAST_INFINITY = 10_000
 """What forbids costs at least so much: pyDCOP's own convention."""
 
 
-def written(team: Team, options: ExportOptions) -> Written:
+def write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the files of `team`.
 
     Raises:
@@ -52,13 +52,13 @@ def written(team: Team, options: ExportOptions) -> Written:
     text = (
         f"robots have several variables: give the file to pyDCOP as the distribution, too, with --distribution {file}"
     )
-    notes = (Note("distribution", text),) if several else ()
-    return Written({name: text.encode() for name, text in files.items()}, notes)
+    notes = (ConversionNote("distribution", text),) if several else ()
+    return ExportResult({name: text.encode() for name, text in files.items()}, notes)
 
 
 def _problem(team: Team) -> Iterator[str]:
-    tables, constant = exported(team)
-    maximize = maximises(team)
+    tables, constant = tabulate(team)
+    maximize = is_maximised(team)
     most, forbids = magnitude(tables, constant), INFINITE in amounts(tables)
     infinity = max(LEAST_INFINITY, 10 * most)
     if (infinity if forbids else most) >= LIMIT:
@@ -78,10 +78,10 @@ def _problem(team: Team) -> Iterator[str]:
         yield f"  {_quoted(name)}: {{domain: {_quoted(f'd_{name}')}}}"
     if constant:
         tables.append(constant_table(team, constant))
-    forbidding = str(-infinity if maximize else infinity)
+    forbidden_cost = str(-infinity if maximize else infinity)
     yield "constraints:" if tables else "constraints: {}"
     for one in tables:
-        yield from _constraint(one, team, forbidding)
+        yield from _constraint(one, team, forbidden_cost)
     sizes = {name: len(variable.domain) for name, variable in team.variables.items()}
     capacity = CAPACITY * sum(1 + sizes[name] for name in [*sizes, *(name for one in tables for name in one.scope)])
     yield "agents:"
@@ -99,24 +99,24 @@ def _owners(team: Team) -> Iterator[str]:
         yield f"  {_quoted(robot.name)}: {_list(one.name for one in robot.variables)}"
 
 
-def _constraint(one: Exported, team: Team, forbidding: str) -> Iterator[str]:
+def _constraint(one: TabulatedConstraint, team: Team, forbidden_cost: str) -> Iterator[str]:
     domains = [team.variables[name].domain for name in one.scope]
     by_cost: dict[str, list[str]] = defaultdict(list)
     for values, cost in one.table.rows.items():
         words = [str(domain.label(value)) for domain, value in zip(domains, values, strict=True)]
-        by_cost[_cost(cost, forbidding)].append(" ".join(words))
+        by_cost[_cost(cost, forbidden_cost)].append(" ".join(words))
     yield f"  {_quoted(one.name)}:"
     yield "    type: extensional"
     yield f"    variables: {_list(one.scope)}"
     if len(one.table.rows) < one.table.size:
-        yield f"    default: {_cost(one.table.default, forbidding)}"
+        yield f"    default: {_cost(one.table.default, forbidden_cost)}"
     yield "    values:" if by_cost else "    values: {}"
     for told, tuples in by_cost.items():
         yield f"      {told}: {_quoted(' | '.join(tuples))}"
 
 
-def _cost(cost: Amount, forbidding: str) -> str:
-    return forbidding if cost == INFINITE else decimal(cost)
+def _cost(cost: Amount, forbidden_cost: str) -> str:
+    return forbidden_cost if cost == INFINITE else decimal(cost)
 
 
 def _values(domain: Domain) -> str:

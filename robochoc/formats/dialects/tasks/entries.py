@@ -74,7 +74,7 @@ class Synergy:
     worth: Fraction
 
 
-class Entry:
+class EntryReader:
     """A mapping with known keys. Each is read by a method of its type, which raises `MistakeError`."""
 
     def __init__(self, what: str, node: Node) -> None:
@@ -97,11 +97,11 @@ class Entry:
         node = self.node(key)
         return default if node is None else self._number(key, node, least)
 
-    def needed(self, key: str, least: int = 0) -> Fraction:
+    def required_number(self, key: str, least: int = 0) -> Fraction:
         """Return a decimal that must be there."""
-        return self._number(key, self.needed_node(key), least)
+        return self._number(key, self.required_node(key), least)
 
-    def whole(self, key: str, default: int | None, least: int = 0) -> int | None:
+    def integer(self, key: str, default: int | None, least: int = 0) -> int | None:
         """Return an integer of at least `least`; `default` where there is none."""
         node = self.node(key)
         if node is None:
@@ -129,7 +129,7 @@ class Entry:
         items = [node] if node.is_scalar and not node.is_empty else node.items
         if items is None or any(not one.is_scalar or one.is_empty for one in items):
             raise self._mistake(key, node, f"write {key}: [ONE, OTHER]")
-        return tuple(word_of(one.scalar) for one in items)
+        return tuple(name_text(one.scalar) for one in items)
 
     def choice(self, key: str, kind: type[_Choice]) -> _Choice | None:
         """Return a member of the enum `kind`; None where there is none."""
@@ -145,7 +145,7 @@ class Entry:
         """Return the value of `key`."""
         return self._node.get(key)
 
-    def needed_node(self, key: str) -> Node:
+    def required_node(self, key: str) -> Node:
         """Return the value of a key that must be there."""
         return self._node.needed(key, self._what)
 
@@ -160,7 +160,7 @@ class Entry:
         return MistakeError(f"{self._what} cannot have {value} as '{key}'", hint, node.line)
 
 
-def word_of(value: Scalar) -> str:
+def name_text(value: Scalar) -> str:
     """Return a name: YAML reads 7 as a number, and yes as true."""
     return "yes" if value is True else "no" if value is False else shown(value)
 
@@ -169,13 +169,13 @@ def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEnt
     """Return the robots in a section; mistakes are noted."""
     found = {}
     for name, one in _named("robots", node):
-        with _noted(one, mistakes):
-            entry = Entry(f"the robot '{shortened(name)}'", one)
+        with _collecting(one, mistakes):
+            entry = EntryReader(f"the robot '{shortened(name)}'", one)
             speed = entry.number("speed", Fraction(1)) or Fraction(0)
             if not speed:
                 raise MistakeError(f"the robot '{shortened(name)}' has the speed 0", "write more than 0", one.line)
             has = frozenset(entry.words("skills"))
-            room, most = entry.whole("capacity", None), entry.whole("most", None)
+            room, most = entry.integer("capacity", None), entry.integer("most", None)
             found[name] = RobotEntry(one.line, entry.point("at"), has, room, most, speed)
     return found
 
@@ -184,10 +184,10 @@ def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry
     """Return the tasks in a section; mistakes are noted."""
     found = {}
     for name, one in _named("tasks", node):
-        with _noted(one, mistakes):
-            entry = Entry(f"the task '{shortened(name)}'", one)
-            needs, worth = frozenset(entry.words("needs")), entry.needed("worth", -MOST)
-            load, robots = entry.whole("load", 1) or 0, entry.whole("robots", 1, 1) or 1
+        with _collecting(one, mistakes):
+            entry = EntryReader(f"the task '{shortened(name)}'", one)
+            needs, worth = frozenset(entry.words("needs")), entry.required_number("worth", -MOST)
+            load, robots = entry.integer("load", 1) or 0, entry.integer("robots", 1, 1) or 1
             deadline = entry.number("deadline", None)
             found[name] = TaskEntry(one.line, entry.point("at"), needs, worth, load, deadline, robots)
     return found
@@ -203,9 +203,9 @@ def read_synergies(node: Node | None, tasks: Collection[str], mistakes: Diagnost
         )
     found = []
     for one in node.items:
-        with _noted(one, mistakes):
-            entry = Entry("a synergy", one)
-            names, worth = entry.words("tasks"), entry.needed("worth", -MOST)
+        with _collecting(one, mistakes):
+            entry = EntryReader("a synergy", one)
+            names, worth = entry.words("tasks"), entry.required_number("worth", -MOST)
             for name in names:
                 if name not in tasks:
                     raise MistakeError(
@@ -220,7 +220,7 @@ def read_synergies(node: Node | None, tasks: Collection[str], mistakes: Diagnost
 
 
 @contextmanager
-def _noted(entry: Node, mistakes: DiagnosticCollector) -> Iterator[None]:
+def _collecting(entry: Node, mistakes: DiagnosticCollector) -> Iterator[None]:
     """Report an error in an entry, and skip the rest of the entry."""
     with mistakes.at(entry.line):
         try:
@@ -236,7 +236,7 @@ def _named(section: str, node: Node) -> Iterator[tuple[str, Node]]:
         raise MistakeError(f"{section} is not a mapping", hint, node.line)
     names = set()
     for key, one in node.named():
-        name = word_of(key)
+        name = name_text(key)
         if name in names:
             raise MistakeError(f"{section} has '{shortened(name)}' twice", "name one otherwise", one.line)
         names.add(name)

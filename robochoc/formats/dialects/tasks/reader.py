@@ -10,22 +10,22 @@ from fractions import Fraction
 from pathlib import Path
 
 from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
-from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
+from robochoc.formats.dialects.dialect import ConversionNote, ImportOptions, ImportResult, NameMap, notes_on_names
+from robochoc.formats.dialects.exact_costs import Scale
 from robochoc.formats.dialects.pydcop.files import file_text
-from robochoc.formats.dialects.tables import Scale
 from robochoc.formats.dialects.tasks.entries import (
     MAX_PLACES,
-    Entry,
+    EntryReader,
     Point,
     RobotEntry,
     Synergy,
     TaskEntry,
+    name_text,
     read_robots,
     read_synergies,
     read_tasks,
-    word_of,
 )
-from robochoc.formats.dialects.tasks.tours import Tasks, Trip, rounded
+from robochoc.formats.dialects.tasks.tours import TaskSet, TourSearch, round_length
 from robochoc.formats.symbols import check_symbol
 from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
 from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
@@ -45,7 +45,7 @@ _ONLY = "task"
 """The last part of the name of a robot's only variable."""
 
 
-def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     """Return the team of a list of robots and tasks.
 
     Raises:
@@ -57,12 +57,12 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
         mistakes.finish()
     path = paths[0]
     mistakes = DiagnosticCollector(encodable(str(path)))
-    found: Imported | None = None
+    found: ImportResult | None = None
     with mistakes.at(0):
         for option, given in (("infinity", options.infinity), ("owner", options.owner)):
             if given is not None:
                 raise MistakeError(f"is a list of tasks, which '{option}' says nothing about", "leave it out")
-        found = _Maker(_read(file_text(path), path.stem, mistakes)).imported(options)
+        found = _TeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
     mistakes.finish()
     if found is None:
         raise InvalidInputError([])
@@ -70,7 +70,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
 
 
 @dataclass(frozen=True)
-class _List:
+class _TaskList:
     """The content of a `tasks.yaml`, read and checked, before a team is made of it."""
 
     name: str
@@ -83,9 +83,9 @@ class _List:
     tours: bool
 
 
-def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _List:
-    def read(root: Node) -> _List:
-        found = _list(Entry("the file", root), stem, mistakes)
+def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _TaskList:
+    def read(root: Node) -> _TaskList:
+        found = _list(EntryReader("the file", root), stem, mistakes)
         for mistake in unread_parts(root):
             mistakes.add(mistake.line, mistake.message, mistake.hint)
         mistakes.finish()
@@ -96,22 +96,22 @@ def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _List:
     return read_list
 
 
-def _list(head: Entry, stem: str, mistakes: DiagnosticCollector) -> _List:
-    listed = head.needed_node("tasks")
-    robots, tasks = read_robots(head.needed_node("robots"), mistakes), read_tasks(listed, mistakes)
+def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> _TaskList:
+    listed = head.required_node("tasks")
+    robots, tasks = read_robots(head.required_node("robots"), mistakes), read_tasks(listed, mistakes)
     for what, entries in (("robots", robots), ("tasks", tasks)):
         if len(entries) > MAX_NUMBER:
             raise MistakeError(f"has {len(entries)} {what}", f"{MAX_NUMBER} are allowed")
-    synergies = read_synergies(head.node("synergies"), [word_of(name) for name, _ in listed.named()], mistakes)
+    synergies = read_synergies(head.node("synergies"), [name_text(name) for name, _ in listed.named()], mistakes)
     model = head.choice("model", TasksModel) or _model(robots, tasks)
     distance = head.choice("distance", Distance) or Distance.STRAIGHT
-    places = head.whole("places", 0) or 0
+    places = head.integer("places", 0) or 0
     if places > MAX_PLACES:
         raise MistakeError(f"has {places} places", f"costs have at most {MAX_PLACES} decimal places")
     tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
     name = " ".join(head.words("name")) or stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
-    return _List(name, model, distance, places, robots, tasks, synergies, tours)
+    return _TaskList(name, model, distance, places, robots, tasks, synergies, tours)
 
 
 def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:
@@ -127,7 +127,7 @@ def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: Diagnosti
         mistakes.add(line, "a place has another number of coordinates than others", "write all with two, or three")
 
 
-def _check_model(read: _List, mistakes: DiagnosticCollector) -> None:
+def _check_model(read: _TaskList, mistakes: DiagnosticCollector) -> None:
     if read.model == TasksModel.ASSIGNMENT:
         for name, robot in read.robots.items():
             if robot.most not in (None, 1):
@@ -161,26 +161,26 @@ def _check_names(variables: Mapping[str, Sequence[Variable]]) -> None:
             names[one.name] = robot
 
 
-class _Maker:
+class _TeamBuilder:
     """Makes the team of a list. Tasks are numbered from 1 on, in the order of the file."""
 
-    def __init__(self, read: _List) -> None:
+    def __init__(self, read: _TaskList) -> None:
         self._read = read
         self._number = {name: number for number, name in enumerate(read.tasks, start=1)}
-        self._notes: list[Note] = []
+        self._notes: list[ConversionNote] = []
         self._sets = 0
-        self._robot_names, self._task_names = Names(), Names()
+        self._robot_names, self._task_names = NameMap(), NameMap()
         amounts = [one.worth for one in read.tasks.values()] + [one.worth for one in read.synergies]
         self._scale = Scale([*amounts, Fraction(1, 10**read.places)])
         if self._scale.rounds:
             text = f"some worths have more than {MAX_PLACES} decimal places, and were rounded to that many"
-            self._notes.append(Note("rounded", text))
+            self._notes.append(ConversionNote("rounded", text))
 
-    def imported(self, options: ImportOptions) -> Imported:
+    def imported(self, options: ImportOptions) -> ImportResult:
         """Return the team. Raises `MistakeError`."""
         read = self._read
         workers = [self._worker(name, robot) for name, robot in read.robots.items()]
-        self._note_what_nobody_does(workers)
+        self._note_impossible_tasks(workers)
         if read.model == TasksModel.ASSIGNMENT:
             _check_symbols(read.tasks)
             variables, constraints = assignment(workers, (NONE, *read.tasks))
@@ -197,45 +197,47 @@ class _Maker:
         units = CostUnits(maximize=True, places=self._scale.places)
         team: Team = assemble(name, variables, kept, kind=ProblemKind.DISWCSP, costs=units)
         changed = self._originals(workers)
-        return Imported(team, "tasks", changed, (*self._notes, *notes_on_names(list(changed.items()))))
+        return ImportResult(team, "tasks", changed, (*self._notes, *notes_on_names(list(changed.items()))))
 
     def _worker(self, name: str, robot: RobotEntry) -> Worker:
         profit = {
-            self._number[task]: brings
+            self._number[task]: profit_of_task
             for task, entry in self._read.tasks.items()
-            if (brings := self._brings(robot, task, entry)) is not None
+            if (profit_of_task := self._profit(robot, task, entry)) is not None
         }
         together: dict[tuple[int, int], int] = {}
         for one in self._read.synergies:
             first, second = sorted(self._number[task] for task in one.tasks)
             if first in profit and second in profit and self._read.model == TasksModel.SEVERAL:
                 together[first, second] = together.get((first, second), 0) + int(self._scale.units(one.worth))
-        own = self._robot_names.of(name)
+        own = self._robot_names.allowed(name)
         if self._read.model == TasksModel.ASSIGNMENT:
             return Worker(own, own, f"{own}.{_ONLY}", profit)
         if not profit:
-            self._notes.append(Note("left out", f"the robot {shortened(name)}, which can do none of the tasks"))
+            self._notes.append(
+                ConversionNote("left out", f"the robot {shortened(name)}, which can do none of the tasks")
+            )
         return Worker(own, own, own, profit, robot.capacity, robot.most, together, *self._tours(name, robot, profit))
 
-    def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[Tasks, int], bool]:
+    def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[TaskSet, int], bool]:
         """Return the lengths of the robot's tours, and whether deadlines leave it no others."""
         if not self._read.tours or not robot.at:  # a robot without a place has no ways
             return {}, False
         numbered = enumerate(self._read.tasks.values(), start=1)
         placed = {number: entry for number, entry in numbered if number in able and entry.at}
-        lengths = Trip(name, robot, placed, lambda start, end: self._way(start, end, MAX_PLACES)).lengths()
+        lengths = TourSearch(name, robot, placed, lambda start, end: self._way(start, end, MAX_PLACES)).lengths()
         self._sets += len(lengths)
         if self._sets > MAX_CONSTRAINTS:
             raise MistakeError(f"makes more than {MAX_CONSTRAINTS:,} tours", "write fewer robots, or smaller most:")
         hurries = any(entry.deadline is not None for entry in placed.values())
-        return {tasks: rounded(length, self._scale.places) for tasks, length in lengths.items()}, hurries
+        return {tasks: round_length(length, self._scale.places) for tasks, length in lengths.items()}, hurries
 
     def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> Job:
         able = sum(self._number[name] in one.profit for one in workers)
         if task.robots > 1 and able > MAX_CREW:
             what = f"the task '{shortened(name)}' asks for {task.robots} robots, and {able} could do it"
             raise MistakeError(what, f"let at most {MAX_CREW} be able to", task.line)
-        return Job(self._task_names.of(name), task.load, task.robots)
+        return Job(self._task_names.allowed(name), task.load, task.robots)
 
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
         """Return the names in the file of what is called otherwise in the team."""
@@ -245,17 +247,20 @@ class _Maker:
             if self._read.model == TasksModel.ASSIGNMENT:
                 found[one.variable] = f"{name}.{_ONLY}"
             else:
-                own = {f"{one.variable}.{self._task_names.of(tasks[task - 1])}": tasks[task - 1] for task in one.profit}
+                own = {
+                    f"{one.variable}.{self._task_names.allowed(tasks[task - 1])}": tasks[task - 1]
+                    for task in one.profit
+                }
                 found |= {variable: f"{name}.{task}" for variable, task in own.items()}
         return {name: original for name, original in found.items() if name != original}
 
-    def _note_what_nobody_does(self, workers: Sequence[Worker]) -> None:
+    def _note_impossible_tasks(self, workers: Sequence[Worker]) -> None:
         able = {task for one in workers for task in one.profit}
         for name, number in self._number.items():
             if number not in able:
-                self._notes.append(Note("left out", f"the task {shortened(name)}, which no robot can do"))
+                self._notes.append(ConversionNote("left out", f"the task {shortened(name)}, which no robot can do"))
 
-    def _brings(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:
+    def _profit(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:
         """Return what a task brings a robot, its share of it where it asks for several. None: it cannot do it."""
         if not entry.needs <= robot.skills or robot.most == 0:
             return None

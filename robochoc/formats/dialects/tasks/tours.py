@@ -15,12 +15,12 @@ from robochoc.formats.dialects.tasks.entries import MAX_PLACES, Point, RobotEntr
 
 MAX_SETS = 4096
 """The maximum number of sets of tasks that a robot may have time and room for."""
-Tasks = tuple[int, ...]
+TaskSet = tuple[int, ...]
 """Numbers of tasks, in ascending order."""
 
 
 @dataclass(frozen=True)
-class Trip:
+class TourSearch:
     """The facts on which the tours of one robot depend.
 
     Attributes:
@@ -35,14 +35,14 @@ class Trip:
     tasks: Mapping[int, TaskEntry]
     way: Callable[[Point, Point], int]
 
-    def lengths(self) -> dict[Tasks, int]:
+    def lengths(self) -> dict[TaskSet, int]:
         """Return the length of the shortest tour of each set of tasks that the robot has time and room for.
 
         Raises:
             MistakeError: where there are too many.
         """
-        ends: dict[Tasks, dict[int, int]] = {(): {}}
-        level: list[Tasks] = [()]
+        ends: dict[TaskSet, dict[int, int]] = {(): {}}
+        level: list[TaskSet] = [()]
         legs = {
             (one, other): self.way(self.tasks[one].at, self.tasks[other].at)
             for one in self.tasks
@@ -53,16 +53,16 @@ class Trip:
         while level:
             larger = []
             for tasks in level:
-                for more in self._larger(tasks):
-                    found = dict(self._ends(more, ends, first, legs))
+                for more in self._larger_sets(tasks):
+                    found = dict(self._last_tasks(more, ends, first, legs))
                     if found:
                         ends[more] = found
                         larger.append(more)
-                        self._refuse(len(ends))
+                        self._check_count(len(ends))
             level = larger
         return {tasks: min(found.values()) for tasks, found in ends.items() if tasks}
 
-    def _larger(self, tasks: Tasks) -> Iterator[Tasks]:
+    def _larger_sets(self, tasks: TaskSet) -> Iterator[TaskSet]:
         """Yield the sets with one more task, of a higher number, that the robot has room for."""
         if self.robot.most is not None and len(tasks) >= self.robot.most:
             return
@@ -72,10 +72,10 @@ class Trip:
             if (not tasks or task > tasks[-1]) and (room is None or load + self.tasks[task].load <= room):
                 yield (*tasks, task)
 
-    def _ends(
+    def _last_tasks(
         self,
-        tasks: Tasks,
-        ends: Mapping[Tasks, Mapping[int, int]],
+        tasks: TaskSet,
+        ends: Mapping[TaskSet, Mapping[int, int]],
         first: Mapping[int, int],
         legs: Mapping[tuple[int, int], int],
     ) -> Iterator[tuple[int, int]]:
@@ -89,7 +89,7 @@ class Trip:
             if deadline is None or length <= deadline * self.robot.speed * 10**MAX_PLACES:
                 yield last, length
 
-    def _refuse(self, sets: int) -> None:
+    def _check_count(self, sets: int) -> None:
         if sets > MAX_SETS:
             raise MistakeError(
                 f"the robot '{shortened(self.name)}' has time and room for more than {MAX_SETS:,} sets of tasks",
@@ -98,7 +98,7 @@ class Trip:
             )
 
 
-def rounded(length: int, places: int) -> int:
+def round_length(length: int, places: int) -> int:
     """Return a length in units of 10**-MAX_PLACES in units of 10**-places, halves up."""
     unit = Fraction(10**places, 10**MAX_PLACES)
     return int(2 * length * unit + 1) // 2

@@ -9,9 +9,16 @@ from typing import NamedTuple
 
 from robochoc.formats.definitions import check_domain
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names, owners_by
-from robochoc.formats.dialects.tables import Amount, CostTable, Scale, forbidding, relation, word
-from robochoc.formats.dialects.tabulation import Exported, amounts, decimal, exported, magnitude
+from robochoc.formats.dialects.dialect import (
+    ConversionNote,
+    ImportOptions,
+    ImportResult,
+    NameMap,
+    notes_on_names,
+    owners_by,
+)
+from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable, Scale, apply_infinity, relation, xml_name
+from robochoc.formats.dialects.tabulation import TabulatedConstraint, amounts, decimal, magnitude, tabulate
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
@@ -27,12 +34,12 @@ class CostFunction:
     """A cost function: its variables by their places, and the costs of tuples of places of values."""
 
     scope: tuple[int, ...]
-    table: CostTable
+    table: ExactCostTable
     line: int
 
 
 @dataclass(frozen=True)
-class Network:
+class CostFunctionNetwork:
     """A cost function network.
 
     Attributes:
@@ -49,18 +56,20 @@ class Network:
     functions: Sequence[CostFunction]
     bound: Amount
     maximize: bool = False
-    notes: tuple[Note, ...] = ()
+    notes: tuple[ConversionNote, ...] = ()
 
 
-def imported(network: Network, options: ImportOptions, dialect: str) -> Imported:
+def to_team(network: CostFunctionNetwork, options: ImportOptions, dialect: str) -> ImportResult:
     """Return `network` as a team. Raises `MistakeError`."""
-    names, robots, symbols = Names(), Names(), Names()
+    names, robots, symbols = NameMap(), NameMap(), NameMap()
     codes, domains = _domains(network, symbols)
     owners = owners_by(options.owner, network.variables) if options.owner is not None else {}
     variables: dict[str, list[Variable]] = {}
     for name in network.variables:
-        variables.setdefault(robots.of(owners.get(name, name)), []).append(Variable(names.of(name), domains[name]))
-    functions = list(_forbidding(network, options.infinity))
+        variables.setdefault(robots.allowed(owners.get(name, name)), []).append(
+            Variable(names.allowed(name), domains[name])
+        )
+    functions = list(_with_hard_tuples(network, options.infinity))
     scale = Scale(amount for one in functions for amount in one.table.amounts())
     places, constant, constraints = list(network.variables), 0, []
     for one in functions:
@@ -68,14 +77,14 @@ def imported(network: Network, options: ImportOptions, dialect: str) -> Imported
         if isinstance(made, int):
             constant += made
         else:
-            scope = tuple(names.of(places[place]) for place in one.scope[: made.arity])
-            name = word(one.table.name)
+            scope = tuple(names.allowed(places[place]) for place in one.scope[: made.arity])
+            name = xml_name(one.table.name)
             constraints.append(Constraint(name, made, scope, scope, ConstraintModel.TKC, line=one.line))
     reaches = _reaches_the_bound(network, functions)
     notes = [*network.notes, *_notes(network, scale, reaches=reaches)]
     notes += notes_on_names([*names.changed.items(), *symbols.changed.items()])
     if options.owner is None:
-        notes.append(Note("owner", "the format knows no owners: each variable is a robot's of its own"))
+        notes.append(ConversionNote("owner", "the format knows no owners: each variable is a robot's of its own"))
     title = options.name or network.name
     if constant or any(_is_soft(one) for one in constraints):
         units = CostUnits(network.maximize, scale.places, constant)
@@ -83,28 +92,31 @@ def imported(network: Network, options: ImportOptions, dialect: str) -> Imported
     else:
         team = assemble(title, variables, constraints)
     bound = Fraction(network.bound) if reaches else None
-    return Imported(team, dialect, {**names.changed, **robots.changed}, tuple(notes), bound)
+    return ImportResult(team, dialect, {**names.changed, **robots.changed}, tuple(notes), bound)
 
 
 def _is_soft(constraint: Constraint) -> bool:
     return isinstance(constraint.definition, Relation) and constraint.definition.semantics == Semantics.SOFT
 
 
-def _domains(network: Network, symbols: Names) -> tuple[dict[str, Sequence[int]], dict[str, Domain]]:
+def _domains(network: CostFunctionNetwork, symbols: NameMap) -> tuple[dict[str, Sequence[int]], dict[str, Domain]]:
     """Return the integers of each variable's values, in the order of the file, and its domain."""
     named = {
-        symbols.of(one): None for values in network.variables.values() if not isinstance(values, int) for one in values
+        symbols.allowed(one): None
+        for values in network.variables.values()
+        if not isinstance(values, int)
+        for one in values
     }
     places = {name: place for place, name in enumerate(named)}
     codes: dict[str, Sequence[int]] = {}
     domains = {}
     for name, values in network.variables.items():
-        title = f"D_{word(name)}"
+        title = f"D_{xml_name(name)}"
         if isinstance(values, int):
             codes[name] = range(values)
             domains[name] = Domain(title, (range(values),))
         else:
-            codes[name] = [places[symbols.of(one)] for one in values]
+            codes[name] = [places[symbols.allowed(one)] for one in values]
             domains[name] = Domain(title, tuple(range(one, one + 1) for one in sorted(codes[name])), tuple(places))
         check_domain(domains[name])
     return codes, domains
@@ -125,17 +137,17 @@ def _relation(function: CostFunction, scale: Scale, codes: Sequence[Sequence[int
     return made
 
 
-def _forbidding(network: Network, infinity: int | None) -> Iterator[CostFunction]:
+def _with_hard_tuples(network: CostFunctionNetwork, infinity: int | None) -> Iterator[CostFunction]:
     """Yield the functions; what no solution below the bound can have is forbidden in them.
 
     A tuple is, if even with the least cost of all other functions the sum reaches the bound.
     """
     sign = -1 if network.maximize else 1
 
-    def told(amount: Amount) -> Amount:
-        return forbidding(amount, infinity, maximize=network.maximize) if abs(amount) != INFINITE else INFINITE
+    def converted(amount: Amount) -> Amount:
+        return apply_infinity(amount, infinity, maximize=network.maximize) if abs(amount) != INFINITE else INFINITE
 
-    functions = [_changed(one, told) for one in network.functions]
+    functions = [_with_costs(one, converted) for one in network.functions]
     least = [min((_signed(cost, sign) for cost in one.table.amounts()), default=0) for one in functions]
     if INFINITE in least:
         yield from functions
@@ -150,14 +162,14 @@ def _forbidding(network: Network, infinity: int | None) -> Iterator[CostFunction
         def cut(amount: Amount, limit: Fraction = limit) -> Amount:
             return INFINITE if _signed(amount, sign) >= limit else amount
 
-        yield one if not one.scope else _changed(one, cut)
+        yield one if not one.scope else _with_costs(one, cut)
 
 
 def _signed(amount: Amount, sign: int) -> Amount:
     return amount if amount == INFINITE else sign * amount
 
 
-def _changed(function: CostFunction, change: object) -> CostFunction:
+def _with_costs(function: CostFunction, change: object) -> CostFunction:
     if not callable(change):
         raise TypeError
     known = {amount: change(amount) for amount in {*function.table.rows.values(), function.table.default}}
@@ -165,7 +177,7 @@ def _changed(function: CostFunction, change: object) -> CostFunction:
     return replace(function, table=replace(function.table, rows=rows, default=known[function.table.default]))
 
 
-def _reaches_the_bound(network: Network, functions: Iterable[CostFunction]) -> bool:
+def _reaches_the_bound(network: CostFunctionNetwork, functions: Iterable[CostFunction]) -> bool:
     """Return whether a sum of finite costs may reach the bound, as far as the greatest cost of each function says."""
     sign = -1 if network.maximize else 1
     most: Amount = 0
@@ -175,19 +187,21 @@ def _reaches_the_bound(network: Network, functions: Iterable[CostFunction]) -> b
     return abs(network.bound) != INFINITE and most >= sign * network.bound
 
 
-def _notes(network: Network, scale: Scale, *, reaches: bool) -> Iterator[Note]:
+def _notes(network: CostFunctionNetwork, scale: Scale, *, reaches: bool) -> Iterator[ConversionNote]:
     if scale.rounds:
-        yield Note("rounded", f"some costs have more than {scale.places} decimal places, and were rounded to that many")
+        yield ConversionNote(
+            "rounded", f"some costs have more than {scale.places} decimal places, and were rounded to that many"
+        )
     if reaches:
         side = "above" if network.maximize else "below"
         text = f"toulbar2 accepts only sums {side} {float(network.bound):g}; here what reaches it is a solution, too"
-        yield Note("bound", f"{text}, and its cost tells")
+        yield ConversionNote("bound", f"{text}, and its cost tells")
 
 
 class TeamCosts(NamedTuple):
     """A team's costs with their constant and decimal places, and a bound that no finite sum reaches."""
 
-    tables: list[Exported]
+    tables: list[TabulatedConstraint]
     constant: Fraction
     places: int
     bound: int
@@ -201,7 +215,7 @@ def team_costs(team: Team) -> TeamCosts:
     """
     if team.scenario:
         raise UnsupportedError("toulbar2's formats have no scenario")
-    tables, constant = exported(team)
+    tables, constant = tabulate(team)
     places, bound = Scale([constant, *amounts(tables)]).places, magnitude(tables, constant)
     if bound * 10**places >= LIMIT:
         unit = f" in units of {decimal(Fraction(1, 10**places))}" if places else ""

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable, shortened
-from robochoc.formats.dialects.dialect import Imported, ImportOptions
-from robochoc.formats.dialects.tables import Amount
+from robochoc.formats.dialects.dialect import ImportOptions, ImportResult
+from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.model.constraint import INFINITE
 
 MAX_TEXT = 256 * 1024 * 1024
@@ -27,7 +27,7 @@ Words = Iterator[tuple[int, str]]
 """The words of a file, each with its line."""
 
 
-class Reader:
+class WordReader:
     """Takes one word after the other."""
 
     def __init__(self, words: Words) -> None:
@@ -73,9 +73,9 @@ class Reader:
         raise MistakeError(message, hint, self.line)
 
 
-def read_words(words: Words, read: Callable[[Reader], Found]) -> Found:
+def read_words(words: Words, read: Callable[[WordReader], Found]) -> Found:
     """Return the result of `read` for the words of a file. Raises `MistakeError` if words remain."""
-    source = Reader(words)
+    source = WordReader(words)
     found = read(source)
     left = source.more()
     if left is not None:
@@ -83,9 +83,9 @@ def read_words(words: Words, read: Callable[[Reader], Found]) -> Found:
     return found
 
 
-def read_with(
-    paths: Sequence[Path], options: ImportOptions, read: Callable[[str, str, ImportOptions], Imported]
-) -> Imported:
+def read_file(
+    paths: Sequence[Path], options: ImportOptions, read: Callable[[str, str, ImportOptions], ImportResult]
+) -> ImportResult:
     """Return what `read` makes of the text of the one file in `paths`, its stem and `options`.
 
     Raises:

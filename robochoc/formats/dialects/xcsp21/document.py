@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from lxml import etree
 
-from robochoc.formats.dialects.tables import Amount
+from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.formats.dialects.tabulation import (
-    Exported,
     HeldConstraint,
+    TabulatedConstraint,
     Tabulator,
     constant_of,
     decimal,
     free_name,
     held_constraints,
-    maximises,
+    is_maximised,
     too_large,
 )
 from robochoc.model.constraint import INFINITE, Domain, Function, Predicate
@@ -40,14 +40,14 @@ class FlatTeam:
             raise UnsupportedError(f"{title} has no problems that change over time: leave scenario.xml out")
         self.team = team
         self.title = title
-        self.maximize = maximises(team)
-        self.weighted = team.kind == ProblemKind.DISWCSP
+        self.maximize = is_maximised(team)
+        self.is_weighted = team.kind == ProblemKind.DISWCSP
         self.constant = constant_of(team)
         self.domains, self.domain_of = _domains(team)
         self.held = list(held_constraints(team))
         self._tabulator = Tabulator(team)
 
-    def table(self, one: HeldConstraint, hint: str = "") -> Exported:
+    def table(self, one: HeldConstraint, hint: str = "") -> TabulatedConstraint:
         """Return a constraint as a table.
 
         Raises:
@@ -58,7 +58,7 @@ class FlatTeam:
             raise UnsupportedError(f"{self.title}: {too_large(self.team, one.constraint)}{hint}")
         return table
 
-    def small_table(self, one: HeldConstraint) -> Exported | None:
+    def small_table(self, one: HeldConstraint) -> TabulatedConstraint | None:
         """Return a constraint as a table. None: it is so large that a predicate or function should be kept."""
         return self._tabulator.table(one, most=MAX_LISTED)
 
@@ -76,14 +76,14 @@ def _domains(team: Team) -> tuple[dict[str, Domain], dict[str, str]]:
     return known, name_of
 
 
-def plain(expression: Expression) -> Expression | None:
+def in_xcsp21_operators(expression: Expression) -> Expression | None:
     """Return `expression` by XCSP 2.1's operators alone, each with the arguments that it has there.
 
     None: an operator has no counterpart.
     """
     if not isinstance(expression, Apply):
         return expression
-    found = [plain(one) for one in expression.arguments]
+    found = [in_xcsp21_operators(one) for one in expression.arguments]
     arguments = tuple(one for one in found if one is not None)
     if len(arguments) < len(found):
         return None
@@ -164,7 +164,7 @@ class Document:
         body = etree.tostring(self.root, pretty_print=True, encoding="unicode")
         return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
 
-    def relation(self, table: Exported, attributes: Mapping[str, str], tuples: str) -> str:
+    def relation(self, table: TabulatedConstraint, attributes: Mapping[str, str], tuples: str) -> str:
         """Return the name of a relation with these tuples, which is added if there is none."""
         key = "relation", tuple(attributes.items()), tuples, len(table.scope)
         if key not in self._known:
@@ -207,8 +207,8 @@ class Document:
         section = self._section("domains")
         for name, domain in self._team.domains.items():
             if domain.symbols:
-                told = ", ".join(f"{value} is {domain.label(value)}" for value in domain)
-                section.append(etree.Comment(f" {name}: {told} ".replace("--", "- -")))
+                labels = ", ".join(f"{value} is {domain.label(value)}" for value in domain)
+                section.append(etree.Comment(f" {name}: {labels} ".replace("--", "- -")))
             element = etree.SubElement(section, "domain", name=name, nbValues=str(len(domain)))
             element.text = " ".join(map(_range, domain.ranges))
 

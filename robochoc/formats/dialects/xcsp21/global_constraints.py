@@ -30,7 +30,7 @@ _TOKEN = re.compile(r"[][{}]|<\w+>|[^][{}<\s]+")
 _ZERO = Constant(0)
 
 
-def expand(name: str, element: ElementView, scope: Sequence[str]) -> list[Formula]:
+def expand_global(name: str, element: ElementView, scope: Sequence[str]) -> list[Formula]:
     """Return what a global constraint says, as predicates.
 
     Args:
@@ -50,7 +50,7 @@ def expand(name: str, element: ElementView, scope: Sequence[str]) -> list[Formul
     return formulas
 
 
-def _as_it_is(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+def _unchanged(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
     """Yield a constraint that is the same here."""
     formals: dict[str, str] = {}
     form = []
@@ -82,7 +82,7 @@ class _Tokens:
     def peek(self) -> str:
         return self._words[self._next] if self else ""
 
-    def take(self) -> str:
+    def next(self) -> str:
         word = self.peek
         self._next += 1
         return word
@@ -97,34 +97,36 @@ class _Tokens:
         self._next = len(self._words)
         return words
 
-    def want(self, word: str) -> None:
+    def expect(self, word: str) -> None:
         if self.peek != word:
-            self.wrong(word)
+            self.fail(word)
         self._next += 1
 
     def term(self) -> Term:
-        word = self.take()
+        word = self.next()
         if not word or word[0] in "[]{}<":
             self._next -= 1
-            self.wrong("a variable or an integer")
+            self.fail("a variable or an integer")
         return integer(word) if is_integer(word) else word
 
     def terms(self, opening: str, closing: str) -> list[Term]:
         """Return what stands between two brackets."""
-        self.want(opening)
+        self.expect(opening)
         found = []
         while self.peek != closing:
             found.append(self.term())
-        self.want(closing)
+        self.expect(closing)
         return found
 
     def end(self) -> None:
         if self:
-            self.wrong("the end")
+            self.fail("the end")
 
-    def wrong(self, wanted: str) -> NoReturn:
+    def fail(self, expected: str) -> NoReturn:
         there = shortened(self.peek) or "the end"
-        raise MistakeError(f"in the parameters of global:{self.name}: '{there}' where {wanted} should stand", "mend it")
+        raise MistakeError(
+            f"in the parameters of global:{self.name}: '{there}' where {expected} should stand", "mend it"
+        )
 
 
 class _Body:
@@ -133,7 +135,7 @@ class _Body:
     def __init__(self) -> None:
         self._formals: dict[str, str] = {}
 
-    def of(self, term: Term) -> Expression:
+    def term_expression(self, term: Term) -> Expression:
         if isinstance(term, int):
             return Constant(term)
         return Name(self._formals.setdefault(term, f"X{len(self._formals)}"))
@@ -149,27 +151,27 @@ def _all_different(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
         raise MistakeError(f"global:allDifferent over {len(terms)} terms", f"{MAX_TERMS} are allowed: split it")
     for one, other in itertools.combinations(terms, 2):
         body = _Body()
-        yield body.formula("different", Apply("ne", (body.of(one), body.of(other))))
+        yield body.formula("different", Apply("ne", (body.term_expression(one), body.term_expression(other))))
 
 
 def _element(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
     """The index counts from 1. FRODO's intervals stand for any value in them."""
     if not tokens.has(".."):
-        yield from _as_it_is(tokens, scope)
+        yield from _unchanged(tokens, scope)
         return
     body = _Body()
     index = tokens.term()
     items: list[Expression | tuple[int, int]] = []
-    tokens.want("[")
+    tokens.expect("[")
     while tokens.peek != "]":
         first, dots, last = tokens.peek.partition("..")
         if dots:
-            tokens.take()
+            tokens.next()
             items.append((integer(first), integer(last)))
         else:
-            items.append(body.of(tokens.term()))
-    tokens.want("]")
-    value = body.of(tokens.term())
+            items.append(body.term_expression(tokens.term()))
+    tokens.expect("]")
+    value = body.term_expression(tokens.term())
     cases = []
     for number, item in enumerate(items, 1):
         same = (
@@ -177,35 +179,41 @@ def _element(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
             if isinstance(item, tuple)
             else Apply("eq", (value, item))
         )
-        cases.append(Apply("and", (Apply("eq", (body.of(index), Constant(number))), same)))
+        cases.append(Apply("and", (Apply("eq", (body.term_expression(index), Constant(number))), same)))
     yield body.formula(tokens.name, _joined("or", cases) if cases else Apply("ne", (_ZERO, _ZERO)))
 
 
 def _diff2(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
     """Yield one predicate for each pair of rectangles: one lies beside the other. An empty one is nowhere."""
     rectangles = []
-    tokens.want("[")
+    tokens.expect("[")
     while tokens.peek != "]":
-        tokens.want("[")
+        tokens.expect("[")
         rectangle = [*tokens.terms("{", "}"), *tokens.terms("{", "}")]
-        tokens.want("]")
+        tokens.expect("]")
         if len(rectangle) != 4:  # noqa: PLR2004 - two dimensions
             raise MistakeError("a rectangle of global:diff2 without two origins and two sizes", "[{x y} {dx dy}]")
         rectangles.append(rectangle)
-    tokens.want("]")
-    _few(rectangles, tokens.name)
+    tokens.expect("]")
+    _check_count(rectangles, tokens.name)
     for one, other in itertools.combinations(rectangles, 2):
         body = _Body()
         sides = [
-            Apply("le", (Apply("add", (body.of(left[axis]), body.of(left[axis + 2]))), body.of(right[axis])))
+            Apply(
+                "le",
+                (
+                    Apply("add", (body.term_expression(left[axis]), body.term_expression(left[axis + 2]))),
+                    body.term_expression(right[axis]),
+                ),
+            )
             for left, right in ((one, other), (other, one))
             for axis in (0, 1)
         ]
-        sides += [Apply("le", (body.of(box[axis]), _ZERO)) for box in (one, other) for axis in (2, 3)]
+        sides += [Apply("le", (body.term_expression(box[axis]), _ZERO)) for box in (one, other) for axis in (2, 3)]
         yield body.formula("diff2", Apply("or", tuple(sides)))
 
 
-def _few(boxes: Sequence[object], name: str) -> None:
+def _check_count(boxes: Sequence[object], name: str) -> None:
     if len(boxes) > MAX_BOXES:
         raise MistakeError(f"global:{name} over {len(boxes)} of them", f"{MAX_BOXES} are allowed: split it")
 
@@ -216,9 +224,9 @@ def _joined(operator: str, terms: Sequence[Expression]) -> Expression:
 
 _EXPANSIONS: dict[str, Callable[[_Tokens, Sequence[str]], Iterator[Formula]]] = {
     "allDifferent": _all_different,
-    "weightedSum": _as_it_is,
+    "weightedSum": _unchanged,
     "element": _element,
     "elementFast": _element,
-    "cumulative": _as_it_is,
+    "cumulative": _unchanged,
     "diff2": _diff2,
 }

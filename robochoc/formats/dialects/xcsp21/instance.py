@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
-from robochoc.formats.dialects.dialect import Note
+from robochoc.formats.dialects.dialect import ConversionNote
 from robochoc.model.constraint import Function, Predicate
 
 UNIT = "unit of costs"
@@ -20,7 +20,7 @@ Price = Decimal | float
 
 
 @dataclass(frozen=True)
-class Table:
+class ForeignTable:
     """A relation: the cost of each tuple, and of those that are not listed."""
 
     name: str
@@ -30,11 +30,11 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Sides:
+class AsymmetricTable:
     """A relation with two costs a tuple: one for the agent of each variable (ADCOP)."""
 
-    first: Table
-    second: Table
+    first: ForeignTable
+    second: ForeignTable
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ class ForeignConstraint:
 
     name: str
     scope: tuple[str, ...]
-    content: Table | Sides | Formula
-    knower: str
+    content: ForeignTable | AsymmetricTable | Formula
+    private_agent: str
     file: str
     line: int
 
@@ -88,7 +88,7 @@ class Instance:
         variables: The variables, by their names.
         constraints: The constraints.
         constant: What is added to all costs.
-        costs_from: Costs of at least so much forbid. None: none do.
+        maximal_cost: Costs of at least so much forbid. None: none do.
         ids: The agents by their `id`.
         type: The kind of problem that the file states.
         constraint_model: How much agents know of constraints that do not say it: TKC or PKC.
@@ -103,11 +103,11 @@ class Instance:
     variables: dict[str, ForeignVariable] = field(default_factory=dict)
     constraints: list[ForeignConstraint] = field(default_factory=list)
     constant: Decimal = Decimal(0)
-    costs_from: Decimal | None = None
+    maximal_cost: Decimal | None = None
     ids: dict[str, str] = field(default_factory=dict)
     type: str = ""
     constraint_model: str = ""
-    notes: list[Note] = field(default_factory=list)
+    notes: list[ConversionNote] = field(default_factory=list)
 
 
 def refuse(file: Path | str, line: int, message: str, hint: str) -> NoReturn:

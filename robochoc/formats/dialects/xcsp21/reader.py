@@ -14,17 +14,17 @@ from typing import NoReturn
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.dialect import ImportOptions, Note
-from robochoc.formats.dialects.xcsp21.global_constraints import expand
+from robochoc.formats.dialects.dialect import ConversionNote, ImportOptions
+from robochoc.formats.dialects.xcsp21.global_constraints import expand_global
 from robochoc.formats.dialects.xcsp21.instance import (
     UNIT,
+    AsymmetricTable,
     ForeignConstraint,
+    ForeignTable,
     ForeignVariable,
     Formula,
     Instance,
     Price,
-    Sides,
-    Table,
 )
 from robochoc.formats.dialects.xcsp21.numbers import (
     CostReader,
@@ -56,7 +56,7 @@ MAX_CONSTRAINTS = 200_000
 GLOBAL = "global:"
 PUBLIC = "PUBLIC"
 
-Knower = Callable[[ElementView, Instance], str]
+PrivateAgentReader = Callable[[ElementView, Instance], str]
 """Returns the agent that alone knows a constraint, or an empty text."""
 
 _DESCRIPTIONS = (
@@ -66,7 +66,7 @@ _DESCRIPTIONS = (
 """Attributes of the presentation that do not concern the problem."""
 
 
-class Beginning:
+class FileHead:
     """The first bytes of a file.
 
     Attributes:
@@ -91,34 +91,36 @@ class Beginning:
         self.has_agents = re.search(rb"<agents[\s/>]", text) is not None and b"<agents_neighbours" not in text
 
 
-def read_instance(path: Path, options: ImportOptions, knower: Knower) -> Instance:
+def read_instance(path: Path, options: ImportOptions, private_agent: PrivateAgentReader) -> Instance:
     """Return the instance in the file at `path`.
 
     Args:
         path: The file.
         options: What the import is asked.
-        knower: Returns the agent that alone knows a constraint, or an empty text.
+        private_agent: Returns the agent that alone knows a constraint, or an empty text.
 
     Raises:
         InvalidInputError: with the first mistake.
     """
     with open_xml(path, MAX_XML) as root:
-        reader = _Reader(path, root, options, knower)
+        reader = _Xcsp21Reader(path, root, options, private_agent)
         reader.read()
     return reader.found
 
 
-class _Reader:
+class _Xcsp21Reader:
     """A file on its way."""
 
-    def __init__(self, path: Path, root: ElementView, options: ImportOptions, knower: Knower) -> None:
+    def __init__(
+        self, path: Path, root: ElementView, options: ImportOptions, private_agent: PrivateAgentReader
+    ) -> None:
         self._path = path
         self._options = options
-        self._knower = knower
+        self._private_agent = private_agent
         self._root = root
         self.found = Instance(path)
         self._domains: dict[str, tuple[range, ...]] = {}
-        self._relations: dict[str, Table | Sides] = {}
+        self._relations: dict[str, ForeignTable | AsymmetricTable] = {}
         self._formulas: dict[str, Predicate | Function] = {}
         self._unit_places = 0
 
@@ -133,14 +135,14 @@ class _Reader:
         for element in self._every("agents", "agent"):
             self._agent(element)
         for element in self._every("domains", "domain"):
-            with _placed(element):
+            with _with_line(element):
                 element.ignore_attributes("nbValues")
                 self._domains[element.attribute("name")] = ranges(element.text())
         for element in self._every("variables", "variable"):
             self._variable(element)
         self._define()
         for element in self._every("constraints", "constraint"):
-            with _placed(element):
+            with _with_line(element):
                 self._constrain(element)
 
     def _present(self) -> None:
@@ -153,14 +155,14 @@ class _Reader:
             for stats in presentation.children("stats"):
                 text = stats.text()
                 if stats.attribute("name") == UNIT:
-                    with _placed(stats):
+                    with _with_line(stats):
                         self._unit_places = unit_places(text)
             if not presentation.has_children:
                 presentation.text()
         for agents in self._root.children("agents"):
             self.found.self_agent = agents.attribute("self")
         for constraints in self._root.children("constraints"):
-            with _placed(constraints):
+            with _with_line(constraints):
                 self._bounds(constraints)
 
     def _bounds(self, constraints: ElementView) -> None:
@@ -169,14 +171,14 @@ class _Reader:
         if initial:
             self.found.constant = finite_cost(initial)
             if self.found.constant:
-                self.found.notes.append(Note("constant", f"initialCost {initial} is added to every cost"))
+                self.found.notes.append(ConversionNote("constant", f"initialCost {initial} is added to every cost"))
         if most and most != "infinity":
             bound = finite_cost(most)
-            self.found.costs_from = bound
-            told = (
+            self.found.maximal_cost = bound
+            text = (
                 f"costs of {most} or more forbid (maximalCost); an optimum of as much means that there is no solution"
             )
-            self.found.notes.append(Note("bound", told))
+            self.found.notes.append(ConversionNote("bound", text))
 
     def _agent(self, element: ElementView) -> None:
         name = element.attribute("name")
@@ -209,15 +211,15 @@ class _Reader:
         costs = CostReader(
             maximize=self.found.maximize,
             infinity=self._options.infinity,
-            bound=self.found.costs_from,
+            bound=self.found.maximal_cost,
             places=self._unit_places,
         )
         for element in self._every("relations", "relation"):
-            with _placed(element):
+            with _with_line(element):
                 self._relations[self._new(element)] = read_relation(element, costs)
         for kind in ("predicate", "function"):
             for element in self._every(f"{kind}s", kind):
-                with _placed(element):
+                with _with_line(element):
                     self._formulas[self._new(element)] = read_formula(element)
                     if self._unit_places and kind == "function":
                         raise MistakeError(f"a function in a file with a {UNIT}", "write its costs as a relation")
@@ -244,23 +246,25 @@ class _Reader:
                 raise MistakeError(f"constraint {shortened(name)} is about no variable", "delete it")
             if len(self.found.constraints) == MAX_CONSTRAINTS:
                 raise MistakeError(f"more than {MAX_CONSTRAINTS} constraints", "import a smaller problem")
-            knower = self._knower(element, self.found)
+            private_agent = self._private_agent(element, self.found)
             self.found.constraints.append(
-                ForeignConstraint(name, scope_now, content, knower, str(self._path), element.line)
+                ForeignConstraint(name, scope_now, content, private_agent, str(self._path), element.line)
             )
 
-    def _contents(self, element: ElementView, scope: tuple[str, ...]) -> list[Table | Sides | Formula]:
+    def _contents(self, element: ElementView, scope: tuple[str, ...]) -> list[ForeignTable | AsymmetricTable | Formula]:
         reference = element.attribute("reference")
         if reference.lower().startswith(GLOBAL):
             kind = reference[len(GLOBAL) :]
-            formulas = expand(kind, element, scope)
+            formulas = expand_global(kind, element, scope)
             for formula in formulas:
                 self._check_terms(formula.terms)
-            self.found.notes.append(Note("global", f"{kind} {element.attribute('name')}: {len(formulas)} predicates"))
+            self.found.notes.append(
+                ConversionNote("global", f"{kind} {element.attribute('name')}: {len(formulas)} predicates")
+            )
             return [*formulas]
         if reference in self._relations:
             relation = self._relations[reference]
-            arity = relation.arity if isinstance(relation, Table) else relation.first.arity
+            arity = relation.arity if isinstance(relation, ForeignTable) else relation.first.arity
             if arity not in {0, len(scope)}:
                 there = f"{len(scope)} variables in the scope, but tuples of {arity} values in '{shortened(reference)}'"
                 raise MistakeError(there, "one for each variable")
@@ -290,7 +294,7 @@ class _Reader:
             yield from found.children(tag)
 
 
-def read_relation(element: ElementView, costs: CostReader) -> Table | Sides:
+def read_relation(element: ElementView, costs: CostReader) -> ForeignTable | AsymmetricTable:
     """Return a relation. Raises `MistakeError`.
 
     A cost holds for all following tuples until the next one. The last of equal tuples wins, as with FRODO. Where there
@@ -311,7 +315,7 @@ def read_relation(element: ElementView, costs: CostReader) -> Table | Sides:
     return _table(element, found, other)
 
 
-def _soft(element: ElementView, costs: CostReader) -> Table | Sides:
+def _soft(element: ElementView, costs: CostReader) -> ForeignTable | AsymmetricTable:
     default = element.attribute("defaultCost")
     other = [costs.cost(word) for word in default.split()] or [INFINITE]
     now: list[Price] = []
@@ -331,18 +335,18 @@ def _soft(element: ElementView, costs: CostReader) -> Table | Sides:
             if len(now) > 1:
                 second[values] = now[1]
     if second or len(other) > 1:
-        return Sides(_table(element, first, other[0]), _table(element, second, other[-1]))
+        return AsymmetricTable(_table(element, first, other[0]), _table(element, second, other[-1]))
     return _table(element, first, other[0])
 
 
-def _table(element: ElementView, costs: dict[tuple[int, ...], Price], default: Price) -> Table:
+def _table(element: ElementView, costs: dict[tuple[int, ...], Price], default: Price) -> ForeignTable:
     name, given = element.attribute("name"), element.attribute("arity")
     arity = len(next(iter(costs))) if costs else integer(given or "0")
     for values in costs:
         if len(values) != arity:
             shown = " ".join(map(str, values))
             raise MistakeError(f"the tuple '{shortened(shown)}' has {len(values)} values, others {arity}", "mend it")
-    return Table(name, arity, costs, default)
+    return ForeignTable(name, arity, costs, default)
 
 
 def _values(text: str) -> tuple[int, ...]:
@@ -386,7 +390,7 @@ def expression(text: str, names: tuple[str, ...], wanted: Type) -> Expression:
 
 
 @contextmanager
-def _placed(element: ElementView) -> Iterator[None]:
+def _with_line(element: ElementView) -> Iterator[None]:
     """Give a `MistakeError` raised inside the line of `element`, if it has none."""
     try:
         yield

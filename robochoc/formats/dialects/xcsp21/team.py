@@ -11,14 +11,14 @@ from fractions import Fraction
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import shortened
-from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
+from robochoc.formats.dialects.dialect import ConversionNote, ImportOptions, ImportResult, NameMap, notes_on_names
 from robochoc.formats.dialects.xcsp21.instance import (
+    AsymmetricTable,
     ForeignConstraint,
+    ForeignTable,
     Formula,
     Instance,
     Price,
-    Sides,
-    Table,
     refuse,
 )
 from robochoc.model.assembly import Extras, assemble
@@ -38,16 +38,16 @@ from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import ProblemKind
 
 
-def as_team(instance: Instance, dialect: str, options: ImportOptions) -> Imported:
+def to_team(instance: Instance, dialect: str, options: ImportOptions) -> ImportResult:
     """Return the team of `instance`, and what was mapped.
 
     Raises:
         InvalidInputError: if something has no counterpart here.
     """
-    return _Import(instance, options).imported(dialect)
+    return _TeamBuilder(instance, options).imported(dialect)
 
 
-class _Import:
+class _TeamBuilder:
     """An instance on its way to a team."""
 
     def __init__(self, instance: Instance, options: ImportOptions) -> None:
@@ -55,43 +55,43 @@ class _Import:
             refuse(instance.file, 0, "has no variable", "there is nothing to decide")
         self._instance = instance
         self._options = options
-        self._names = Names()
+        self._names = NameMap()
         self._notes = list(instance.notes)
         self._owned = self._with_owners()
         self._owner = {name: agent for agent, names in self._owned.items() for name in names}
         self._prices = list(_all_prices(instance))
         self._places = max(map(_places, self._prices))
-        self._definitions = _Definitions(self._scaled)
+        self._definitions = _Definitions(self._in_units)
 
-    def imported(self, dialect: str) -> Imported:
+    def imported(self, dialect: str) -> ImportResult:
         """Return the team."""
         instance = self._instance
         variables = {
-            self._names.of(agent): [self._variable(name) for name in names]
+            self._names.allowed(agent): [self._variable(name) for name in names]
             for agent, names in self._owned.items()
             if names
         }
         if idle := [agent for agent, names in self._owned.items() if not names]:
-            told = f"agents without variables are left out: {shortened(' '.join(idle))}"
-            self._notes.append(Note("left out", told))
+            text = f"agents without variables are left out: {shortened(' '.join(idle))}"
+            self._notes.append(ConversionNote("left out", text))
         constraints: list[Constraint] = []
         parts: dict[str, list[Constraint]] = defaultdict(list)
         for one in instance.constraints:
-            for knower, constraint in self._held(one):
-                (parts[self._names.of(knower)] if knower else constraints).append(constraint)
-        weighted = self._weighted()
+            for private_agent, constraint in self._constraints(one):
+                (parts[self._names.allowed(private_agent)] if private_agent else constraints).append(constraint)
+        is_weighted = self._is_weighted()
         team = assemble(
             self._options.name or instance.name or instance.file.stem,
             variables,
             constraints,
-            kind=ProblemKind.DISWCSP if weighted else ProblemKind.DISCSP,
-            costs=self._units() if weighted else PLAIN_COSTS,
+            kind=ProblemKind.DISWCSP if is_weighted else ProblemKind.DISCSP,
+            costs=self._units() if is_weighted else PLAIN_COSTS,
             extras=Extras(parts=parts),
         )
         changed = self._names.changed
         notes = (*notes_on_names([*changed.items()]), *self._notes)
-        bound = None if instance.costs_from is None or instance.maximize else Fraction(instance.costs_from)
-        return Imported(team, dialect, changed, notes, bound)
+        bound = None if instance.maximal_cost is None or instance.maximize else Fraction(instance.maximal_cost)
+        return ImportResult(team, dialect, changed, notes, bound)
 
     # Owners
 
@@ -108,7 +108,7 @@ class _Import:
             agent = owner[name] or next((agent for agent in agents if agent in seen[name]), agents[0])
             owned[agent].append(name)
             if not owner[name]:
-                self._notes.append(Note("shared variable", f"{name} is owned by {agent} from now on"))
+                self._notes.append(ConversionNote("shared variable", f"{name} is owned by {agent} from now on"))
         return owned
 
     def _owned_by_names(self) -> dict[str, list[str]]:
@@ -118,43 +118,43 @@ class _Import:
             found = re.search(self._options.owner, name) if self._options.owner else None
             owned[(found[1] if found.re.groups else found[0]) if found else name].append(name)
         what = "by their names (--owner)" if self._options.owner else "one each"
-        self._notes.append(Note("owners", f"variables have no agents in the file: robots own them, {what}"))
+        self._notes.append(ConversionNote("owners", f"variables have no agents in the file: robots own them, {what}"))
         return owned
 
     def _variable(self, name: str) -> Variable:
         variable = self._instance.variables[name]
         if not variable.ranges:
             refuse(self._instance.file, variable.line, f"the domain of '{shortened(name)}' is empty", "add a value")
-        return Variable(self._names.of(name), Domain(word(variable.domain), variable.ranges))
+        return Variable(self._names.allowed(name), Domain(without_blanks(variable.domain), variable.ranges))
 
     # Costs
 
-    def _weighted(self) -> bool:
+    def _is_weighted(self) -> bool:
         return any(price not in {0, INFINITE} for price in self._prices) or any(
             _is_function(one) for one in self._instance.constraints
         )
 
     def _units(self) -> CostUnits:
         if self._places:
-            told = f"costs are decimals: inside, 1 stands for {Decimal(1).scaleb(-self._places):f}"
-            self._notes.append(Note("scale", told))
+            text = f"costs are decimals: inside, 1 stands for {Decimal(1).scaleb(-self._places):f}"
+            self._notes.append(ConversionNote("scale", text))
         if self._instance.maximize:
-            self._notes.append(Note("maximize", "the sum is maximised"))
-        return CostUnits(self._instance.maximize, self._places, int(self._scaled(self._instance.constant)))
+            self._notes.append(ConversionNote("maximize", "the sum is maximised"))
+        return CostUnits(self._instance.maximize, self._places, int(self._in_units(self._instance.constant)))
 
-    def _scaled(self, price: Price) -> float:
+    def _in_units(self, price: Price) -> float:
         return price if isinstance(price, float) else int(price.scaleb(self._places))
 
     # Constraints
 
-    def _held(self, one: ForeignConstraint) -> Iterator[tuple[str, Constraint]]:
+    def _constraints(self, one: ForeignConstraint) -> Iterator[tuple[str, Constraint]]:
         """Yield a constraint, and the robot that alone knows of it; an empty text where all of its robots do."""
-        if isinstance(one.content, Sides):
-            yield from self._sides(one, one.content)
+        if isinstance(one.content, AsymmetricTable):
+            yield from self._asymmetric_parts(one, one.content)
             return
-        yield self._knower(one), self._constraint(one, one.content)
+        yield self._private_agent(one), self._constraint(one, one.content)
 
-    def _sides(self, one: ForeignConstraint, sides: Sides) -> Iterator[tuple[str, Constraint]]:
+    def _asymmetric_parts(self, one: ForeignConstraint, sides: AsymmetricTable) -> Iterator[tuple[str, Constraint]]:
         if len(one.scope) != 2:  # noqa: PLR2004 - a cost for each of two variables
             message = f"two costs a tuple, but {len(one.scope)} variables in '{shortened(one.name)}'"
             refuse(one.file, one.line, message, "asymmetric costs are for constraints of two variables")
@@ -162,69 +162,69 @@ class _Import:
             apart = self._owner[one.scope[0]] != self._owner[one.scope[1]]
             yield self._owner[variable] if apart else "", self._constraint(one, table)
 
-    def _knower(self, one: ForeignConstraint) -> str:
+    def _private_agent(self, one: ForeignConstraint) -> str:
         """Return the robot that alone knows of a constraint with another. Empty: there is none."""
         owners = {self._owner[name] for name in one.scope}
-        if not one.knower:
+        if not one.private_agent:
             return ""
-        if one.knower not in owners:
-            what = f"constraint '{shortened(one.name)}' is known to {shortened(one.knower)} alone"
+        if one.private_agent not in owners:
+            what = f"constraint '{shortened(one.name)}' is known to {shortened(one.private_agent)} alone"
             refuse(one.file, one.line, f"{what}, who owns none of its variables", "let an agent of its scope know it")
         if len(owners) == 1:
             return ""
         if len(one.scope) > 2 or _is_function(one):  # noqa: PLR2004 - partially known constraints are binary
-            told = f"{one.name} was known to {one.knower} alone; now all robots of its scope know it"
-            self._notes.append(Note("known to more", told))
+            text = f"{one.name} was known to {one.private_agent} alone; now all robots of its scope know it"
+            self._notes.append(ConversionNote("known to more", text))
             return ""
-        self._notes.append(Note("partially known", f"{one.name} is known to {one.knower} alone (PKC)"))
-        return one.knower
+        self._notes.append(ConversionNote("partially known", f"{one.name} is known to {one.private_agent} alone (PKC)"))
+        return one.private_agent
 
-    def _constraint(self, one: ForeignConstraint, content: Table | Formula) -> Constraint:
+    def _constraint(self, one: ForeignConstraint, content: ForeignTable | Formula) -> Constraint:
         scope = self._terms(one.scope)
-        if isinstance(content, Table):
-            return Constraint(word(one.name), self._definitions.relation(content, len(scope)), scope, scope)
-        cost = INFINITE if content.cost is None else self._scaled(content.cost)
+        if isinstance(content, ForeignTable):
+            return Constraint(without_blanks(one.name), self._definitions.relation(content, len(scope)), scope, scope)
+        cost = INFINITE if content.cost is None else self._in_units(content.cost)
         definition = self._definitions.formula(content.definition)
-        return Constraint(word(one.name), definition, scope, self._terms(content.terms), cost=cost)
+        return Constraint(without_blanks(one.name), definition, scope, self._terms(content.terms), cost=cost)
 
     def _terms(self, terms: Iterable[Term]) -> tuple[Term, ...]:
-        return tuple(term if isinstance(term, int) else self._names.of(term) for term in terms)
+        return tuple(term if isinstance(term, int) else self._names.allowed(term) for term in terms)
 
 
 class _Definitions:
     """Relations, predicates and functions, each under a name of its own."""
 
-    def __init__(self, scaled: Callable[[Price], float]) -> None:
-        self._scaled = scaled
+    def __init__(self, in_units: Callable[[Price], float]) -> None:
+        self._in_units = in_units
         self._taken: dict[str, object] = dict(PREDEFINED)
         self._formulas: dict[Predicate | Function, Predicate | Function] = {}
-        self._relations: dict[int, tuple[Table, Relation]] = {}
+        self._relations: dict[int, tuple[ForeignTable, Relation]] = {}
 
     def formula(self, definition: Predicate | Function) -> Predicate | Function:
         """Return `definition` under a name that no other has."""
         if isinstance(definition, GlobalPredicate):
             return definition
         if definition not in self._formulas:
-            self._formulas[definition] = replace(definition, name=self._free(definition.name, definition))
+            self._formulas[definition] = replace(definition, name=self._free_name(definition.name, definition))
         return self._formulas[definition]
 
-    def relation(self, table: Table, arity: int) -> Relation:
+    def relation(self, table: ForeignTable, arity: int) -> Relation:
         """Return the relation that `table` is: a soft one only where a cost is neither 0 nor infinite."""
         if id(table) not in self._relations:
             self._relations[id(table)] = table, self._relation(table, arity)
         return self._relations[id(table)][1]
 
-    def _relation(self, table: Table, arity: int) -> Relation:
-        name = self._free(table.name, table)
+    def _relation(self, table: ForeignTable, arity: int) -> Relation:
+        name = self._free_name(table.name, table)
         if {table.default, *table.costs.values()} <= {0, INFINITE}:
             allowed = table.default == INFINITE
             listed = tuple(values for values, price in table.costs.items() if (price == 0) is allowed)
             return Relation(name, arity, Semantics.SUPPORTS if allowed else Semantics.CONFLICTS, listed)
-        costs = tuple(self._scaled(price) for price in table.costs.values())
-        return Relation(name, arity, Semantics.SOFT, tuple(table.costs), costs, self._scaled(table.default))
+        costs = tuple(self._in_units(price) for price in table.costs.values())
+        return Relation(name, arity, Semantics.SOFT, tuple(table.costs), costs, self._in_units(table.default))
 
-    def _free(self, name: str, thing: object) -> str:
-        base, number = word(name), 1
+    def _free_name(self, name: str, thing: object) -> str:
+        base, number = without_blanks(name), 1
         free = base
         while self._taken.setdefault(free, thing) != thing:
             number += 1
@@ -238,7 +238,7 @@ def _agents_that_see(instance: Instance, owner: Mapping[str, str]) -> Mapping[st
     for one in instance.constraints:
         for name in one.scope:
             if not owner[name]:
-                seen[name] |= {owner[other] for other in one.scope} | {one.knower}
+                seen[name] |= {owner[other] for other in one.scope} | {one.private_agent}
     return seen
 
 
@@ -251,14 +251,14 @@ def _all_prices(instance: Instance) -> Iterator[Price]:
             case Formula(cost=cost):
                 if cost is not None:
                     yield cost
-            case Table() as table:
+            case ForeignTable() as table:
                 yield from _prices(table, met)
-            case Sides(first=first, second=second):
+            case AsymmetricTable(first=first, second=second):
                 yield from _prices(first, met)
                 yield from _prices(second, met)
 
 
-def _prices(table: Table, met: set[int]) -> Iterator[Price]:
+def _prices(table: ForeignTable, met: set[int]) -> Iterator[Price]:
     if id(table) not in met:
         met.add(id(table))
         yield table.default
@@ -273,6 +273,6 @@ def _places(price: Price) -> int:
     return 0 if isinstance(price, float) else max(0, -int(price.as_tuple().exponent))
 
 
-def word(name: str) -> str:
+def without_blanks(name: str) -> str:
     """Return `name` without blanks, as names of domains, definitions and constraints are."""
     return re.sub(r"\s+", "_", name) or "_"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.xcsp3.constraints import as_integers, best, distinct, items, weighted
 from robochoc.formats.dialects.xcsp3.document import ignore_remarks
-from robochoc.formats.dialects.xcsp3.kinds import as_integers, best, distinct, items, weighted
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import as_integer, compare, some, times, total
+from robochoc.formats.dialects.xcsp3.terms import as_integer, compare, disjunction, times, total
 from robochoc.formats.element_view import ElementView
 from robochoc.model.expression import Apply, Constant, Expression, names
 
@@ -60,7 +60,7 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
         return as_integer(posting.term(element.text()))
     if kind == "sum" and element.view.has_children:
         return weighted(element, posting)
-    members = as_integers(items(element.whole(), posting))
+    members = as_integers(items(element.only_list(), posting))
     if not members:
         raise MistakeError("an objective without variables", "name them")
     match kind:
@@ -86,10 +86,10 @@ def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximi
     parts: list[Expression] = []
     if maximize:
         for number, member in enumerate(members):
-            beside = next(iter(names(member)), None)
-            is_new = posting.add_variable(f"{beside or 'value'}_is_new", (0, 1), _NEW, beside)
+            same_robot_as = next(iter(names(member)), None)
+            is_new = posting.add_variable(f"{same_robot_as or 'value'}_is_new", (0, 1), _NEW, same_robot_as)
             for earlier in members[:number]:
-                posting.post(some([compare("eq", is_new, Constant(0)), compare("ne", member, earlier)]))
+                posting.post(disjunction([compare("eq", is_new, Constant(0)), compare("ne", member, earlier)]))
             parts.append(is_new)
         return total(parts)
     holders: dict[int, list[Expression]] = {}
@@ -102,7 +102,7 @@ def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximi
             continue
         is_used = posting.add_variable(f"uses_{value}".replace("-", "minus_"), (0, 1), _USED)
         for member in holders[value]:
-            posting.post(some([compare("ne", member, Constant(value)), compare("eq", is_used, Constant(1))]))
+            posting.post(disjunction([compare("ne", member, Constant(value)), compare("eq", is_used, Constant(1))]))
         parts.append(is_used)
     return total(parts)
 

@@ -13,7 +13,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.xcsp3.terms import (
     FALSE,
     TRUE,
-    Condition,
+    Xcsp3Condition,
     as_boolean,
     as_integer,
     compare,
@@ -21,7 +21,7 @@ from robochoc.formats.dialects.xcsp3.terms import (
     read_condition,
     read_conditions,
     read_tree,
-    resolved,
+    resolve_tree,
 )
 from robochoc.formats.dialects.xcsp3.variables import MAX_VARIABLES, Variables
 from robochoc.model.expression import (
@@ -44,9 +44,9 @@ MAX_NODES = 9_000
 """The maximum number of operators and terms of one constraint."""
 MAX_NESTING = 60
 """The maximum depth of the expression of one constraint."""
-MAX_TRIED = 200_000
+MAX_ENUMERATED = 200_000
 """The maximum number of combinations of values that a constraint is tried on to make it a table."""
-MAX_COST_TRIED = 1_000_000
+MAX_COST_ENUMERATED = 1_000_000
 """The maximum number of combinations of values of the variables of one cost."""
 MAX_WORK = 5_000_000
 """The maximum number of all operators, terms and values of an instance."""
@@ -61,7 +61,7 @@ class Auxiliary(NamedTuple):
 
     values: tuple[int, ...]
     purpose: str
-    beside: str | None
+    same_robot_as: str | None
 
 
 @dataclass
@@ -76,7 +76,7 @@ class Posting:
         constraints: The constraints, over our names.
         costs: The costs, over our names.
         constant: The constant part of the costs.
-        extra: Auxiliary variables, which are not in the instance, by our names.
+        auxiliaries: Auxiliary variables, which are not in the instance, by our names.
         line: The line of the element that is read.
         title: The name of the constraint that is read.
         work: The operators, terms and values so far.
@@ -89,7 +89,7 @@ class Posting:
     constraints: list[Constraint] = field(default_factory=list)
     costs: list[Constraint] = field(default_factory=list)
     constant: int = 0
-    extra: dict[str, Auxiliary] = field(default_factory=dict)
+    auxiliaries: dict[str, Auxiliary] = field(default_factory=dict)
     line: int = 0
     title: str = ""
     work: int = 0
@@ -126,13 +126,13 @@ class Posting:
 
     def expression(self, text: str) -> Expression:
         """Return the functional expression in a text."""
-        return resolved(read_tree(text), self.leaf, MAX_VALUES)
+        return resolve_tree(read_tree(text), self.leaf, MAX_VALUES)
 
-    def condition(self, text: str) -> Condition:
+    def condition(self, text: str) -> Xcsp3Condition:
         """Return the condition in a text."""
         return read_condition(text, self.term, MAX_VALUES)
 
-    def conditions(self, text: str) -> list[Condition]:
+    def conditions(self, text: str) -> list[Xcsp3Condition]:
         """Return the conditions in a text."""
         return read_conditions(text, self.term, MAX_VALUES)
 
@@ -160,14 +160,14 @@ class Posting:
         """Return whether the values of our variable `name` are symbols."""
         return name in self._original and self.variables.is_symbolic(self._original[name])
 
-    def add_variable(self, name: str, values: Iterable[int], purpose: str, beside: str | None = None) -> Name:
+    def add_variable(self, name: str, values: Iterable[int], purpose: str, same_robot_as: str | None = None) -> Name:
         """Return a new auxiliary variable.
 
         Args:
             name: The name of the variable; a suffix is added if it is not free.
             values: The values of the variable.
             purpose: The purpose of the variable, for messages.
-            beside: The variable, by our name, whose robot owns the new one. None: the new variable gets its own robot.
+            same_robot_as: The name in the team of a variable; its robot owns the new variable. None: a new robot does.
 
         Raises:
             MistakeError: if there are too many values or variables.
@@ -175,15 +175,15 @@ class Posting:
         found = tuple(sorted(set(values)))
         if len(found) > MAX_VALUES:
             raise MistakeError(f"an auxiliary variable of {len(found):,} values", f"{MAX_VALUES:,} are supported")
-        if len(self.extra) == MAX_VARIABLES:
+        if len(self.auxiliaries) == MAX_VARIABLES:
             raise MistakeError(f"more than {MAX_VARIABLES:,} auxiliary variables", "import a smaller problem")
-        while name in self._original or name in self.extra:
+        while name in self._original or name in self.auxiliaries:
             name += "_"
-        self.extra[name] = Auxiliary(found, purpose, beside)
+        self.auxiliaries[name] = Auxiliary(found, purpose, same_robot_as)
         return Name(name)
 
     def _values(self, name: str) -> Sequence[int]:
-        return self.extra[name].values if name in self.extra else self.values[self._original[name]]
+        return self.auxiliaries[name].values if name in self.auxiliaries else self.values[self._original[name]]
 
     def size(self, items: Iterable[str]) -> int:
         """Return the number of combinations of values of variables."""
@@ -199,9 +199,9 @@ class Posting:
             if not scope:
                 self._post_constant(part)
                 continue
-            formal, body = self._general(part, scope)
+            formal, body = self._with_formals(part, scope)
             predicate = self._shared(("predicate", body), lambda name: Predicate(name, formal, body), "p")  # noqa: B023
-            self._keep(predicate, scope)
+            self._add(predicate, scope)
 
     def post_table(self, scope: Sequence[Item], rows: Iterable[Sequence[int]], *, allowed: bool) -> None:
         """Post that `scope` has one of the values in `rows`, or none of them."""
@@ -210,29 +210,29 @@ class Posting:
         own = [item.name for item in scope if isinstance(item, Name)]
         if len(own) != len(scope) or len(set(own)) != len(own):
             own = list(dict.fromkeys(own))
-            rows = _fitting(scope, own, rows)
+            rows = _matching_rows(scope, own, rows)
         found = tuple(sorted({tuple(row) for row in rows}))
         if len(found) > MAX_TUPLES:
             raise MistakeError(f"a table of {len(found):,} tuples", f"{MAX_TUPLES:,} are allowed")
         if not own:
             self.post(TRUE if bool(found) == allowed else FALSE)
             return
-        self._spend(len(found) + 1)
+        self._count_work(len(found) + 1)
         if not found:
-            self.post(_never(own[0]) if allowed else TRUE)
+            self.post(_unsatisfiable(own[0]) if allowed else TRUE)
             return
         semantics = Semantics.SUPPORTS if allowed else Semantics.CONFLICTS
         relation = self._shared(
             ("relation", semantics, found), lambda name: Relation(name, len(own), semantics, found), "r"
         )
-        self._keep(relation, own)
+        self._add(relation, own)
 
-    def post_tried(self, kind: str, scope: Sequence[Item], test: Test) -> None:
+    def post_enumerated(self, kind: str, scope: Sequence[Item], test: Test) -> None:
         """Post what `test` says of the values of `scope`, which are all tried."""
         own = list(dict.fromkeys(name for item in scope for name in names(item)))
-        if self.size(own) > MAX_TRIED:
-            message = f"<{kind}> has {in_words(self.size(own))} combinations of values"
-            raise MistakeError(message, f"it becomes a table of at most {MAX_TRIED:,}")
+        if self.size(own) > MAX_ENUMERATED:
+            message = f"<{kind}> has {readable_number(self.size(own))} combinations of values"
+            raise MistakeError(message, f"it becomes a table of at most {MAX_ENUMERATED:,}")
         domains = [self.domain(Name(name)) for name in own]
         place = {name: index for index, name in enumerate(own)}
 
@@ -253,21 +253,23 @@ class Posting:
             else:
                 self.constant += value
             return
-        if self.size(scope) > MAX_COST_TRIED:
-            message = f"the cost of {len(scope)} variables together has {in_words(self.size(scope))} combinations"
-            raise MistakeError(message, f"at most {MAX_COST_TRIED:,} are supported; a sum is split into its terms")
-        formal, body = self._general(expression, scope)
+        if self.size(scope) > MAX_COST_ENUMERATED:
+            message = (
+                f"the cost of {len(scope)} variables together has {readable_number(self.size(scope))} combinations"
+            )
+            raise MistakeError(message, f"at most {MAX_COST_ENUMERATED:,} are supported; a sum is split into its terms")
+        formal, body = self._with_formals(expression, scope)
         function = self._shared(("function", body), lambda name: Function(name, formal, body), "f")
         self.costs.append(Constraint(self.title, function, scope, scope, line=self.line))
 
     def _post_constant(self, part: Expression) -> None:
         if not _constant(part):
-            self.post(_never(next(iter(self._original))))
+            self.post(_unsatisfiable(next(iter(self._original))))
 
-    def _general(self, expression: Expression, scope: Sequence[str]) -> tuple[tuple[str, ...], Expression]:
+    def _with_formals(self, expression: Expression, scope: Sequence[str]) -> tuple[tuple[str, ...], Expression]:
         """Return formal parameters for `scope`, and `expression` over them."""
         formal = {name: f"X{number}" for number, name in enumerate(scope)}
-        return tuple(formal.values()), renamed(expression, formal)
+        return tuple(formal.values()), rename_variables(expression, formal)
 
     def _shared(self, key: object, make: Callable[[str], Definition], letter: str) -> Definition:
         """Return the definition for `key`: constraints that say the same share one."""
@@ -275,7 +277,7 @@ class Posting:
             self._definitions[key] = make(f"{letter}{len(self._definitions)}")
         return self._definitions[key]
 
-    def _keep(self, definition: Definition, scope: Sequence[str]) -> None:
+    def _add(self, definition: Definition, scope: Sequence[str]) -> None:
         if len(self.constraints) == MAX_CONSTRAINTS:
             raise MistakeError(f"more than {MAX_CONSTRAINTS:,} constraints", "import a smaller problem")
         self.constraints.append(Constraint(self.title, definition, tuple(scope), tuple(scope), line=self.line))
@@ -288,12 +290,12 @@ class Posting:
             nodes, deepest = nodes + 1, max(deepest, depth)
             if isinstance(node, Apply):
                 waiting += [(argument, depth + 1) for argument in node.arguments]
-        self._spend(nodes)
+        self._count_work(nodes)
         if nodes > MAX_NODES or deepest > MAX_NESTING:
             message = f"a constraint of {nodes:,} operators and terms, {deepest} levels deep"
             raise MistakeError(message, f"{MAX_NODES:,} and {MAX_NESTING} are allowed: split it")
 
-    def _spend(self, work: int) -> None:
+    def _count_work(self, work: int) -> None:
         self.work += work
         if self.work > MAX_WORK:
             raise MistakeError(f"the problem has more than {MAX_WORK:,} operators and values", "import a smaller one")
@@ -310,18 +312,18 @@ def _constant(expression: Expression) -> int | None:
         return None
 
 
-def in_words(number: int) -> str:
+def readable_number(number: int) -> str:
     """Return a number as it may stand in a message, however large it is."""
     return f"{number:,}" if number < 10**15 else f"10^{int(number.bit_length() * 0.30103)}"
 
 
-def renamed(expression: Expression, names_for: Mapping[str, str]) -> Expression:
+def rename_variables(expression: Expression, names_for: Mapping[str, str]) -> Expression:
     """Return `expression` with other names."""
     match expression:
         case Name(name):
             return Name(names_for[name])
         case Apply(operator, arguments):
-            return Apply(operator, tuple(renamed(argument, names_for) for argument in arguments))
+            return Apply(operator, tuple(rename_variables(argument, names_for) for argument in arguments))
         case Constant():
             return expression
 
@@ -334,11 +336,13 @@ def _conjuncts(expression: Expression) -> Iterator[Expression]:
         yield expression
 
 
-def _never(name: str) -> Expression:
+def _unsatisfiable(name: str) -> Expression:
     return compare("ne", Name(name), Name(name))
 
 
-def _fitting(scope: Sequence[Item], own: Sequence[str], rows: Iterable[Sequence[int]]) -> Iterator[tuple[int, ...]]:
+def _matching_rows(
+    scope: Sequence[Item], own: Sequence[str], rows: Iterable[Sequence[int]]
+) -> Iterator[tuple[int, ...]]:
     """Yield `rows` as values of the variables `own`: those that fit the integers and the repetitions of `scope`."""
     for row in rows:
         bound: dict[str, int] = {}

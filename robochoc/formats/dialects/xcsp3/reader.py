@@ -9,12 +9,12 @@ from pathlib import Path
 
 from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, invalid_input
-from robochoc.formats.dialects.dialect import MAX_FILE, Imported, ImportOptions, Names, Note
-from robochoc.formats.dialects.xcsp3 import kinds, scheduling, tables
+from robochoc.formats.dialects.dialect import MAX_FILE, ConversionNote, ImportOptions, ImportResult, NameMap
+from robochoc.formats.dialects.xcsp3 import constraints, scheduling, tables
+from robochoc.formats.dialects.xcsp3.constraints import circuit
 from robochoc.formats.dialects.xcsp3.document import check_root, ignore_remarks
-from robochoc.formats.dialects.xcsp3.kinds import circuit
 from robochoc.formats.dialects.xcsp3.objective import post_objective
-from robochoc.formats.dialects.xcsp3.posting import Posting, in_words
+from robochoc.formats.dialects.xcsp3.posting import Posting, readable_number
 from robochoc.formats.dialects.xcsp3.template import Element, slide_scopes
 from robochoc.formats.dialects.xcsp3.variables import Variables, domain_of, read_variables
 from robochoc.formats.element_view import ElementView, open_xml
@@ -27,25 +27,25 @@ NAME = "xcsp3"
 Kind = Callable[[Element, Posting], None]
 
 KINDS: Mapping[str, Kind] = {
-    "intension": kinds.intension,
-    "allDifferent": kinds.all_different,
-    "allEqual": kinds.all_equal,
-    "ordered": kinds.ordered,
-    "lex": kinds.lex,
-    "sum": kinds.sum_of,
-    "count": kinds.count,
-    "nValues": kinds.n_values,
-    "cardinality": kinds.cardinality,
-    "minimum": kinds.extremum("min"),
-    "maximum": kinds.extremum("max"),
-    "minimumArg": kinds.place_of_extremum("min"),
-    "maximumArg": kinds.place_of_extremum("max"),
-    "channel": kinds.channel,
-    "instantiation": kinds.instantiation,
-    "clause": kinds.clause,
-    "precedence": kinds.precedence,
-    "knapsack": kinds.knapsack,
-    "binPacking": kinds.bin_packing,
+    "intension": constraints.intension,
+    "allDifferent": constraints.all_different,
+    "allEqual": constraints.all_equal,
+    "ordered": constraints.ordered,
+    "lex": constraints.lex,
+    "sum": constraints.sum_of,
+    "count": constraints.count,
+    "nValues": constraints.n_values,
+    "cardinality": constraints.cardinality,
+    "minimum": constraints.extremum("min"),
+    "maximum": constraints.extremum("max"),
+    "minimumArg": constraints.place_of_extremum("min"),
+    "maximumArg": constraints.place_of_extremum("max"),
+    "channel": constraints.channel,
+    "instantiation": constraints.instantiation,
+    "clause": constraints.clause,
+    "precedence": constraints.precedence,
+    "knapsack": constraints.knapsack,
+    "binPacking": constraints.bin_packing,
     "element": tables.element,
     "regular": tables.regular,
     "mdd": tables.mdd,
@@ -60,7 +60,7 @@ _WIDE = 4_000_000
 """A constraint with more combinations of values than these is told: the central solver makes tables of no more."""
 
 
-def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     """Return the problem in an XCSP3 file.
 
     Args:
@@ -78,7 +78,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
         return _read_instance(root, path, options)
 
 
-def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imported:
+def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> ImportResult:
     variables = read_variables(root.child("variables"))
     root.report.finish()
     if not variables.domains:
@@ -91,7 +91,7 @@ def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imp
     posting = Posting(variables, {name: tuple(domain) for name, domain in domains.items()}, symbols, ids)
     constraints = root.child("constraints")
     if constraints is not None:
-        _Reader(posting).read(constraints)
+        _ConstraintReader(posting).read(constraints)
     objectives = root.child("objectives")
     maximize = False
     if objectives is not None:
@@ -114,12 +114,14 @@ def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imp
     changed = {ours: theirs for theirs, ours in ids.items() if ours != theirs}
     notes = list(_notes(posting, root, changed))
     if options.infinity is not None:
-        notes.append(Note("infinity", "no cost of XCSP3 forbids, however large: its constraints are hard ones"))
-    return Imported(team, NAME, changed, tuple(notes))
+        notes.append(
+            ConversionNote("infinity", "no cost of XCSP3 forbids, however large: its constraints are hard ones")
+        )
+    return ImportResult(team, NAME, changed, tuple(notes))
 
 
 @dataclass
-class _Reader:
+class _ConstraintReader:
     """Reads constraints, in blocks, groups and slides."""
 
     posting: Posting
@@ -141,18 +143,18 @@ class _Reader:
                         self._post(Element(child, self.posting.variables))
 
     def _group(self, group: ElementView) -> None:
-        every = group.children("args")
+        arguments = group.children("args")
         template = self._template(group)
-        if not every:
+        if not arguments:
             raise MistakeError("a <group> without <args>", "write the arguments of each constraint")
-        for one in every:
-            words = list(self.posting.variables.named(one.text()))
-            self._post(template.applied(words))
+        for one in arguments:
+            words = list(self.posting.variables.expand(one.text()))
+            self._post(template.with_arguments(words))
 
     def _slide(self, slide: ElementView) -> None:
         template = self._template(slide)
         for words in slide_scopes(slide, self.posting.variables, template.arity):
-            self._post(template.applied(words))
+            self._post(template.with_arguments(words))
 
     def _template(self, parent: ElementView) -> Element:
         ignore_remarks(parent)
@@ -177,16 +179,16 @@ class _Reader:
 
 def _names(variables: Variables) -> dict[str, str]:
     """Return our name of each variable: `x_1_2` for `x[1][2]`, unless that is another one's."""
-    names = Names()
-    plain = {name: names.of(name) for name in variables.domains if "[" not in name}
+    names = NameMap()
+    plain = {name: names.allowed(name) for name in variables.domains if "[" not in name}
     for name in variables.domains:
         if "[" in name:
             pretty = re.sub(r"[\[\]]+", "_", name).strip("_")
-            plain[name] = names.of(pretty if pretty not in variables.domains else name)
+            plain[name] = names.allowed(pretty if pretty not in variables.domains else name)
     found = {name: plain[name] for name in variables.domains}
     if len(set(found.values())) < len(found):  # `a_1[2]` and `a[1][2]`
-        exact = Names()
-        return {name: exact.of(name) for name in variables.domains}
+        exact = NameMap()
+        return {name: exact.allowed(name) for name in variables.domains}
     return found
 
 
@@ -198,24 +200,24 @@ def _robots(own: Mapping[str, Variable], owner: str | None, path: Path) -> dict[
         raise invalid_input(
             path, f"--owner {owner} is not a valid regular expression: {error}", "write x\\[(\\d+)\\]"
         ) from None
-    names = Names()
+    names = NameMap()
     robots: dict[str, list[Variable]] = {}
     for original, variable in own.items():
         match = pattern.search(original) if pattern else None
         if pattern and not match:
             raise invalid_input(path, f"--owner {owner} fits no part of '{original}'", "let it fit all variables")
         word = variable.name if match is None else match[1] if match.re.groups and match[1] else match[0]
-        robots.setdefault(names.of(word if word[:1].isalpha() else f"r{word}"), []).append(variable)
+        robots.setdefault(names.allowed(word if word[:1].isalpha() else f"r{word}"), []).append(variable)
     return robots
 
 
 def _add_auxiliaries(robots: dict[str, list[Variable]], posting: Posting) -> None:
     """Add auxiliary variables to the robots of the variables that they belong to; others get robots of their own."""
     owner = {variable.name: robot for robot, variables in robots.items() for variable in variables}
-    for name, (values, _, beside) in posting.extra.items():
+    for name, (values, _, same_robot_as) in posting.auxiliaries.items():
         domain = Domain(f"d_{name}", tuple(range(value, value + 1) for value in values))
-        if beside is not None:
-            robots[owner[beside]].append(Variable(name, domain))
+        if same_robot_as is not None:
+            robots[owner[same_robot_as]].append(Variable(name, domain))
             continue
         robot = name
         while robot in robots:
@@ -227,25 +229,27 @@ def _team_name(path: Path, options: ImportOptions) -> str:
     return options.name or path.name.removesuffix(".xml")
 
 
-def _notes(posting: Posting, root: ElementView, changed: Mapping[str, str]) -> list[Note]:
-    notes = [Note("renamed", f"{original} is {name}") for name, original in changed.items()]
+def _notes(posting: Posting, root: ElementView, changed: Mapping[str, str]) -> list[ConversionNote]:
+    notes = [ConversionNote("renamed", f"{original} is {name}") for name, original in changed.items()]
     by_purpose: dict[str, list[str]] = {}
-    for name, auxiliary in posting.extra.items():
+    for name, auxiliary in posting.auxiliaries.items():
         by_purpose.setdefault(auxiliary.purpose, []).append(name)
     for purpose, added in by_purpose.items():
         if len(added) == 1:
-            notes.append(Note("auxiliary", f"{added[0]} is an additional variable: {purpose}"))
+            notes.append(ConversionNote("auxiliary", f"{added[0]} is an additional variable: {purpose}"))
         else:
-            every = f"{added[0]} to {added[-1]}"
-            notes.append(Note("auxiliary", f"{every} are {len(added)} additional variables: each is {purpose}"))
+            span = f"{added[0]} to {added[-1]}"
+            notes.append(
+                ConversionNote("auxiliary", f"{span} are {len(added)} additional variables: each is {purpose}")
+            )
     if root.has("annotations"):
-        notes.append(Note("annotations", "advice to solvers is left out"))
+        notes.append(ConversionNote("annotations", "advice to solvers is left out"))
     wide = [one for one in posting.constraints if posting.size(one.variables) > _WIDE]
     notes += [
-        Note(
+        ConversionNote(
             "wide",
             f"line {one.line}: {one.name} is over {len(one.variables)} variables with"
-            f" {in_words(posting.size(one.variables))} combinations of values; protocols with tables do not take it",
+            f" {readable_number(posting.size(one.variables))} combinations of values, too many for table protocols",
         )
         for one in wide[:100]
     ]

@@ -7,19 +7,19 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.xcsp3.kinds import as_integers, items
+from robochoc.formats.dialects.xcsp3.constraints import as_integers, items
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.template import Element
 from robochoc.formats.dialects.xcsp3.terms import (
-    Condition,
+    Xcsp3Condition,
     as_integer,
     compare,
-    every,
+    conjunction,
+    disjunction,
     plus,
-    some,
     times,
-    together,
     total,
+    zip_equal,
 )
 from robochoc.model.expression import Constant, Expression
 
@@ -27,7 +27,7 @@ MAX_COVERS = 5_000
 """The maximum number of sets of tasks that are too much together."""
 
 
-class Task(NamedTuple):
+class ScheduledTask(NamedTuple):
     """A task: when it begins, how long it takes, and how much it needs."""
 
     start: Expression
@@ -38,17 +38,17 @@ class Task(NamedTuple):
 def no_overlap(element: Element, posting: Posting) -> None:
     """Tasks, or boxes, do not overlap."""
     origins, lengths = (_points(element, child, posting) for child in ("origins", "lengths"))
-    spared = element.is_true("zeroIgnored", default=True)
+    excepted = element.is_true("zeroIgnored", default=True)
     boxes = [
-        list(together(*box, what="<origins> and <lengths>"))
-        for box in together(origins, lengths, what="<origins> and <lengths>")
+        list(zip_equal(*box, what="<origins> and <lengths>"))
+        for box in zip_equal(origins, lengths, what="<origins> and <lengths>")
     ]
     for one, other in itertools.combinations(boxes, 2):
         apart = []
-        for (x, long), (y, wide) in together(one, other):
+        for (x, long), (y, wide) in zip_equal(one, other):
             apart += [compare("le", plus(x, long), y), compare("le", plus(y, wide), x)]
-            apart += [_is_zero(side) for side in (long, wide) if spared and _may_be_zero(side, posting)]
-        posting.post(some(apart))
+            apart += [_is_zero(side) for side in (long, wide) if excepted and _may_be_zero(side, posting)]
+        posting.post(disjunction(apart))
 
 
 def cumulative(element: Element, posting: Posting) -> None:
@@ -56,8 +56,8 @@ def cumulative(element: Element, posting: Posting) -> None:
     children = ["origins", "lengths", "heights", *(["ends"] if element.has("ends") else [])]
     columns = [as_integers(items(element.words(child), posting)) for child in children]
     tasks = []
-    for start, length, height, *ends in together(*columns, what=f"<cumulative>: {', '.join(children)}"):
-        tasks.append(Task(start, length, height))
+    for start, length, height, *ends in zip_equal(*columns, what=f"<cumulative>: {', '.join(children)}"):
+        tasks.append(ScheduledTask(start, length, height))
         for end in ends:
             posting.post(compare("eq", plus(start, length), end))
     if any(min(posting.domain(one), default=0) < 0 for task in tasks for one in (task.length, task.height)):
@@ -68,7 +68,7 @@ def cumulative(element: Element, posting: Posting) -> None:
     post_tasks(tasks, condition, posting)
 
 
-def post_tasks(every_task: Sequence[Task], condition: Condition, posting: Posting) -> None:
+def post_tasks(every_task: Sequence[ScheduledTask], condition: Xcsp3Condition, posting: Posting) -> None:
     """Post that what the tasks that run at one time need, together, meets `condition`: at most something."""
     nothing = Constant(0)
     tasks = [task for task in every_task if nothing not in (task.length, task.height)]
@@ -79,72 +79,76 @@ def post_tasks(every_task: Sequence[Task], condition: Condition, posting: Postin
         return
     for cover in covers:
         pairs = itertools.combinations(cover, 2)
-        posting.post(some([part for one, other in pairs for part in _apart(one, other)] + _absent(cover, posting)))
+        posting.post(
+            disjunction([part for one, other in pairs for part in _apart(one, other)] + _absent(cover, posting))
+        )
 
 
-def _absent(cover: Sequence[Task], posting: Posting) -> list[Expression]:
+def _absent(cover: Sequence[ScheduledTask], posting: Posting) -> list[Expression]:
     return [_is_zero(task.length) for task in cover if _may_be_zero(task.length, posting)]
 
 
-def _apart(one: Task, other: Task) -> list[Expression]:
+def _apart(one: ScheduledTask, other: ScheduledTask) -> list[Expression]:
     return [
         compare("le", plus(one.start, one.length), other.start),
         compare("le", plus(other.start, other.length), one.start),
     ]
 
 
-def _covers(tasks: Sequence[Task], condition: Condition) -> list[tuple[Task, ...]] | None:
+def _covers(tasks: Sequence[ScheduledTask], condition: Xcsp3Condition) -> list[tuple[ScheduledTask, ...]] | None:
     """Return the smallest sets of tasks that are too much together; None where there are many, or heights vary.
 
     Tasks that overlap in pairs overlap all at one time, so that in each set two must be apart.
     """
     if condition.with_constant(0) is None or not all(isinstance(task.height, Constant) for task in tasks):
         return None
-    found: list[tuple[Task, ...]] = []
+    found: list[tuple[ScheduledTask, ...]] = []
     try:
         found.extend(_minimal(sorted(tasks, key=_height, reverse=True), condition))
-    except _TooManyError:
+    except _TooManySetsError:
         return None
     return found
 
 
-class _TooManyError(Exception):
+class _TooManySetsError(Exception):
     """There are too many sets of tasks."""
 
 
-def _minimal(tasks: Sequence[Task], condition: Condition) -> Iterator[tuple[Task, ...]]:
+def _minimal(tasks: Sequence[ScheduledTask], condition: Xcsp3Condition) -> Iterator[tuple[ScheduledTask, ...]]:
     """Yield the minimal sets that violate `condition`; `tasks` are from the highest to the lowest."""
     steps = 0
-    waiting: list[tuple[tuple[Task, ...], int, int]] = [((), 0, 0)]
+    waiting: list[tuple[tuple[ScheduledTask, ...], int, int]] = [((), 0, 0)]
     while waiting:
         chosen, height, following = waiting.pop()
         for place in range(following, len(tasks)):
             steps += 1
             if steps > 20 * MAX_COVERS:
-                raise _TooManyError
-            together, sum_of_heights = (*chosen, tasks[place]), height + _height(tasks[place])
+                raise _TooManySetsError
+            larger, sum_of_heights = (*chosen, tasks[place]), height + _height(tasks[place])
             # the last is the lowest: the set is minimal, as without it nothing is violated
             if not condition.with_constant(sum_of_heights):
-                yield together
+                yield larger
             else:
-                waiting.append((together, sum_of_heights, place + 1))
+                waiting.append((larger, sum_of_heights, place + 1))
 
 
-def _height(task: Task) -> int:
+def _height(task: ScheduledTask) -> int:
     return task.height.value if isinstance(task.height, Constant) else 0
 
 
-def _load_at(task: Task, tasks: Sequence[Task], condition: Condition, posting: Posting) -> Expression:
+def _load_at(
+    task: ScheduledTask, tasks: Sequence[ScheduledTask], condition: Xcsp3Condition, posting: Posting
+) -> Expression:
     """Return that when `task` begins, those that run do not need too much."""
     running = [task.height]
     for other in tasks:
         if other is not task:
-            runs = every(
+            runs = conjunction(
                 [compare("le", other.start, task.start), compare("lt", task.start, plus(other.start, other.length))]
             )
             running.append(times(other.height, as_integer(runs)))
     unused = [_is_zero(task.length)] if _may_be_zero(task.length, posting) else []
-    return some([*unused, condition.on(total(running))])
+    return disjunction([*unused, condition.on(total(running))])
 
 
 def _is_zero(length: Expression) -> Expression:

@@ -10,10 +10,18 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from robochoc.formats.definitions import MAX_TUPLES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.xcsp3.kinds import as_integers, items, rows_of
+from robochoc.formats.dialects.xcsp3.constraints import as_integers, items, rows_of
 from robochoc.formats.dialects.xcsp3.posting import Item, Posting
 from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import Condition, compare, every, inside, integer, some, span
+from robochoc.formats.dialects.xcsp3.terms import (
+    Xcsp3Condition,
+    compare,
+    conjunction,
+    disjunction,
+    integer,
+    is_one_of,
+    span,
+)
 from robochoc.model.expression import Apply, Constant, Expression
 
 MAX_WRITTEN_OUT = 100_000
@@ -68,7 +76,7 @@ def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
             yield from ((value,) for value in _cell(word, scope[0], posting))
         return
     number = "[+-]?[0-9]{1,18}"
-    plain = _squeezed(text)
+    plain = _without_blanks(text)
     if re.fullmatch(rf"(?>\({number}(?:,{number}){{{len(scope) - 1}}}\))++", plain):
         flat = list(map(int, plain[1:-1].replace(")(", ",").split(",")))
         yield from zip(*(flat[place :: len(scope)] for place in range(len(scope))), strict=True)
@@ -84,14 +92,14 @@ def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
 
 def _cells(text: str, scope: Sequence[Item]) -> Iterator[list[str]]:
     """Yield the words of each tuple. Raises `MistakeError`."""
-    for row in _squeezed(text).removeprefix("(").removesuffix(")").split(")("):
+    for row in _without_blanks(text).removeprefix("(").removesuffix(")").split(")("):
         words = row.split(",")
         if len(words) != len(scope):
             raise MistakeError(f"the tuple ({shortened(row)}) of {len(words)}", f"{len(scope)} values are expected")
         yield words
 
 
-def _squeezed(text: str) -> str:
+def _without_blanks(text: str) -> str:
     """Return `text` without blanks around commas and parentheses. Raises `MistakeError` for other blanks."""
     return re.sub(r"\s*([(),])\s*", r"\1", text)
 
@@ -101,11 +109,11 @@ def _post_cases(text: str, scope: Sequence[Item], posting: Posting, *, allowed: 
     cases = []
     for words in _cells(text, scope):
         cells = zip(words, as_integers(scope), strict=True)
-        cases.append(every([inside(item, _cell(word, item, posting)) for word, item in cells if word != "*"]))
+        cases.append(conjunction([is_one_of(item, _cell(word, item, posting)) for word, item in cells if word != "*"]))
         if len(cases) > MAX_CASES:
             raise MistakeError(f"a table with * of more than {MAX_CASES:,} tuples", "write it without")
     if allowed:
-        posting.post(some(cases))
+        posting.post(disjunction(cases))
         return
     for case in cases:
         posting.post(Apply("not", (case,)))
@@ -127,14 +135,14 @@ def element(element: Element, posting: Posting) -> None:
     condition = (
         posting.condition(element.text("condition"))
         if element.has("condition")
-        else Condition("eq", posting.term(element.text("value")))
+        else Xcsp3Condition("eq", posting.term(element.text("value")))
     )
     if element.has("matrix"):
         _element_of_matrix(element, posting, condition)
         return
     members = as_integers(items(element.words("list"), posting))
     if not element.has("index"):
-        posting.post(some([condition.on(member) for member in members]))
+        posting.post(disjunction([condition.on(member) for member in members]))
         return
     if element.attribute("rank", "index") not in {"", "any"}:
         raise MistakeError("an <element> of a given rank is not supported", "leave rank out")
@@ -143,7 +151,7 @@ def element(element: Element, posting: Posting) -> None:
     choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
 
 
-def _element_of_matrix(element: Element, posting: Posting, condition: Condition) -> None:
+def _element_of_matrix(element: Element, posting: Posting, condition: Xcsp3Condition) -> None:
     rows = [as_integers(posting.term(word) for word in row) for row in element.matrix("matrix")]
     down = element.start("startRowIndex", "matrix")
     across = element.start("startColIndex", "matrix")
@@ -157,7 +165,7 @@ def _element_of_matrix(element: Element, posting: Posting, condition: Condition)
 
 
 def choose(
-    posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Condition
+    posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Xcsp3Condition
 ) -> None:
     """Post `condition` on the cell that `indexes` choose: a table where all cells are integers, else cell by cell.
 
@@ -173,7 +181,7 @@ def choose(
                 continue
             value = cell.value if isinstance(cell, Constant) else 0
             for row in itertools.product(*(posting.domain(other) for other in others)):
-                fixed = Condition(condition.operator, Constant(row[0])) if others else condition
+                fixed = Xcsp3Condition(condition.operator, Constant(row[0])) if others else condition
                 if fixed.with_constant(value):
                     rows.append((*place, *row))
             if len(rows) > MAX_TUPLES:
@@ -181,10 +189,10 @@ def choose(
         posting.post_table([*indexes, *others], rows, allowed=True)
         return
     for axis, index in enumerate(indexes):
-        posting.post(inside(index, {where[axis] for where in cells}))
+        posting.post(is_one_of(index, {where[axis] for where in cells}))
     for where, chosen in cells.items():
         elsewhere = [compare("ne", index, Constant(number)) for index, number in zip(indexes, where, strict=True)]
-        posting.post(some([*elsewhere, condition.on(chosen)]))
+        posting.post(disjunction([*elsewhere, condition.on(chosen)]))
 
 
 def regular(element: Element, posting: Posting) -> None:
@@ -197,7 +205,7 @@ def regular(element: Element, posting: Posting) -> None:
             raise MistakeError(
                 f"the state '{shortened(state)}' is in no transition", suggestion(state, states, "states")
             )
-    _walk(element, posting, arcs, start, set(final))
+    _post_paths(element, posting, arcs, start, set(final))
 
 
 def mdd(element: Element, posting: Posting) -> None:
@@ -207,7 +215,7 @@ def mdd(element: Element, posting: Posting) -> None:
     roots, ends = set(arcs) - reached, reached - set(arcs)
     if len(roots) != 1 or not ends:
         raise MistakeError("a decision diagram without one root", "expected one, and an end")
-    _walk(element, posting, arcs, roots.pop(), ends)
+    _post_paths(element, posting, arcs, roots.pop(), ends)
 
 
 def _arcs(element: Element) -> Arcs:
@@ -220,7 +228,7 @@ def _arcs(element: Element) -> Arcs:
     return arcs
 
 
-def _walk(element: Element, posting: Posting, arcs: Arcs, start: str, final: set[str]) -> None:
+def _post_paths(element: Element, posting: Posting, arcs: Arcs, start: str, final: set[str]) -> None:
     """Post the words that lead from `start` to a state in `final`, as a table."""
     scope = items(element.words("list"), posting)
     domains = [set(posting.domain(item)) for item in scope]

@@ -9,7 +9,7 @@ from functools import cached_property
 
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.xcsp3.document import flag
-from robochoc.formats.dialects.xcsp3.terms import integer, together
+from robochoc.formats.dialects.xcsp3.terms import integer, zip_equal
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.formats.element_view import ElementView
 
@@ -41,24 +41,24 @@ class Element:
 
     def text(self, child: str = "") -> str:
         """Return the text of a child, or of the element itself. Raises `MistakeError` where there is no such child."""
-        return self._filled(self.view.required(child) if child else self.view)
+        return self._substituted(self.view.required(child) if child else self.view)
 
     def texts(self, child: str) -> list[str]:
         """Return the texts of all children of this name."""
-        return [self._filled(found) for found in self.view.children(child)]
+        return [self._substituted(found) for found in self.view.children(child)]
 
     def words(self, child: str) -> list[str]:
         """Return the words of a child; compact forms are written out. Raises `MistakeError`."""
-        return list(self.variables.named(self.text(child)))
+        return list(self.variables.expand(self.text(child)))
 
     def lists(self) -> list[list[str]]:
         """Return the words of each `<list>`; where the element has no children, of its own text."""
         if not self.view.has_children:
-            return [list(self.variables.named(self.text()))]
+            return [list(self.variables.expand(self.text()))]
         texts = self.texts("list") or [self.text("list")]
-        return [list(self.variables.named(text)) for text in texts]
+        return [list(self.variables.expand(text)) for text in texts]
 
-    def whole(self) -> list[str]:
+    def only_list(self) -> list[str]:
         """Return the words of the only `<list>`, or of the element where it has no children."""
         return self.words("list") if self.view.has_children else self.lists()[0]
 
@@ -90,14 +90,14 @@ class Element:
     def _parameters(self) -> list[str]:
         return _PARAMETER.findall(self.view.all_text())
 
-    def applied(self, arguments: Sequence[str]) -> Element:
+    def with_arguments(self, arguments: Sequence[str]) -> Element:
         """Return the constraint of a template with `arguments`. Raises `MistakeError` where some are not used."""
         if len(arguments) > self.arity and "..." not in self._parameters:
             what = f"{len(arguments)} arguments for a template of {self.arity} parameters"
             raise MistakeError(what, "write one for each parameter")
         return Element(self.view, self.variables, arguments)
 
-    def _filled(self, view: ElementView) -> str:
+    def _substituted(self, view: ElementView) -> str:
         text = view.text()
         if "%" not in text:
             return text
@@ -127,7 +127,7 @@ def slide_scopes(slide: ElementView, variables: Variables, arity: int) -> Iterat
         MistakeError: if its attributes are wrong.
     """
     lists = slide.children("list")
-    members = [list(variables.named(one.text())) for one in lists]
+    members = [list(variables.expand(one.text())) for one in lists]
     offsets = [_positive(one, "offset", 1) for one in lists]
     collects = [_positive(one, "collect", arity if len(lists) == 1 else 1) for one in lists]
     circular = flag(slide, "circular")
@@ -139,12 +139,12 @@ def slide_scopes(slide: ElementView, variables: Variables, arity: int) -> Iterat
         if circular:
             fits = starts[0] < len(members[0])
         else:
-            fits = all(start + collect <= len(some) for start, collect, some in together(starts, collects, members))
+            fits = all(start + collect <= len(words) for start, collect, words in zip_equal(starts, collects, members))
         if not fits:
             return
         yield [
-            some[(start + step) % len(some)]
-            for start, collect, some in together(starts, collects, members)
+            words[(start + step) % len(words)]
+            for start, collect, words in zip_equal(starts, collects, members)
             for step in range(collect)
         ]
         number += 1

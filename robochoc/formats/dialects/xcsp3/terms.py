@@ -81,12 +81,12 @@ def as_boolean(expression: Expression) -> Expression:
     return Apply("ne", (expression, Constant(0)))
 
 
-def every(parts: Sequence[Expression]) -> Expression:
+def conjunction(parts: Sequence[Expression]) -> Expression:
     """Return the conjunction of Booleans."""
     return FALSE if FALSE in parts else _fold("and", [part for part in parts if part != TRUE], TRUE)
 
 
-def some(parts: Sequence[Expression]) -> Expression:
+def disjunction(parts: Sequence[Expression]) -> Expression:
     """Return the disjunction of Booleans."""
     return TRUE if TRUE in parts else _fold("or", [part for part in parts if part != FALSE], FALSE)
 
@@ -119,7 +119,7 @@ def compare(operator: str, left: Expression, right: Expression) -> Expression:
     return Apply(operator, (left, right))
 
 
-def inside(expression: Expression, values: Collection[int]) -> Expression:
+def is_one_of(expression: Expression, values: Collection[int]) -> Expression:
     """Return that `expression` is one of `values`."""
     runs: list[tuple[int, int]] = []
     for value in sorted(set(values)):
@@ -129,11 +129,11 @@ def inside(expression: Expression, values: Collection[int]) -> Expression:
             runs.append((value, value))
     if len(runs) > 1 and len(values) <= _LARGEST_SET:  # one operation: alike in each term of an aggregate
         return Apply("in", (expression, *(Constant(value) for value in sorted(set(values)))))
-    return some([_between(expression, low, high) for low, high in runs])
+    return disjunction([_between(expression, low, high) for low, high in runs])
 
 
 @dataclass(frozen=True)
-class Condition:
+class Xcsp3Condition:
     """A comparison with something: `(le,10)`, `(eq,x)`, `(in,1..3)`, `(notin,{1,2})`."""
 
     operator: str
@@ -142,7 +142,7 @@ class Condition:
     def on(self, expression: Expression) -> Expression:
         """Return that the condition holds for the integer `expression`."""
         if isinstance(self.operand, tuple):
-            found = inside(expression, self.operand)
+            found = is_one_of(expression, self.operand)
             return found if self.operator == "in" else Apply("not", (found,))
         return compare(self.operator, expression, self.operand)
 
@@ -155,7 +155,7 @@ class Condition:
         return bool(OPERATORS[self.operator].meaning(value, self.operand.value))
 
 
-def read_conditions(text: str, term: Callable[[str], Expression], max_values: int) -> list[Condition]:
+def read_conditions(text: str, term: Callable[[str], Expression], max_values: int) -> list[Xcsp3Condition]:
     """Return the conditions in a text such as `(le,10)(in,1..3)`. Raises `MistakeError`. See `read_condition`."""
     stripped = text.strip()
     if not _CONDITIONS.fullmatch(stripped):
@@ -163,7 +163,7 @@ def read_conditions(text: str, term: Callable[[str], Expression], max_values: in
     return [read_condition(one, term, max_values) for one in _CONDITION_IN_LIST.findall(stripped)]
 
 
-def read_condition(text: str, term: Callable[[str], Expression], max_values: int) -> Condition:
+def read_condition(text: str, term: Callable[[str], Expression], max_values: int) -> Xcsp3Condition:
     """Return the condition in a text.
 
     Args:
@@ -176,13 +176,13 @@ def read_condition(text: str, term: Callable[[str], Expression], max_values: int
     """
     match = _CONDITION.fullmatch(text)
     if match and match[1] in RELATIONS:
-        return Condition(match[1], term(match[2]))
+        return Xcsp3Condition(match[1], term(match[2]))
     if match and match[1] in {"in", "notin"}:
-        return Condition(match[1], tuple(_values(match[2], max_values)))
+        return Xcsp3Condition(match[1], tuple(_values(match[2], max_values)))
     raise MistakeError(f"'{shortened(text)}' is not a valid condition", "write (le,10), (eq,x) or (in,1..3)")
 
 
-def together(*lists: Sequence[Any], what: str = "") -> Iterator[tuple[Any, ...]]:
+def zip_equal(*lists: Sequence[Any], what: str = "") -> Iterator[tuple[Any, ...]]:
     """Return an iterator over the members of lists at the same places, as `zip` does.
 
     Args:
@@ -256,44 +256,44 @@ def read_tree(text: str) -> Tree:
     return tree
 
 
-def resolved(tree: Tree, resolve: Resolve, max_values: int) -> Expression:
+def resolve_tree(tree: Tree, resolve: Resolve, max_values: int) -> Expression:
     """Return `tree` as an expression of ours.
 
     Raises:
         MistakeError: if it has an unsupported operator, or wrong arguments.
     """
-    return _resolved(tree, resolve, max_values)[0]
+    return _resolve(tree, resolve, max_values)[0]
 
 
-def _resolved(tree: Tree, resolve: Resolve, max_values: int) -> tuple[Expression, bool]:
+def _resolve(tree: Tree, resolve: Resolve, max_values: int) -> tuple[Expression, bool]:
     if isinstance(tree, Leaf):
         return resolve(tree.text)
     if tree.operator in {"in", "notin"}:
         return _membership(tree, resolve, max_values), False
-    found = [_resolved(argument, resolve, max_values) for argument in tree.arguments]
+    found = [_resolve(argument, resolve, max_values) for argument in tree.arguments]
     symbolic = [is_symbolic for _, is_symbolic in found]
     if any(symbolic) and (tree.operator not in {"eq", "ne"} or not all(symbolic)):
         raise MistakeError(
             f"{tree.operator} of symbols", "of symbols, only eq, ne and in among themselves are supported"
         )
-    return _applied(tree.operator, [expression for expression, _ in found]), False
+    return _apply(tree.operator, [expression for expression, _ in found]), False
 
 
 def _membership(tree: Call, resolve: Resolve, max_values: int) -> Expression:
     if len(tree.arguments) != 2 or not isinstance(tree.arguments[1], Call) or tree.arguments[1].operator != "set":  # noqa: PLR2004
         raise MistakeError(f"{tree.operator} without a set", "write in(x,set(1,2))")
-    what, is_symbolic = _resolved(tree.arguments[0], resolve, max_values)
-    members = [_resolved(member, resolve, max_values) for member in tree.arguments[1].arguments]
+    what, is_symbolic = _resolve(tree.arguments[0], resolve, max_values)
+    members = [_resolve(member, resolve, max_values) for member in tree.arguments[1].arguments]
     if any(symbol is not is_symbolic for _, symbol in members):
         raise MistakeError("a set of symbols and integers", "write values of one kind")
     value = as_integer(what)
     constants = [member.value for member, _ in members if isinstance(member, Constant)]
     others = [compare("eq", value, as_integer(member)) for member, _ in members if not isinstance(member, Constant)]
-    found = some([inside(value, constants), *others])
+    found = disjunction([is_one_of(value, constants), *others])
     return found if tree.operator == "in" else Apply("not", (found,))
 
 
-def _applied(operator: str, arguments: list[Expression]) -> Expression:
+def _apply(operator: str, arguments: list[Expression]) -> Expression:
     """Return XCSP3's `operator`, applied. Raises `MistakeError`."""
     least, most, make = _MEANINGS.get(operator, (0, -1, None))
     if make is None:
@@ -319,7 +319,7 @@ def _variadic(operator: str) -> Callable[[list[Expression]], Expression]:
 
 def _equal(parts: list[Expression]) -> Expression:
     first, *others = parts
-    return every([_same(first, other) for other in others])
+    return conjunction([_same(first, other) for other in others])
 
 
 def _same(one: Expression, other: Expression) -> Expression:
@@ -339,7 +339,7 @@ def _exclusive(parts: list[Expression]) -> Expression:
     return reduce(lambda one, other: Apply("xor", (one, other)), [as_boolean(part) for part in parts])
 
 
-def _chosen(parts: list[Expression]) -> Expression:
+def _conditional(parts: list[Expression]) -> Expression:
     condition, then, otherwise = parts
     return Apply("if", (as_boolean(condition), as_integer(then), as_integer(otherwise)))
 
@@ -356,12 +356,12 @@ _MEANINGS: dict[str, tuple[int, int, Callable[[list[Expression]], Expression] | 
     "eq": (2, _MANY, _equal),
     "ne": (2, 2, _unequal),
     "not": (1, 1, lambda parts: Apply("not", (as_boolean(parts[0]),))),
-    "and": (1, _MANY, lambda parts: every([as_boolean(part) for part in parts])),
-    "or": (1, _MANY, lambda parts: some([as_boolean(part) for part in parts])),
+    "and": (1, _MANY, lambda parts: conjunction([as_boolean(part) for part in parts])),
+    "or": (1, _MANY, lambda parts: disjunction([as_boolean(part) for part in parts])),
     "xor": (1, _MANY, _exclusive),
     "iff": (2, _MANY, lambda parts: _equal([as_boolean(part) for part in parts])),
-    "imp": (2, 2, lambda parts: some([Apply("not", (as_boolean(parts[0]),)), as_boolean(parts[1])])),
-    "if": (3, 3, _chosen),
+    "imp": (2, 2, lambda parts: disjunction([Apply("not", (as_boolean(parts[0]),)), as_boolean(parts[1])])),
+    "if": (3, 3, _conditional),
 }
 """The least and the greatest number of arguments, and what is made of them."""
 
@@ -375,7 +375,7 @@ def _fold(operator: str, parts: list[Expression], nothing: Expression) -> Expres
 def _between(expression: Expression, low: int, high: int) -> Expression:
     if low == high:
         return compare("eq", expression, Constant(low))
-    return every([compare("ge", expression, Constant(low)), compare("le", expression, Constant(high))])
+    return conjunction([compare("ge", expression, Constant(low)), compare("le", expression, Constant(high))])
 
 
 def _values(text: str, max_values: int) -> Iterable[int]:

@@ -47,14 +47,14 @@ class Variables:
     @property
     def symbols(self) -> tuple[str, ...]:
         """All symbols, in the order in which they are first written."""
-        every = (symbol for domain in self.domains.values() for symbol in domain if isinstance(symbol, str))
-        return tuple(dict.fromkeys(every))
+        all_symbols = (symbol for domain in self.domains.values() for symbol in domain if isinstance(symbol, str))
+        return tuple(dict.fromkeys(all_symbols))
 
     def is_symbolic(self, name: str) -> bool:
         """Return whether the values of a variable are symbols."""
         return isinstance(self.domains[name][0], str)
 
-    def named(self, words: str) -> Iterator[str]:
+    def expand(self, words: str) -> Iterator[str]:
         """Yield the variables that a list of words means, and the other words as they are; `2x3` is `2 2 2`.
 
         Raises:
@@ -62,7 +62,7 @@ class Variables:
         """
         number = 0
         for word in words_of(words):
-            for one in self._meant(word):
+            for one in self._expand_word(word):
                 number += 1
                 if number > MAX_VARIABLES:
                     raise MistakeError(f"a list of more than {MAX_VARIABLES:,}", "split it")
@@ -71,12 +71,12 @@ class Variables:
     def matrix(self, text: str) -> list[list[str]]:
         """Return the rows of a matrix: `(x,y)(1,2)`, or `x[][]`. Raises `MistakeError`."""
         if text.startswith("("):
-            return [[one for word in row for one in self._meant(word.strip())] for row in lists(text)]
+            return [[one for word in row for one in self._expand_word(word.strip())] for row in lists(text)]
         match = _COMPACT.fullmatch(text)
         if not match or match[1] not in self.shapes:
             raise MistakeError(f"'{shortened(text)}' is not a valid matrix", "write x[][] or (x,y)(z,u)")
         indexes = self._indexes(match[1], match[2])
-        wide = [place for place, some in enumerate(indexes) if len(some) != 1]
+        wide = [place for place, values in enumerate(indexes) if len(values) != 1]
         if len(wide) != 2:  # noqa: PLR2004 - rows and columns
             raise MistakeError(f"'{shortened(text)}' is not a valid matrix", "two of its indexes must be open")
         row, column = wide
@@ -102,11 +102,11 @@ class Variables:
         if math.prod(shape) > MAX_VARIABLES:
             raise MistakeError(f"an array of {math.prod(shape):,} variables", f"{MAX_VARIABLES:,} are allowed")
         self.shapes[name] = shape
-        every = self._cells(name, [range(size) for size in shape], declared=False)
+        cells = self._cells(name, [range(size) for size in shape], declared=False)
         known: dict[str, Values] = {}
         for words, domain in domains:
             if words == "others":
-                known.update((cell, domain) for cell in every if cell not in known)
+                known.update((cell, domain) for cell in cells if cell not in known)
                 continue
             for word in words.split():
                 match = _COMPACT.fullmatch(word)
@@ -115,11 +115,11 @@ class Variables:
                 for cell in self._cells(name, self._indexes(name, match[2]), declared=False):
                     if known.setdefault(cell, domain) is not domain:
                         raise MistakeError(f"two domains for {cell}", "write one of them")
-        for cell in every:
+        for cell in cells:
             if cell in known:
                 self.add(cell, known[cell])
 
-    def _meant(self, word: str) -> Iterable[str]:
+    def _expand_word(self, word: str) -> Iterable[str]:
         if word in self.domains:
             return (word,)
         match = _COMPACT.fullmatch(word)
@@ -179,8 +179,8 @@ def read_variables(view: ElementView | None) -> Variables:
                 if not _SIZE.fullmatch(size) or child.attribute("startIndex") not in {"", "0"}:
                     raise MistakeError(f"an array of size '{shortened(size)}'", 'write size="[3][4]", from index 0')
                 shape = tuple(int(part) for part in _BRACKETS.findall(size))
-                whole = name + "[]" * len(shape)
-                variables.add_array(name, shape, [(words or whole, values) for words, values in domains.items()])
+                all_cells = name + "[]" * len(shape)
+                variables.add_array(name, shape, [(words or all_cells, values) for words, values in domains.items()])
             declared[name] = domains
     return variables
 

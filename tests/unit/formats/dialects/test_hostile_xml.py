@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.formats import InvalidInputError
 from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.registry import NAMES, dialect_called, dialects, read_foreign, recognise
+from robochoc.formats.dialects.registry import NAMES, dialects, find_dialect, read_foreign, recognise
 from robochoc.formats.names_file import NAMES_FILE, original_names
 from tests.support.cases import looped
 
@@ -84,8 +84,8 @@ def test_what_is_no_file_is_not_recognised(tmp_path: Path) -> None:
 
 
 def test_all_dialects_have_their_names() -> None:
-    assert [one.name for one in dialects()] == [name for name in NAMES if dialect_called(name)]
-    assert dialect_called("os") is None
+    assert [one.name for one in dialects()] == [name for name in NAMES if find_dialect(name)]
+    assert find_dialect("os") is None
 
 
 @looped("content", [b"", b"[]", b'{"dialect": 1, "names": {}}', b"\xff", b"[" * 10_000, b'{"names":{"a":1}}'])

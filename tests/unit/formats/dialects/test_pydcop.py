@@ -14,7 +14,7 @@ import yaml
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.pydcop import python_function
-from robochoc.formats.dialects.pydcop.hosting import Hosting
+from robochoc.formats.dialects.pydcop.hosting import VariableOwners
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.assembly import assemble
@@ -315,8 +315,8 @@ def test_variables_without_an_owner_go_to_the_agents_that_have_least() -> None:
         agents = [f"a{number}" for number in range(chance.randint(1, 6))]
         variables = [f"v{number}" for number in range(chance.randint(0, 12))]
         owners = {name: chance.choice(agents) for name in variables if chance.random() < 0.4}
-        hosting = Hosting(agents, variables, (), dict(owners))
-        hosting.rest()
+        hosting = VariableOwners(agents, variables, (), dict(owners))
+        hosting.assign_remaining()
         for name in variables:
             if name not in owners:
                 load = [list(owners.values()).count(agent) for agent in agents]

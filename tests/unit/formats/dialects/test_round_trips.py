@@ -18,7 +18,7 @@ from lxml import etree
 
 from robochoc.formats import check_team
 from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
+from robochoc.formats.dialects.registry import find_dialect, read_foreign, recognise
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
@@ -134,7 +134,7 @@ def _there_and_back(name: str, team: Team, folder: Path) -> Fraction | None:
     file, content = next(iter(written(name, team).items()))
     path = folder / file
     path.write_bytes(content)
-    assert recognise(path) is dialect_called("xdiscsp" if name == "dcopsolver" else name)
+    assert recognise(path) is find_dialect("xdiscsp" if name == "dcopsolver" else name)
     back = read_foreign([path], ImportOptions())
     check_team(back.team)
     assert name not in IN_XML or back.names == {}

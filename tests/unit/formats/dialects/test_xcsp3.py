@@ -13,7 +13,7 @@ from random import Random
 import pytest
 
 from robochoc.formats.diagnostics import InvalidInputError
-from robochoc.formats.dialects.dialect import ExportOptions, Imported, ImportOptions
+from robochoc.formats.dialects.dialect import ExportOptions, ImportOptions, ImportResult
 from robochoc.formats.dialects.registry import recognise
 from robochoc.formats.dialects.xcsp3 import DIALECT
 from robochoc.model.cost_units import CostUnits
@@ -33,7 +33,7 @@ ABC = "<var id='a'> 0..2 </var><var id='b'> 0..2 </var><var id='c'> 0..2 </var>"
 ARRAY = "<array id='x' size='[3]'> 0..2 </array>"
 
 
-def imported(path: Path, body: str, kind: str = "CSP", options: ImportOptions | None = None) -> Imported:
+def imported(path: Path, body: str, kind: str = "CSP", options: ImportOptions | None = None) -> ImportResult:
     file = path / "problem.xml"
     file.write_text(f'<instance format="XCSP3" type="{kind}">{body}</instance>')
     return DIALECT.read([file], options or ImportOptions())

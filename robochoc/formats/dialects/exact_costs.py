@@ -20,7 +20,7 @@ Amount = int | Fraction | float
 
 
 @dataclass(frozen=True)
-class CostTable:
+class ExactCostTable:
     """The costs of the values of some variables.
 
     Attributes:
@@ -74,7 +74,7 @@ def decimal_places(number: Fraction) -> int | None:
     return max(twos, fives) if rest == 1 else None
 
 
-def relation(table: CostTable, arity: int, scale: Scale) -> Relation | int:
+def relation(table: ExactCostTable, arity: int, scale: Scale) -> Relation | int:
     """Return `table` as a relation, as short as it goes; an integer where all costs are this one, and not infinite.
 
     Raises:
@@ -98,18 +98,18 @@ def relation(table: CostTable, arity: int, scale: Scale) -> Relation | int:
     return Relation(name, arity, Semantics.SOFT, tuple(listed), tuple(listed.values()), default)
 
 
-def word(name: str) -> str:
+def xml_name(name: str) -> str:
     """Return `name` as it can stand as a constraint's: without blanks and signs that no XML file can hold."""
     return re.sub(r"[^!-~\u00a1-\ud7ff\ue000-\ufffd]", "_", name) or "_"
 
 
 def definition_name(name: str) -> str:
     """Return `name` as it can stand as a relation's, a predicate's or a function's."""
-    plain = word(name)
+    plain = xml_name(name)
     return f"{plain}_" if plain in PREDEFINED or plain.startswith("global:") else plain
 
 
-def forbidding(amount: Amount, infinity: int | None, *, maximize: bool) -> Amount:
+def apply_infinity(amount: Amount, infinity: int | None, *, maximize: bool) -> Amount:
     """Return `amount`, or `INFINITE` where it forbids.
 
     Args:

@@ -11,23 +11,23 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.posting import MAX_NODES, MAX_TRIED, Item, Posting
+from robochoc.formats.dialects.xcsp3.posting import MAX_ENUMERATED, MAX_NODES, Item, Posting
 from robochoc.formats.dialects.xcsp3.template import Element, first_index
 from robochoc.formats.dialects.xcsp3.terms import (
     FALSE,
     TRUE,
-    Condition,
+    Xcsp3Condition,
     as_boolean,
     as_integer,
     compare,
-    every,
-    inside,
+    conjunction,
+    disjunction,
     integer,
+    is_one_of,
     plus,
-    some,
     times,
-    together,
     total,
+    zip_equal,
 )
 from robochoc.formats.dialects.xcsp3.variables import lists, values_of
 from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Name, names
@@ -54,18 +54,18 @@ def all_different(element: Element, posting: Posting) -> None:
         groups = [vectors_of([group]) for group in (*rows, *map(list, zip(*rows, strict=True)))]
     else:
         groups = [vectors(element, posting)]
-    spared = excepted(element, groups)
+    excepted = excepted_rows(element, groups)
     for group in groups:
         for here, there in itertools.combinations(group, 2):
-            posting.post(some([differ(here, there), *_is_one_of(here, spared)]))
+            posting.post(disjunction([differ(here, there), *_is_one_of(here, excepted)]))
 
 
 def all_equal(element: Element, posting: Posting) -> None:
     """All values of a list are equal, or all lists are."""
     members = vectors(element, posting)
-    spared = excepted(element, [members])
-    for one, other in itertools.combinations(members, 2) if spared else itertools.pairwise(members):
-        posting.post(some([same(one, other), *_is_one_of(one, spared), *_is_one_of(other, spared)]))
+    excepted = excepted_rows(element, [members])
+    for one, other in itertools.combinations(members, 2) if excepted else itertools.pairwise(members):
+        posting.post(disjunction([same(one, other), *_is_one_of(one, excepted), *_is_one_of(other, excepted)]))
 
 
 def ordered(element: Element, posting: Posting) -> None:
@@ -78,7 +78,7 @@ def ordered(element: Element, posting: Posting) -> None:
     lengths = as_integers(items(element.words("lengths"), posting))
     if len(lengths) != len(members) - 1:
         raise MistakeError(f"{len(lengths)} lengths for {len(members)} values", f"write {len(members) - 1} lengths")
-    for ((one,), (other,)), length in together(list(itertools.pairwise(members)), lengths):
+    for ((one,), (other,)), length in zip_equal(list(itertools.pairwise(members)), lengths):
         posting.post(compare(operator, plus(one, length), other))
 
 
@@ -122,8 +122,8 @@ def count(element: Element, posting: Posting) -> None:
 def n_values(element: Element, posting: Posting) -> None:
     """A condition on how many different values a list has, or how many lists differ."""
     members = vectors(element, posting)
-    spared = excepted(element, [members])
-    posting.post(posting.condition(element.text("condition")).on(_distinct(members, spared)))
+    excepted = excepted_rows(element, [members])
+    posting.post(posting.condition(element.text("condition")).on(_distinct(members, excepted)))
 
 
 def distinct(members: Sequence[Expression]) -> Expression:
@@ -131,15 +131,15 @@ def distinct(members: Sequence[Expression]) -> Expression:
     return _distinct([(member,) for member in members], [])
 
 
-def _distinct(members: Sequence[Vector], spared: Sequence[Row]) -> Expression:
-    """Return the number of different `members` that are not `spared`: each counts unless an earlier one is equal."""
+def _distinct(members: Sequence[Vector], excepted: Sequence[Row]) -> Expression:
+    """Return the number of different `members` that are not `excepted`: each counts unless an earlier one is equal."""
     _limit_pairs(members)
     first = []
     for number, member in enumerate(members):
         new = [differ(member, earlier) for earlier in members[:number]]
-        if spared:
-            new.append(Apply("not", (some(_is_one_of(member, spared)),)))
-        first.append(as_integer(every(new)) if new else Constant(1))
+        if excepted:
+            new.append(Apply("not", (disjunction(_is_one_of(member, excepted)),)))
+        first.append(as_integer(conjunction(new)) if new else Constant(1))
     return _sum_with_constants(first)
 
 
@@ -147,9 +147,11 @@ def cardinality(element: Element, posting: Posting) -> None:
     """How often each of some values occurs in a list."""
     members = as_integers(items(element.words("list"), posting))
     values = [posting.term(word) for word in element.words("values")]
-    for value, word in together(values, element.words("occurs"), what="<values> and <occurs>"):
+    for value, word in zip_equal(values, element.words("occurs"), what="<values> and <occurs>"):
         number = total([as_integer(compare("eq", member, value)) for member in members])
-        condition = Condition("in", tuple(values_of([word]))) if ".." in word else Condition("eq", posting.term(word))
+        condition = (
+            Xcsp3Condition("in", tuple(values_of([word]))) if ".." in word else Xcsp3Condition("eq", posting.term(word))
+        )
         posting.post(condition.on(number))
     if element.is_true("closed", "values"):
         for member in members:
@@ -163,7 +165,7 @@ def extremum(operator: str) -> Callable[[Element, Posting], None]:
     def post(element: Element, posting: Posting) -> None:
         members = as_integers(items(element.words("list"), posting))
         if element.has("index"):
-            place = Condition("eq", posting.term(element.text("index")))
+            place = Xcsp3Condition("eq", posting.term(element.text("index")))
             _post_place(operator, members, place, element.start(), element.attribute("rank", "index"), posting)
             if not element.has("condition"):
                 return
@@ -181,7 +183,7 @@ def place_of_extremum(operator: str) -> Callable[[Element, Posting], None]:
     """Return the kind: a condition on the place of the least, or the greatest, value of a list."""
 
     def post(element: Element, posting: Posting) -> None:
-        members = as_integers(items(element.whole(), posting))
+        members = as_integers(items(element.only_list(), posting))
         condition = posting.condition(element.text("condition"))
         _post_place(operator, members, condition, element.start(), element.attribute("rank"), posting)
 
@@ -196,7 +198,7 @@ def best(operator: str, members: Sequence[Expression]) -> Expression:
 
 
 def _post_place(
-    operator: str, members: Sequence[Expression], condition: Condition, start: int, rank: str, posting: Posting
+    operator: str, members: Sequence[Expression], condition: Xcsp3Condition, start: int, rank: str, posting: Posting
 ) -> None:
     """Post that `condition` holds for a place of the extremum: any of them, the first or the last one."""
     if rank not in {"", "any", "first", "last"}:
@@ -210,9 +212,9 @@ def _post_place(
     places = range(len(members))
     numbers = [Constant(start + place) for place in places]
     if condition.operator == "eq" and not isinstance(condition.operand, Constant | tuple):
-        posting.post(inside(condition.operand, [number.value for number in numbers]))
+        posting.post(is_one_of(condition.operand, [number.value for number in numbers]))
         for here, there in itertools.permutations(places, 2):
-            posting.post(some([compare("ne", condition.operand, numbers[here]), beats(here, there)]))
+            posting.post(disjunction([compare("ne", condition.operand, numbers[here]), beats(here, there)]))
         return
     _limit_pairs(members)
     possible = [place for place in places if condition.with_constant(start + place) is not False]
@@ -220,8 +222,8 @@ def _post_place(
     for here in possible:
         known = condition.with_constant(start + here) is not None
         others = [beats(here, there) for there in places if there != here]
-        cases.append(every([*([] if known else [condition.on(numbers[here])]), *others]))
-    posting.post(some(cases))
+        cases.append(conjunction([*([] if known else [condition.on(numbers[here])]), *others]))
+    posting.post(disjunction(cases))
 
 
 def channel(element: Element, posting: Posting) -> None:
@@ -233,10 +235,10 @@ def channel(element: Element, posting: Posting) -> None:
             raise MistakeError("a <channel> of two lists with a <value>", "write one <list>")
         (members,), (start,) = both, starts
         chosen = posting.term(element.text("value"))
-        posting.post(inside(chosen, range(start, start + len(members))))
+        posting.post(is_one_of(chosen, range(start, start + len(members))))
         for place, member in enumerate(members, start):
             posting.post(Apply("iff", (compare("eq", member, Constant(1)), compare("eq", chosen, Constant(place)))))
-            posting.post(inside(member, (0, 1)))
+            posting.post(is_one_of(member, (0, 1)))
         return
     if len(both) > 2:  # noqa: PLR2004 - one for each direction
         raise MistakeError(f"a <channel> of {len(both)} lists", "write one or two")
@@ -245,31 +247,31 @@ def channel(element: Element, posting: Posting) -> None:
         raise MistakeError("a <channel> whose first list is the longer one", "exchange the lists")
     first, second = starts[0], starts[-1]
     for member in here:
-        posting.post(inside(member, range(second, second + len(there))))
+        posting.post(is_one_of(member, range(second, second + len(there))))
     alike = len(here) == len(there)
     for member in there if alike else []:
-        posting.post(inside(member, range(first, first + len(here))))
+        posting.post(is_one_of(member, range(first, first + len(here))))
     for (i, one), (j, other) in itertools.product(enumerate(here, first), enumerate(there, second)):
         forth, back = compare("eq", one, Constant(j)), compare("eq", other, Constant(i))
-        posting.post(Apply("iff", (forth, back)) if alike else some([Apply("not", (forth,)), back]))
+        posting.post(Apply("iff", (forth, back)) if alike else disjunction([Apply("not", (forth,)), back]))
 
 
 def instantiation(element: Element, posting: Posting) -> None:
     """Variables have given values."""
     members, values = items(element.words("list"), posting), element.words("values")
-    for member, word in together(members, values, what="<list> and <values>"):
+    for member, word in zip_equal(members, values, what="<list> and <values>"):
         if word != "*":
             posting.post(compare("eq", as_integer(member), posting.item(word)))
 
 
 def clause(element: Element, posting: Posting) -> None:
     """One of some literals is true."""
-    posting.post(some([as_boolean(member) for member in items(element.whole(), posting)]))
+    posting.post(disjunction([as_boolean(member) for member in items(element.only_list(), posting)]))
 
 
 def precedence(element: Element, posting: Posting) -> None:
     """Each of some values occurs in a list only behind the value before it."""
-    members = as_integers(items(element.whole(), posting))
+    members = as_integers(items(element.only_list(), posting))
     if element.has("values"):
         numbers = values_of(element.words("values"))
         covered = element.is_true("covered", "values")
@@ -279,9 +281,9 @@ def precedence(element: Element, posting: Posting) -> None:
     for before, after in itertools.pairwise(values):
         for place, member in enumerate(members):
             earlier = [compare("eq", other, before) for other in members[:place]]
-            posting.post(some([compare("ne", member, after), *earlier]))
+            posting.post(disjunction([compare("ne", member, after), *earlier]))
     if covered and values:
-        posting.post(some([compare("eq", member, values[-1]) for member in members]))
+        posting.post(disjunction([compare("eq", member, values[-1]) for member in members]))
 
 
 def knapsack(element: Element, posting: Posting) -> None:
@@ -289,7 +291,7 @@ def knapsack(element: Element, posting: Posting) -> None:
     members = as_integers(items(element.words("list"), posting))
     conditions = [posting.condition(text) for text in element.texts("condition")]
     if element.has("limit"):
-        conditions.insert(0, Condition("le", posting.term(element.text("limit"))))
+        conditions.insert(0, Xcsp3Condition("le", posting.term(element.text("limit"))))
     if len(conditions) != 2:  # noqa: PLR2004 - of weight and profit
         raise MistakeError(f"a <knapsack> with {len(conditions)} conditions", "write one for weights, one for profits")
     for kind, condition in zip(("weights", "profits"), conditions, strict=True):
@@ -309,32 +311,32 @@ def bin_packing(element: Element, posting: Posting) -> None:
     else:
         conditions = dict(enumerate(_conditions_of_bins(element, posting), start))
         for item in bins:
-            posting.post(inside(item, conditions))
+            posting.post(is_one_of(item, conditions))
     for number, condition in conditions.items():
         hits = [as_integer(compare("eq", item, Constant(number))) for item in bins]
         posting.post(condition.on(total(_products(sizes, hits, "<sizes> and <list>"))))
 
 
-def _conditions_of_bins(element: Element, posting: Posting) -> list[Condition]:
+def _conditions_of_bins(element: Element, posting: Posting) -> list[Xcsp3Condition]:
     """Return the condition on the load of each bin, in their order."""
     if element.has("conditions"):
         return posting.conditions(element.text("conditions"))
     for kind, operator in (("limits", "le"), ("loads", "eq")):
         if element.has(kind):
-            return [Condition(operator, posting.term(word)) for word in element.words(kind)]
+            return [Xcsp3Condition(operator, posting.term(word)) for word in element.words(kind)]
     raise MistakeError("a <binPacking> without a condition", "write <condition>, <conditions>, <limits> or <loads>")
 
 
 def circuit(element: Element, posting: Posting) -> None:
     """The values of a list are successors: all nodes but those that follow themselves lie on one circle."""
-    scope = items(element.whole(), posting)
+    scope = items(element.only_list(), posting)
     starts = [first_index(one) for one in element.view.children("list")] or [0]
-    size = Condition("eq", posting.term(element.text("size"))) if element.has("size") else None
+    size = Xcsp3Condition("eq", posting.term(element.text("size"))) if element.has("size") else None
     members = as_integers(scope)
     for one, other in itertools.combinations(members, 2):
         posting.post(compare("ne", one, other))
     own = {name for member in members for name in names(member)}
-    if posting.size(own) > MAX_TRIED or not (size is None or isinstance(size.operand, Constant)):
+    if posting.size(own) > MAX_ENUMERATED or not (size is None or isinstance(size.operand, Constant)):
         _post_with_places(members, starts[0], size, posting)
         return
 
@@ -342,7 +344,7 @@ def circuit(element: Element, posting: Posting) -> None:
         length = _circle([value - starts[0] for value in row])
         return length > 1 and (size is None or bool(size.with_constant(length)))
 
-    posting.post_tried(element.kind, scope, holds)
+    posting.post_enumerated(element.kind, scope, holds)
 
 
 def _circle(successors: Sequence[int]) -> int:
@@ -359,7 +361,7 @@ def _circle(successors: Sequence[int]) -> int:
     return len(seen) if place == moving[0] and len(seen) == len(moving) else 0
 
 
-def _post_with_places(members: Sequence[Expression], start: int, size: Condition | None, posting: Posting) -> None:
+def _post_with_places(members: Sequence[Expression], start: int, size: Xcsp3Condition | None, posting: Posting) -> None:
     """Post that `members`, which differ, have one circle, by auxiliary variables that they determine.
 
     These are the place of each node on the circle, counted from its first node (0 for nodes that follow themselves),
@@ -367,32 +369,34 @@ def _post_with_places(members: Sequence[Expression], start: int, size: Condition
     """
     nodes = range(start, start + len(members))
     values = {node: set(posting.domain(member)) & set(nodes) for node, member in zip(nodes, members, strict=True)}
-    beside = {node: next(iter(names(member)), None) for node, member in zip(nodes, members, strict=True)}
+    same_robot_as = {node: next(iter(names(member)), None) for node, member in zip(nodes, members, strict=True)}
     for member in members:
-        posting.post(inside(member, nodes))
+        posting.post(is_one_of(member, nodes))
     fixed = [node for node in nodes if node not in values[node]]
     possible = range(start, fixed[0] + 1) if fixed else nodes
     first: Expression = Constant(start)
     if len(possible) > 1:
-        first = posting.add_variable("first_node", possible, _START, beside[start])
+        first = posting.add_variable("first_node", possible, _START, same_robot_as[start])
     place = [
-        posting.add_variable(f"{beside[node] or 'node'}_place", range(len(members)), _PLACES, beside[node])
+        posting.add_variable(
+            f"{same_robot_as[node] or 'node'}_place", range(len(members)), _PLACES, same_robot_as[node]
+        )
         for node in nodes
     ]
     for node, successor in zip(nodes, members, strict=True):
         here = place[node - start]
         if node in possible:
-            posting.post(some([_compare("le", first, node), _compare("eq", successor, node)]))
-            posting.post(some([_compare("ne", first, node), _compare("ne", successor, node)]))
-            posting.post(some([_compare("ne", first, node), _compare("eq", here, 0)]))
-        posting.post(some([_compare("ne", successor, node), _compare("eq", here, 0)]))
+            posting.post(disjunction([_compare("le", first, node), _compare("eq", successor, node)]))
+            posting.post(disjunction([_compare("ne", first, node), _compare("ne", successor, node)]))
+            posting.post(disjunction([_compare("ne", first, node), _compare("eq", here, 0)]))
+        posting.post(disjunction([_compare("ne", successor, node), _compare("eq", here, 0)]))
         for other in values[node] - {node}:
             leaves = _compare("ne", successor, other)
             next_place = plus(here, Constant(1))
             is_first = _compare("eq", first, other) if other in possible else FALSE
-            posting.post(some([leaves, is_first, compare("eq", place[other - start], next_place)]))
+            posting.post(disjunction([leaves, is_first, compare("eq", place[other - start], next_place)]))
             if size is not None and other in possible:
-                posting.post(some([leaves, _compare("ne", first, other), size.on(next_place)]))
+                posting.post(disjunction([leaves, _compare("ne", first, other), size.on(next_place)]))
 
 
 def _compare(operator: str, expression: Expression, value: int) -> Expression:
@@ -411,13 +415,13 @@ def vectors_of(lists: Sequence[Sequence[Expression]]) -> list[Vector]:
     """Return the members of the only list, one by one, or several lists as wholes. Raises `MistakeError`."""
     if len(lists) == 1:
         return [(member,) for member in lists[0]]
-    found: list[Vector] = list(zip(*together(*lists), strict=True))
+    found: list[Vector] = list(zip(*zip_equal(*lists), strict=True))
     if not found:
         raise MistakeError("empty lists", "name their members")
     return found
 
 
-def excepted(element: Element, groups: Sequence[Sequence[Vector]]) -> list[Row]:
+def excepted_rows(element: Element, groups: Sequence[Sequence[Vector]]) -> list[Row]:
     """Return the rows of values that `<except>` names. Raises `MistakeError`."""
     if not element.has("except"):
         return []
@@ -436,12 +440,12 @@ def excepted(element: Element, groups: Sequence[Sequence[Vector]]) -> list[Row]:
 
 def same(one: Vector, other: Vector) -> Expression:
     """Return the expression that two rows have the same values."""
-    return every([compare("eq", *pair) for pair in zip(one, other, strict=True)])
+    return conjunction([compare("eq", *pair) for pair in zip(one, other, strict=True)])
 
 
 def differ(one: Vector, other: Vector) -> Expression:
     """Return the expression that two rows have different values."""
-    return some([compare("ne", *pair) for pair in zip(one, other, strict=True)])
+    return disjunction([compare("ne", *pair) for pair in zip(one, other, strict=True)])
 
 
 def items(words: Iterable[str], posting: Posting) -> list[Item]:
@@ -471,13 +475,13 @@ def _limit_pairs(members: Sequence[object]) -> None:
 
 
 def _products(factors: Sequence[Expression], members: Sequence[Expression], what: str) -> list[Expression]:
-    return [times(factor, member) for factor, member in together(factors, members, what=what)]
+    return [times(factor, member) for factor, member in zip_equal(factors, members, what=what)]
 
 
 def _is_one_of(member: Vector, rows: Sequence[Row]) -> list[Expression]:
     """Return the cases in which `member` is one of `rows`, one expression for each."""
     if len(member) == 1:
-        return [inside(member[0], [value for (value,) in rows])] if rows else []
+        return [is_one_of(member[0], [value for (value,) in rows])] if rows else []
     return [same(member, tuple(map(Constant, row))) for row in rows]
 
 
@@ -486,7 +490,7 @@ def _one_of(member: Expression, values: Sequence[Expression]) -> Expression:
     others = [compare("eq", member, value) for value in values if isinstance(value, Name)]
     if len(constants) + len(others) != len(values):
         raise MistakeError("an expression among values", "write integers or variables")
-    return some([*([inside(member, constants)] if constants else []), *others])
+    return disjunction([*([is_one_of(member, constants)] if constants else []), *others])
 
 
 def _sum_with_constants(parts: Sequence[Expression]) -> Expression:
@@ -497,7 +501,7 @@ def _sum_with_constants(parts: Sequence[Expression]) -> Expression:
 def _post_chain(operator: str, members: Sequence[Vector], posting: Posting) -> None:
     """Post that `members` follow each other in the lexicographic order."""
     for one, other in itertools.pairwise(members):
-        posting.post(_lexicographic(operator, list(together(one, other))))
+        posting.post(_lexicographic(operator, list(zip_equal(one, other))))
 
 
 def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]) -> Expression:
@@ -509,9 +513,9 @@ def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]
     cases = []
     for place, pair in enumerate(before):
         alike = [compare("eq", *earlier) for earlier in before[:place]]
-        cases.append(every([*alike, compare(strict, *pair)]))
-    cases.append(every([*(compare("eq", *pair) for pair in before), compare(operator, *last)]))
-    return some(cases)
+        cases.append(conjunction([*alike, compare(strict, *pair)]))
+    cases.append(conjunction([*(compare("eq", *pair) for pair in before), compare(operator, *last)]))
+    return disjunction(cases)
 
 
 def rows_of(text: str) -> list[list[str]]:
