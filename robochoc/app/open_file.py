@@ -11,12 +11,12 @@ from pathlib import Path
 
 import msgspec
 
-from robochoc.app.flights.state import unpack_run
+from robochoc.app.flights.saved_state import unpack_run
 from robochoc.app.jobs.job import Job, LateError
 from robochoc.app.jobs.process import Command
-from robochoc.app.sketch.opening import opened
+from robochoc.app.sketch.open_from_disk import open_team
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 
@@ -31,7 +31,7 @@ class OpenedFile(msgspec.Struct, frozen=True):
     mistakes: str = ""
 
 
-def open_file_job(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> Job[OpenedFile]:
+def open_file_job(file: Path, store: TeamStore, *, within_s: float = PATIENCE_S) -> Job[OpenedFile]:
     """Start opening `file` as a new team in `store`; return the job."""
 
     def work(job: Job[OpenedFile]) -> OpenedFile:
@@ -48,10 +48,10 @@ def open_file_job(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> 
 
 def main() -> None:
     """Open the file."""
-    store, file = Store(Path(sys.argv[1])), Path(sys.argv[2])
+    store, file = TeamStore(Path(sys.argv[1])), Path(sys.argv[2])
     try:
-        found = opened(file)
-        team = store.add(found) if isinstance(found, Sketch) else store.add_foreign(found)
+        found = open_team(file)
+        team = store.add(found) if isinstance(found, Sketch) else store.add_imported(found)
         with suppress(OSError):  # a saved state also has a run
             unpack_run(file, store.path(team))
     except (InvalidInputError, OSError) as error:

@@ -9,17 +9,17 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from robochoc.app.foreign.facts import Facts
+from robochoc.app.imported.facts import ImportedFacts
 from robochoc.app.jobs.job import Job, end_jobs_in
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import USER_LOG
-from robochoc.app.parts import PartsOwner
+from robochoc.app.parts_owner import PartsOwner
 from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.edits import EditError
+from robochoc.app.sketch.element_checks import is_sound
 from robochoc.app.sketch.history import History
-from robochoc.app.sketch.shape import is_sound
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from robochoc.app.texts import say
 
 SAVE_S = 0.5
@@ -31,7 +31,7 @@ AGAIN_S = 5.0
 class Project(PartsOwner):
     """A team that is edited. Changes are saved automatically, and reported to listeners."""
 
-    def __init__(self, store: Store, name: str) -> None:
+    def __init__(self, store: TeamStore, name: str) -> None:
         super().__init__()
         self.id = name
         self._store = store
@@ -55,18 +55,18 @@ class Project(PartsOwner):
         return self._store.path(self.id)
 
     @property
-    def foreign(self) -> Path | None:
+    def import_folder(self) -> Path | None:
         """The files of an imported team, which cannot be edited; None if the team was drawn here."""
-        return self._store.foreign(self.id)
+        return self._store.import_folder(self.id)
 
     @property
     def files(self) -> TeamFiles | None:
         """The files that runs of an imported team use; None if the team was drawn here: runs use its sketch."""
-        folder = self.foreign
+        folder = self.import_folder
         return None if folder is None else TeamFiles(folder, flies=self.facts.flies, maximised=self.facts.maximised)
 
     @cached_property
-    def facts(self) -> Facts:
+    def facts(self) -> ImportedFacts:
         """The facts about an imported team. Raises `ValueError` if its files are damaged."""
         return self._store.facts(self.id)
 
@@ -152,7 +152,7 @@ class Project(PartsOwner):
 class Projects:
     """All teams of a store. An open team is in memory once."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: TeamStore) -> None:
         self.store = store
         self._open: dict[str, Project] = {}
 

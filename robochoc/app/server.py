@@ -18,13 +18,12 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 
-from robochoc.app.connections import BoundedConnection
 from robochoc.app.error_log import log_errors_to
-from robochoc.app.guard import Guard
+from robochoc.app.guard import AccessGuard, BoundedConnection
 from robochoc.app.jobs.job import end_all
 from robochoc.app.pages import routes
 from robochoc.app.projects import Projects
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from robochoc.app.texts import LANGUAGE, say
 from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.redirect import RedirectFile
@@ -53,7 +52,7 @@ def serve_app(
     Raises:
         OSError: if the port is in use, or the folder is in use by another `robochoc app`.
     """
-    store = Store(folder)
+    store = TeamStore(folder)
     with store.locked(), loopback_socket(port) as here:
         log_errors_to(folder)
         secret = secret_path()
@@ -74,7 +73,7 @@ def serve_app(
             tailwind=False,
         )
         config = uvicorn.Config(
-            Guard(outside, secret, here.getsockname()[1]),
+            AccessGuard(outside, secret, here.getsockname()[1]),
             http=BoundedConnection,
             log_config=None,
             log_level="error",
@@ -82,10 +81,10 @@ def serve_app(
             ws_max_size=1 << 24,
             timeout_graceful_shutdown=1,
         )
-        asyncio.run(_serve(_Server(config, projects), here, url, ready, open_browser=open_browser))
+        asyncio.run(_serve(_AppServer(config, projects), here, url, ready, open_browser=open_browser))
 
 
-class _Server(uvicorn.Server):
+class _AppServer(uvicorn.Server):
     """A server that calls `ready` when it accepts requests, and ends in time after a signal."""
 
     ready: Callable[[], None]
@@ -119,7 +118,7 @@ class _Server(uvicorn.Server):
 
 
 async def _serve(
-    server: _Server, here: socket, url: str, ready: Callable[[str], None] | None, *, open_browser: bool
+    server: _AppServer, here: socket, url: str, ready: Callable[[str], None] | None, *, open_browser: bool
 ) -> None:
     shown: AbstractContextManager[RedirectFile | None] = RedirectFile(url) if open_browser else nullcontext()
     with shown as redirect:

@@ -21,11 +21,11 @@ from typing import TypeVar
 
 import msgspec
 
-from robochoc.app.foreign.drawing import drawn
-from robochoc.app.foreign.facts import Facts, facts_of
+from robochoc.app.imported.facts import ImportedFacts, facts_of
+from robochoc.app.imported.picture import picture_sketch
+from robochoc.app.sketch.element_checks import is_sound
 from robochoc.app.sketch.history import History
-from robochoc.app.sketch.opening import ForeignTeam
-from robochoc.app.sketch.shape import is_sound
+from robochoc.app.sketch.open_from_disk import ImportedTeam
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.formats import InvalidInputError, read_team
 
@@ -54,7 +54,7 @@ class _Now(msgspec.Struct):
 _Read = TypeVar("_Read", History, _Now)
 
 
-class Store:
+class TeamStore:
     """The teams in `folder`, which is created if it does not exist."""
 
     def __init__(self, folder: Path) -> None:
@@ -112,21 +112,21 @@ class Store:
             shutil.rmtree(folder, ignore_errors=True)
             raise
 
-    def foreign(self, name: str) -> Path | None:
+    def import_folder(self, name: str) -> Path | None:
         """Return the files of an imported team; None if it was drawn here. Raises `KeyError` for an invalid id."""
         files = self.path(name) / FILES
         return files if files.is_dir() else None
 
-    def add_foreign(self, team: ForeignTeam) -> str:
+    def add_imported(self, team: ImportedTeam) -> str:
         """Save an imported team; return its id."""
         facts = facts_of(team.team, files=team.changed, notes=team.notes, origin=team.path.name)
         with self._new_team() as (name, folder):
-            _write(folder / _HISTORY, History(drawn(team)))
+            _write(folder / _HISTORY, History(picture_sketch(team)))
             team.save(folder / FILES)
             (folder / _FACTS).write_bytes(msgspec.json.encode(facts))
         return name
 
-    def facts(self, name: str) -> Facts:
+    def facts(self, name: str) -> ImportedFacts:
         """Return the facts about an imported team.
 
         Raises:
@@ -136,7 +136,7 @@ class Store:
         file = self.path(name) / _FACTS
         try:
             if file.stat().st_size <= MAX_BYTES:
-                return msgspec.json.decode(file.read_bytes(), type=Facts)
+                return msgspec.json.decode(file.read_bytes(), type=ImportedFacts)
         except (OSError, msgspec.DecodeError, RecursionError):  # for example, the team was saved by an earlier version
             pass
         try:

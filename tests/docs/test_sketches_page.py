@@ -9,7 +9,7 @@ import argparse
 import re
 from collections.abc import Iterator
 
-from robochoc.app.sketch import fits, opening, shape
+from robochoc.app.sketch import element_checks, open_from_disk, rule_checks
 from robochoc.app.sketch import sketch as limits
 from robochoc.app.sketch.palette import ALL_KINDS, Links
 from robochoc.app.sketch.rules import PALETTE
@@ -42,11 +42,11 @@ def bounds() -> Iterator[str]:
         ("columns, and rows, of a map", limits.MAX_SIDE),
         ("decisions", limits.MAX_DECISIONS),
         ("values of a decision", limits.MAX_VALUES),
-        ("a number that is a value", shape.MAX_NUMBER),
+        ("a number that is a value", element_checks.MAX_NUMBER),
         ("rules", limits.MAX_RULES),
-        ("constraints that all rules become", fits.MAX_LINKS),
-        ("robots of a rule about all together", fits.MAX_GROUP),
-        ("files of a team that is opened", opening.MAX_FILES),
+        ("constraints that all rules become", rule_checks.MAX_LINKS),
+        ("robots of a rule about all together", rule_checks.MAX_GROUP),
+        ("files of a team that is opened", open_from_disk.MAX_FILES),
     )
     yield from (f"| {what} | {most:,} |" for what, most in found)
 

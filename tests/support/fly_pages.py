@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from robochoc.app.jobs.job import end_all
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.run import Run, RunState
 from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.limits import wait_until
 
 READY = ".stage[data-ready=true]"
@@ -19,17 +19,17 @@ TALK = "document.querySelector('.stage-views figure:last-child iframe').contentW
 class DecidedTeam:
     """A team in the store, as `Runs` wants it."""
 
-    def __init__(self, teams: Store, sketch: Sketch) -> None:
+    def __init__(self, teams: TeamStore, sketch: Sketch) -> None:
         self.sketch = sketch
         self.id = teams.add(sketch)
         self.folder = teams.path(self.id)
 
 
-def decided(teams: Store, sketch: Sketch) -> tuple[DecidedTeam, Run]:
+def decided(teams: TeamStore, sketch: Sketch) -> tuple[DecidedTeam, Run]:
     """Return a team that has decided."""
     team = DecidedTeam(teams, sketch)
     run = Runs(team).start(RunOptions(protocol="syncbb"))
-    wait_until(lambda: run.state is not State.RUNNING, lambda: run.message)
+    wait_until(lambda: run.state is not RunState.RUNNING, lambda: run.message)
     end_all()
-    assert run.state is State.ENDED, run.message
+    assert run.state is RunState.ENDED, run.message
     return team, run

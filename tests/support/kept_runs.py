@@ -7,14 +7,14 @@ from pathlib import Path
 import msgspec
 
 from robochoc.app.runs.options import JOURNAL, RESULT, RunOptions
-from robochoc.app.runs.run import SKETCH, Record, Run, State
+from robochoc.app.runs.run import SKETCH, Record, Run, RunState
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRule
 
 STARTED = 1_700_000_000.0
 
 
-def cube(robots: int = 3, name: str = "Cube", kind: Kind = Kind.LEVEL) -> Sketch:
+def cube(robots: int = 3, name: str = "Cube", kind: DecisionKind = DecisionKind.LEVEL) -> Sketch:
     """Return robots that choose different values, and would all rather have the first one."""
     sketch = Sketch(name, Area(8, 4))
     for number in range(robots):
@@ -59,7 +59,7 @@ def kept_run(folder: Path, sketch: Sketch, **differing: object) -> Run:
     (place / SKETCH).write_bytes(msgspec.json.encode(sketch))
     (place / JOURNAL).write_bytes(b"what was said")
     arguments = ["solve", "Cube", "--seed", "7"]
-    record = Record(RunOptions(seed=7), arguments, state=State.ENDED, started=STARTED, ended=STARTED + 1)
+    record = Record(RunOptions(seed=7), arguments, state=RunState.ENDED, started=STARTED, ended=STARTED + 1)
     run = Run(place, record, sketch)
     run.save()
     run.read_result()

@@ -10,7 +10,7 @@ import msgspec
 
 from robochoc.app.conflicts.rules import with_only
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Setting, Sketch, SketchRobot, SketchRule, Value
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Setting, Sketch, SketchRobot, SketchRule, Value
 
 NAMES = ("A", "B", "C")
 _KINDS = ("different", "same", "apart", "close", "in-order", "only", "never", "at-least", "at-most", "table")
@@ -22,7 +22,7 @@ def random_rules(random: Random) -> Sketch:
     """Return a sketch of three robots with three values and up to six rules, some soft or switched off."""
     numbers = random.random() < 0.6
     values: tuple[int | str, ...] = (1, 2, 3) if numbers else ("wash", "two words", "dry")
-    decision = Decision("d", Kind.SLOT if numbers else Kind.TASK, values)
+    decision = Decision("d", DecisionKind.SLOT if numbers else DecisionKind.TASK, values)
     robots = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate(NAMES))
     rules = []
     for number in range(random.randint(1, 6)):

@@ -14,7 +14,7 @@ from robochoc.app.sketch.sketch import (
     Area,
     Cell,
     Decision,
-    Kind,
+    DecisionKind,
     Setting,
     Sketch,
     SketchRobot,
@@ -48,9 +48,9 @@ def random_sketch(random: Random, kinds: list[str] | None = None) -> Sketch:
 
 
 def _decision(random: Random, area: Area, name: str, robots: list[str], *, whole: bool) -> Decision:
-    kind = random.choice([*Kind])
+    kind = random.choice([*DecisionKind])
     values: Sequence[int | str]
-    if kind is Kind.PLACE:
+    if kind is DecisionKind.PLACE:
         values = random.sample(area.free, random.randint(0, len(area.free)))
     elif kind in NUMBERED:
         low = random.randint(-1, 3)
@@ -134,7 +134,7 @@ def _of_decision(random: Random, sketch: Sketch) -> Sketch:
     changes = random.choice(
         _changes(
             {"name": random.choice((*HOSTILE, sketch.decisions[0].name, "b.level"))},
-            {"kind": random.choice([*Kind])},
+            {"kind": random.choice([*DecisionKind])},
             {"values": ()},
             {"values": (*old.values, random.choice((*HOSTILE, 10**30, -1, 99)))},
             {"values": old.values * 2},

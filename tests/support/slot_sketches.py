@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRule
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRule
 
 
 def slots(robots: int, slots: int, *, little: bool = True, name: str = "Berths") -> Sketch:
@@ -11,7 +11,7 @@ def slots(robots: int, slots: int, *, little: bool = True, name: str = "Berths")
     sketch = Sketch(name=name)
     for number in range(robots):
         sketch = edits.with_robot(sketch, Cell(number % 8, number // 8))
-    sketch = edits.with_decision(sketch, Decision("slot", Kind.SLOT, tuple(range(1, slots + 1))))
+    sketch = edits.with_decision(sketch, Decision("slot", DecisionKind.SLOT, tuple(range(1, slots + 1))))
     sketch = edits.with_rule(sketch, SketchRule("", "different", "slot"))
     if little:
         sketch = edits.with_rule(sketch, SketchRule("", "little", "slot", settings={"step": 1}))

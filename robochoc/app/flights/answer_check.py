@@ -13,8 +13,8 @@ from decimal import Decimal
 import msgspec
 
 from robochoc.app.flights.flight_map import changed_to
-from robochoc.app.runs.labels import value_of
 from robochoc.app.runs.options import RESULT
+from robochoc.app.runs.prepared_team import value_of
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Checked, Run
 from robochoc.app.sketch.building import model_of

@@ -25,7 +25,7 @@ import msgspec
 
 from robochoc.app.flights.flight_map import MAP, ground_of, happened_in
 from robochoc.app.flights.flight_result import FLOWN, flight_result_of, refused
-from robochoc.app.foreign.facts import events_in_words
+from robochoc.app.imported.facts import events_in_words
 from robochoc.app.jobs.job import Call, Job, event_loop_caller
 from robochoc.app.jobs.process import Command
 from robochoc.app.listeners import Listeners
@@ -33,7 +33,7 @@ from robochoc.app.log import error_text
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import MAX_RESULT, Run
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.sketch import Kind
+from robochoc.app.sketch.sketch import DecisionKind
 from robochoc.formats import InvalidInputError, read_team
 from robochoc.modelling.errors import ModelError
 from robochoc.system.files import write_atomically
@@ -52,7 +52,7 @@ _REFUSAL = "the result cannot be flown: "
 """The text of `robochoc fly` before the reason."""
 
 
-class Stage(StrEnum):
+class BuildStage(StrEnum):
     """The stage of the work."""
 
     WAITING = "waiting"
@@ -73,7 +73,7 @@ def flies(run: Run) -> bool:
     if run.record.flies is not None:
         return run.record.flies
     decisions = run.sketch.decisions
-    return not decisions or any(decision.kind in {Kind.LEVEL, Kind.PLACE} for decision in decisions)
+    return not decisions or any(decision.kind in {DecisionKind.LEVEL, DecisionKind.PLACE} for decision in decisions)
 
 
 def can_record() -> bool:
@@ -86,8 +86,8 @@ class FlightBuilder:
 
     def __init__(self, run: Run) -> None:
         self.run = run
-        self.stage = Stage.WAITING
-        self.troubles: dict[Stage, str] = {}
+        self.stage = BuildStage.WAITING
+        self.troubles: dict[BuildStage, str] = {}
         """The errors of failed stages."""
         self._began = time.monotonic()
         self._requests = Listeners()
@@ -104,12 +104,12 @@ class FlightBuilder:
     @property
     def has_flight(self) -> bool:
         """Whether there is a flight to show, when it is built."""
-        return self.has_answer and flies(self.run) and Stage.FLIGHT not in self.troubles
+        return self.has_answer and flies(self.run) and BuildStage.FLIGHT not in self.troubles
 
     @property
     def has_conversation(self) -> bool:
         """Whether there are messages to show."""
-        return self.run.artefact(JOURNAL) is not None and Stage.CONVERSATION not in self.troubles
+        return self.run.artefact(JOURNAL) is not None and BuildStage.CONVERSATION not in self.troubles
 
     @property
     def flight(self) -> Path | None:
@@ -134,7 +134,7 @@ class FlightBuilder:
     def request(self, on_stage: Callable[[], None]) -> Callable[[], None]:
         """Start the work if necessary, and call `on_stage` at each stage; return a function that ends the request."""
         leave = self._requests.add(on_stage)
-        if self.stage == Stage.WAITING:
+        if self.stage == BuildStage.WAITING:
             self._start()
 
         def release() -> None:
@@ -146,7 +146,7 @@ class FlightBuilder:
 
     def retry(self) -> None:
         """Repeat the failed stages, and a flight that was rejected. Raises `OSError`."""
-        if self.stage != Stage.DONE:
+        if self.stage != BuildStage.DONE:
             return
         flown = flight_result_of(self.run)
         if flown and flown.refused:
@@ -160,7 +160,7 @@ class FlightBuilder:
         if self._job is not None:
             self._job.end()
             self._before, self._job = self._job, None
-            self._set_stage(Stage.WAITING)
+            self._set_stage(BuildStage.WAITING)
 
     async def recording(self) -> Path:
         """Return a recording of the flight, which is created if it does not exist. Raises `CannotMakeError`."""
@@ -181,7 +181,7 @@ class FlightBuilder:
         self.troubles.clear()
         self._began = time.monotonic()
         self._call = event_loop_caller()
-        self.stage = Stage.FLIGHT if self._needs_flight else Stage.CONVERSATION
+        self.stage = BuildStage.FLIGHT if self._needs_flight else BuildStage.CONVERSATION
         before, self._before = self._before, None
         self._job = job = Job(f"flight {self.run.folder}", partial(self._make, before), folder=self.run.folder)
         job.over = partial(self._interrupted, job)
@@ -195,12 +195,12 @@ class FlightBuilder:
         if before:  # two jobs must not write the same files
             before.join()
         if self._needs_flight:
-            self._part(job, Stage.FLIGHT, self._make_flight)
+            self._part(job, BuildStage.FLIGHT, self._make_flight)
         if self.conversation is None and self.run.artefact(JOURNAL):
-            self._part(job, Stage.CONVERSATION, self._make_conversation)
-        self._advance(job, Stage.DONE)
+            self._part(job, BuildStage.CONVERSATION, self._make_conversation)
+        self._advance(job, BuildStage.DONE)
 
-    def _part(self, job: Job[None], stage: Stage, make: Callable[[Job[None]], None]) -> None:
+    def _part(self, job: Job[None], stage: BuildStage, make: Callable[[Job[None]], None]) -> None:
         self._advance(job, stage)
         try:
             make(job)
@@ -210,7 +210,7 @@ class FlightBuilder:
     def _interrupted(self, job: Job[None], why: str) -> None:
         if self._job is job and why:
             self.troubles[self.stage] = why
-        self._advance(job, Stage.DONE if why else Stage.WAITING)
+        self._advance(job, BuildStage.DONE if why else BuildStage.WAITING)
 
     def _make_flight(self, job: Job[None]) -> None:
         self._write_team()
@@ -266,14 +266,14 @@ class FlightBuilder:
             raise CannotMakeError(finished.why[-_MAX_MESSAGE:])
         return finished.out
 
-    def _advance(self, job: Job[None], stage: Stage) -> None:
+    def _advance(self, job: Job[None], stage: BuildStage) -> None:
         """Set the stage that a job has reached, unless the job was cancelled."""
         if self._job is job:
-            if stage in {Stage.DONE, Stage.WAITING}:
+            if stage in {BuildStage.DONE, BuildStage.WAITING}:
                 self._job = None
             self._set_stage(stage)
 
-    def _set_stage(self, stage: Stage) -> None:
+    def _set_stage(self, stage: BuildStage) -> None:
         self.stage = stage
         self._call(self._requests)
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 import msgspec
 
 from robochoc.app.runs.run import CHANGE, Run
-from robochoc.app.sketch.shape import is_sound
+from robochoc.app.sketch.element_checks import is_sound
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.maps.ground_map import BlockedCell, GroundMap
 
@@ -19,7 +19,7 @@ _MOST_TOLD = 100_000
 """The maximum number of characters in the texts of a change."""
 
 
-class Change(msgspec.Struct):
+class RunChange(msgspec.Struct):
     """The content of `change.json`: the team after the events, and why it decided `anew` in another run, if so."""
 
     after: Sketch
@@ -62,9 +62,9 @@ def happened_in(run: Run) -> list[str]:
     return change.happened if change else []
 
 
-def _change(run: Run) -> Change | None:
+def _change(run: Run) -> RunChange | None:
     with suppress(OSError, msgspec.DecodeError, RecursionError):
-        change = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=Change)
+        change = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=RunChange)
         return None if change.anew else change
     return None
 

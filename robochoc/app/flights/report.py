@@ -21,16 +21,15 @@ import msgspec
 from robochoc.app.flights.answer_check import claim_words
 from robochoc.app.flights.builder import flies
 from robochoc.app.flights.flight_map import changed_to, happened_in
-from robochoc.app.flights.flight_result import flight_result_of, flight_words
-from robochoc.app.flights.flying_robots import flying_robots_words
+from robochoc.app.flights.flight_result import flight_result_of, flight_words, flying_robots_words
 from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.result import robots_in
 from robochoc.app.runs.rule_costs import Decided, rule_cost, rules_with_costs, values_by_robot, violated_links
 from robochoc.app.runs.run import Run
-from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sentences import listed, sentence, value_words, weight_of
 from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
-from robochoc.app.sketch.words import listed, sentence, value_words, weight_of
+from robochoc.app.sketch.thumbnail import thumbnail
 from robochoc.app.texts import LANGUAGE, say
 from robochoc.model.cost_units import cost_shown
 from robochoc.system.plain_text import printable
@@ -200,7 +199,7 @@ def _team(sketch: Sketch) -> str:
     ]
     own = [say(f"report.{key}") for key in ("robot", "stands", "weight", "rank")]
     story = f"<p>{_text(sketch.story)}</p>" if sketch.story else ""
-    drawn = f'<figure class="map">{picture(sketch)}</figure>' if sketch.decisions else ""
+    drawn = f'<figure class="map">{thumbnail(sketch)}</figure>' if sketch.decisions else ""
     return _section(
         "report.team",
         f"{story}<p>{_text(size)}</p>{drawn}{_table(headings, decisions)}{_table(own, robots, fold=True)}",

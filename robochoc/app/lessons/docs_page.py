@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robochoc.app.lessons.lesson import COUNT, Step, lesson
+from robochoc.app.lessons.lesson import COUNT, LessonStep, lesson
 from robochoc.app.lessons.picture import picture
 from robochoc.app.lessons.recording import before, reasons
 
@@ -41,7 +41,7 @@ def list_page() -> str:
     return f"# Lessons\n\n{_INTRO}\n\n" + "\n".join(rows) + "\n"
 
 
-def _step(number: int, place: int, step: Step) -> Iterator[str]:
+def _step(number: int, place: int, step: LessonStep) -> Iterator[str]:
     moment = before(number, step)
     yield f"## Step {place}: {step.title}"
     yield step.text
@@ -53,7 +53,7 @@ def _step(number: int, place: int, step: Step) -> Iterator[str]:
     yield "\n".join(_answer(number, step))
 
 
-def _answer(number: int, step: Step) -> Iterator[str]:
+def _answer(number: int, step: LessonStep) -> Iterator[str]:
     yield '??? success "The answer"'
     yield ""
     letter = _LETTERS[step.choices.index(step.answer)]

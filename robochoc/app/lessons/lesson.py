@@ -65,7 +65,7 @@ class RunSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     turns: int = 0
 
 
-class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class AnswerChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One of the answers: its text, its claim, and the reason why it is right or wrong.
 
     Attributes:
@@ -103,7 +103,7 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.text or f"To {self.to}: “{self.words}”"
 
 
-class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LessonStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A moment of a run, and a question.
 
     Attributes:
@@ -126,7 +126,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     turn: int = 0
     team: str = "team"
     levels: dict[str, int] = {}
-    choices: tuple[Choice, ...]
+    choices: tuple[AnswerChoice, ...]
 
     @property
     def is_spoken(self) -> bool:
@@ -134,7 +134,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         return self.about == "next" or self.about.startswith("told ")
 
     @property
-    def answer(self) -> Choice:
+    def answer(self) -> AnswerChoice:
         """The right choice."""
         return next(choice for choice in self.choices if choice.right)
 
@@ -146,10 +146,10 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     goal: str
     teams: dict[str, TeamSpec]
     runs: dict[str, RunSpec] = {}
-    steps: tuple[Step, ...]
+    steps: tuple[LessonStep, ...]
     end: str
 
-    def team_of(self, step: Step) -> TeamSpec:
+    def team_of(self, step: LessonStep) -> TeamSpec:
         """Return the team of a step."""
         return self.teams[self.runs[step.run].team if step.run else step.team]
 

@@ -6,7 +6,7 @@ import math
 from html import escape
 
 from robochoc.app.lessons.lesson import ROBOTS, TeamSpec
-from robochoc.app.lessons.recording import Message, Moment
+from robochoc.app.lessons.recording import LessonMessage, LessonMoment
 
 WIDTH, HEIGHT = 400, 290
 _RADIUS = 27
@@ -16,7 +16,7 @@ _SIGN = 0.4
 _Point = tuple[float, float]
 
 
-def picture(team: TeamSpec, moment: Moment) -> str:
+def picture(team: TeamSpec, moment: LessonMoment) -> str:
     """Return the picture of a team at a moment, without empty lines, so that it can be part of a Markdown page."""
     if team.chain:
         return _chain(team.chain)
@@ -28,7 +28,7 @@ def picture(team: TeamSpec, moment: Moment) -> str:
     return _framed(in_words(team, moment), parts)
 
 
-def in_words(team: TeamSpec, moment: Moment) -> str:
+def in_words(team: TeamSpec, moment: LessonMoment) -> str:
     """Return a description of the picture, for screen readers."""
     levels = [
         f"{robot} is at level {moment.levels[robot]}" if robot in moment.levels else f"{robot} has no level yet"
@@ -57,7 +57,7 @@ def _link(team: TeamSpec, one: str, other: str) -> str:
     )
 
 
-def _robot(team: TeamSpec, moment: Moment, robot: str) -> str:
+def _robot(team: TeamSpec, moment: LessonMoment, robot: str) -> str:
     x, y = team.place(robot)
     kind = "robot asked" if robot == moment.asked else "robot"
     level = moment.levels.get(robot)
@@ -76,7 +76,7 @@ def _robot(team: TeamSpec, moment: Moment, robot: str) -> str:
     )
 
 
-def _arrows(messages: tuple[Message, ...]) -> dict[tuple[str, str], str]:
+def _arrows(messages: tuple[LessonMessage, ...]) -> dict[tuple[str, str], str]:
     """Return one arrow for each sender and receiver, with the kind of the last message."""
     return {(one.sender, one.to): one.kind for one in messages}
 

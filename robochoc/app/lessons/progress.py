@@ -12,7 +12,7 @@ _FILE = "lessons.json"
 _MOST_BYTES = 1 << 16
 
 
-class Progress:
+class LessonProgress:
     """The answered steps by lesson, saved in `folder`. After an error of reading, the progress is empty."""
 
     def __init__(self, folder: Path) -> None:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import robochoc
 from robochoc.app.lessons.lesson import ROBOTS, Lesson, RunSpec, TeamSpec
-from robochoc.app.lessons.recording import Message, Recording, Turn
+from robochoc.app.lessons.recording import LessonMessage, LessonTurn, RecordedRun
 from robochoc.journal.entries import Header
 from robochoc.journal.events import AnyEvent
 from robochoc.modelling.model import Model
@@ -21,7 +21,7 @@ LEVEL = "level"
 AUTO = "auto"
 
 
-def recorded(lesson: Lesson) -> dict[str, Recording]:
+def recorded(lesson: Lesson) -> dict[str, RecordedRun]:
     """Run and return the recordings of a lesson."""
     return {name: _recorded(lesson.teams[run.team], run) for name, run in lesson.runs.items()}
 
@@ -45,11 +45,11 @@ def model_of(spec: TeamSpec) -> Model:
     return model
 
 
-def _recorded(spec: TeamSpec, run: RunSpec) -> Recording:
+def _recorded(spec: TeamSpec, run: RunSpec) -> RecordedRun:
     model = model_of(spec)
     if run.protocol == AUTO:
         choice = decided(model.team, Options(protocol=AUTO))
-        return Recording(choice.options.protocol, choice.options.chosen["protocol"])
+        return RecordedRun(choice.options.protocol, choice.options.chosen["protocol"])
     events: list[AnyEvent] = []
     found = model.solve(
         run.protocol,
@@ -62,7 +62,7 @@ def _recorded(spec: TeamSpec, run: RunSpec) -> Recording:
     )
     events.sort(key=lambda event: event.t)
     messages, turns = _messages_and_turns(events, run)
-    return Recording(
+    return RecordedRun(
         run.protocol,
         messages=messages,
         turns=turns,
@@ -71,7 +71,9 @@ def _recorded(spec: TeamSpec, run: RunSpec) -> Recording:
     )
 
 
-def _messages_and_turns(events: list[AnyEvent], run: RunSpec) -> tuple[tuple[Message, ...], tuple[Turn, ...]]:
+def _messages_and_turns(
+    events: list[AnyEvent], run: RunSpec
+) -> tuple[tuple[LessonMessage, ...], tuple[LessonTurn, ...]]:
     """Return the messages and turns, in the words of the sniffer and the replay."""
     header = Header(team="lesson", protocol=run.protocol, runtime="simulator", seed=run.seed)
     trace = Trace(header)
@@ -86,13 +88,15 @@ def _messages_and_turns(events: list[AnyEvent], run: RunSpec) -> tuple[tuple[Mes
             levels[robot] = decisions[step][f"{robot}.{LEVEL}"]
         reasons = why[robot][done[robot]] if step in decisions else ()
         done[robot] += 1
-        turns.append(Turn(robot, tuple(trace.packet(step)), tuple(trace.sent_in(step)), levels.get(robot), reasons))
+        turns.append(
+            LessonTurn(robot, tuple(trace.packet(step)), tuple(trace.sent_in(step)), levels.get(robot), reasons)
+        )
     data = PageData(trace)
     count = max((*turns[-1].said, *(one for turn in turns for one in (*turn.said, *turn.heard))), default=-1) + 1
     return tuple(_message(data, one) for one in range(count)), tuple(turns)
 
 
-def _message(data: PageData, number: int) -> Message:
+def _message(data: PageData, number: int) -> LessonMessage:
     trace, of = data.trace, data.trace.messages
     sender, to = trace.robots[of.sender[number]], trace.robots[of.receiver[number]]
-    return Message(sender, to, trace.kinds[of.kind[number]], data.words(number).removeprefix(f"{sender} says: "))
+    return LessonMessage(sender, to, trace.kinds[of.kind[number]], data.words(number).removeprefix(f"{sender} says: "))

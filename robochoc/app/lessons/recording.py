@@ -10,10 +10,10 @@ from importlib.resources import files
 
 import msgspec
 
-from robochoc.app.lessons.lesson import Step
+from robochoc.app.lessons.lesson import LessonStep
 
 
-class Message(msgspec.Struct, frozen=True):
+class LessonMessage(msgspec.Struct, frozen=True):
     """A message in the words of the sniffer."""
 
     sender: str
@@ -22,7 +22,7 @@ class Message(msgspec.Struct, frozen=True):
     words: str
 
 
-class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
+class LessonTurn(msgspec.Struct, frozen=True, omit_defaults=True):
     """One step of a robot: the received and sent messages by number, its level, and the reasons for the level."""
 
     robot: str
@@ -32,13 +32,13 @@ class Turn(msgspec.Struct, frozen=True, omit_defaults=True):
     why: tuple[str, ...] = ()
 
 
-class Recording(msgspec.Struct, frozen=True, omit_defaults=True):
+class RecordedRun(msgspec.Struct, frozen=True, omit_defaults=True):
     """A run: its protocol, the reason for its choice, messages and turns in order, verdict and cost."""
 
     protocol: str
     reason: str = ""
-    messages: tuple[Message, ...] = ()
-    turns: tuple[Turn, ...] = ()
+    messages: tuple[LessonMessage, ...] = ()
+    turns: tuple[LessonTurn, ...] = ()
     verdict: str = ""
     cost: int | None = None
 
@@ -47,44 +47,46 @@ class Recording(msgspec.Struct, frozen=True, omit_defaults=True):
         return {turn.robot: turn.level for turn in self.turns[:turns] if turn.level is not None}
 
 
-class Moment(msgspec.Struct, frozen=True):
+class LessonMoment(msgspec.Struct, frozen=True):
     """The content of a picture: levels, the present messages, and the robot of the question."""
 
     levels: dict[str, int]
-    messages: tuple[Message, ...] = ()
+    messages: tuple[LessonMessage, ...] = ()
     asked: str = ""
 
 
 @cache
-def recordings(number: int) -> dict[str, Recording]:
+def recordings(number: int) -> dict[str, RecordedRun]:
     """Return the runs of a lesson by their names."""
     file = files(__package__) / "runs" / f"{number:02}.json"
-    return msgspec.json.decode(file.read_bytes(), type=dict[str, Recording])
+    return msgspec.json.decode(file.read_bytes(), type=dict[str, RecordedRun])
 
 
-def before(number: int, step: Step) -> Moment:
+def before(number: int, step: LessonStep) -> LessonMoment:
     """Return the moment of a step: the robot of the question has received the drawn messages, and sent none yet."""
     if not step.run:
-        return Moment(step.levels)
+        return LessonMoment(step.levels)
     run = recordings(number)[step.run]
     if step.turn >= len(run.turns):
-        return Moment(run.levels(step.turn))
+        return LessonMoment(run.levels(step.turn))
     turn = run.turns[step.turn]
     moved = step.is_spoken and step.about != "next"  # the robot's new level is already known
-    return Moment(run.levels(step.turn + moved), tuple(run.messages[one] for one in turn.heard), _asked(step, turn))
+    return LessonMoment(
+        run.levels(step.turn + moved), tuple(run.messages[one] for one in turn.heard), _asked(step, turn)
+    )
 
 
-def after(number: int, step: Step) -> Moment:
+def after(number: int, step: LessonStep) -> LessonMoment:
     """Return the moment after the answer: the messages that the robot has sent, and its level."""
     if not step.run or not step.is_spoken:
         shown = before(number, step)
         return msgspec.structs.replace(shown, levels=step.answer.levels or shown.levels)
     run = recordings(number)[step.run]
     turn = run.turns[step.turn]
-    return Moment(run.levels(step.turn + 1), tuple(run.messages[one] for one in turn.said))
+    return LessonMoment(run.levels(step.turn + 1), tuple(run.messages[one] for one in turn.said))
 
 
-def reasons(number: int, step: Step) -> tuple[str, ...]:
+def reasons(number: int, step: LessonStep) -> tuple[str, ...]:
     """Return the robot's reasons for its new level, from the replay of the run."""
     if not step.run or not step.is_spoken:
         return ()
@@ -92,5 +94,5 @@ def reasons(number: int, step: Step) -> tuple[str, ...]:
     return tuple(reason for reason in why if "bytes>" not in reason)  # packed tables are not readable
 
 
-def _asked(step: Step, turn: Turn) -> str:
+def _asked(step: LessonStep, turn: LessonTurn) -> str:
     return turn.robot if step.is_spoken else ""

@@ -7,18 +7,16 @@ from collections.abc import Callable
 from nicegui import app, ui
 
 from robochoc.app.jobs.job import end_all
-from robochoc.app.lessons.progress import Progress
+from robochoc.app.lessons.progress import LessonProgress
 from robochoc.app.log import error_text
-from robochoc.app.pages.compare.page import build_compare
-from robochoc.app.pages.compare.served import install_reports
+from robochoc.app.pages.compare.page import build_compare, install_reports
 from robochoc.app.pages.decide.page import build_decide
 from robochoc.app.pages.fly.page import build_fly
 from robochoc.app.pages.fly.saved_files import install_saved_files
-from robochoc.app.pages.foreign.model import build_foreign_model
-from robochoc.app.pages.foreign.whatif import build_foreign_whatif
 from robochoc.app.pages.gallery import build_gallery
-from robochoc.app.pages.lessons.lesson_page import build_lesson
-from robochoc.app.pages.lessons.list_page import build_lessons
+from robochoc.app.pages.imported.model import build_imported_model
+from robochoc.app.pages.imported.whatif import build_imported_whatif
+from robochoc.app.pages.lessons.page import build_lesson, build_lessons
 from robochoc.app.pages.model.page import build_model
 from robochoc.app.pages.shell import AREAS, shell
 from robochoc.app.pages.whatif.page import build_whatif
@@ -32,7 +30,7 @@ _BUILD: dict[str, Callable[[Project], None]] = {
     "fly": build_fly,
     "compare": build_compare,
 }
-_BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_foreign_model, "whatif": build_foreign_whatif}
+_BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_imported_model, "whatif": build_imported_whatif}
 """Pages of imported teams that differ from the others."""
 
 
@@ -62,7 +60,7 @@ def install(projects: Projects) -> None:
         with shell(project.sketch.name, project, chosen):
             build[chosen](project)
 
-    progress = Progress(projects.store.folder)
+    progress = LessonProgress(projects.store.folder)
 
     @ui.page("/lessons")
     def lessons() -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-from robochoc.app.runs.tape import Said, in_words
+from robochoc.app.runs.tape import MessageWords, in_words
 from robochoc.app.sketch.sketch import Value
 from robochoc.journal.entries import JournalError
 from robochoc.journal.events import Began, Bounded, Decided, Heard, Sent
@@ -55,7 +55,7 @@ class Live:
     costs: list[tuple[float, Cost]] = field(default_factory=list)
     recent: Counter[tuple[str, str]] = field(default_factory=Counter)
     is_cut: bool = False
-    said: tuple[Said, ...] = ()
+    said: tuple[MessageWords, ...] = ()
 
     def settled(self, robot: str) -> bool:
         """Return whether a robot has not changed its values for a while."""

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import cast
 
 from robochoc.app.sketch.palette import Applied
+from robochoc.app.sketch.python_text import Operand
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
-from robochoc.app.sketch.written import Operand
 
 Decided = Mapping[tuple[str, str], Value]
 """Values by robot and decision, as `values_by_robot` returns them."""

@@ -23,7 +23,7 @@ import msgspec
 
 from robochoc.app.jobs.job import Call
 from robochoc.app.listeners import Listeners
-from robochoc.app.parts import PartsOwner
+from robochoc.app.parts_owner import PartsOwner
 from robochoc.app.runs.live import Live
 from robochoc.app.runs.options import RESULT, RunOptions, command_line
 from robochoc.app.runs.result import RunResult, decoded
@@ -39,7 +39,7 @@ MAX_RESULT = 64 << 20
 _MAX_MESSAGE = 2_000
 
 
-class State(StrEnum):
+class RunState(StrEnum):
     """The state of a run."""
 
     RUNNING = "running"
@@ -73,7 +73,7 @@ class Record(msgspec.Struct):
     options: RunOptions
     arguments: list[str] = []
     purpose: str = "decide"
-    state: State = State.RUNNING
+    state: RunState = RunState.RUNNING
     started: float = 0.0
     ended: float | None = None
     message: str = ""
@@ -116,7 +116,7 @@ class Run(PartsOwner):
         self.watched_by: Watcher | None = None
 
     @property
-    def state(self) -> State:
+    def state(self) -> RunState:
         """The state of the run: running, ended, stopped or failed."""
         return self.record.state
 
@@ -189,9 +189,9 @@ class Run(PartsOwner):
         """Call all listeners."""
         self._call(self._listeners)
 
-    def finish(self, state: State, message: str = "") -> None:
+    def finish(self, state: RunState, message: str = "") -> None:
         """Set the final state. Later calls have no effect."""
-        if self.state != State.RUNNING:
+        if self.state != RunState.RUNNING:
             return
         self.record.message = " ".join(message.split())[:_MAX_MESSAGE]
         self.record.ended = time.time()
@@ -220,9 +220,9 @@ def run_of(folder: Path) -> Run:
     try:
         record = msgspec.json.decode((folder / RECORD).read_bytes(), type=Record)
     except (OSError, msgspec.DecodeError, RecursionError):
-        return Run(folder, Record(RunOptions(), state=State.FAILED, message="broken"))
+        return Run(folder, Record(RunOptions(), state=RunState.FAILED, message="broken"))
     run = Run(folder, record)
     run.read_result()
-    if record.state == State.RUNNING:
-        run.finish(State.ENDED if run.result else State.FAILED, "" if run.result else "lost")
+    if record.state == RunState.RUNNING:
+        run.finish(RunState.ENDED if run.result else RunState.FAILED, "" if run.result else "lost")
     return run

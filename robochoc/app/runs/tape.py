@@ -31,7 +31,7 @@ MOST_LINKS = 200
 """The maximum number of pairs of robots in one moment, for readability."""
 
 
-class Said(NamedTuple):
+class MessageWords(NamedTuple):
     """A message in words."""
 
     sender: str
@@ -40,11 +40,11 @@ class Said(NamedTuple):
     words: str
 
 
-def in_words(sent: Sent, spoken: Spoken) -> Said:
+def in_words(sent: Sent, spoken: Spoken) -> MessageWords:
     """Return a message in words, without the name of its sender; long texts are shortened."""
     words = spoken.sentence(sent).removeprefix(f"{sent.sender} says: ").removeprefix(f"{sent.sender} says ")
     short = words if len(words) <= MOST_LETTERS else f"{words[: MOST_LETTERS - 1]}…"
-    return Said(sent.sender, sent.receiver, sent.type, short)
+    return MessageWords(sent.sender, sent.receiver, sent.type, short)
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Moment:
     """
 
     count: int = 0
-    said: tuple[Said, ...] = ()
+    said: tuple[MessageWords, ...] = ()
     links: Counter[tuple[str, str]] = field(default_factory=Counter)
     values: dict[str, dict[str, Value]] = field(default_factory=dict)
     begins: bool = False
@@ -176,9 +176,9 @@ class Tape:
         """Return the number of messages up to the end of a moment."""
         return sum(moment.count for moment in self.moments[: number + 1])
 
-    def said_at(self, number: int, most: int) -> list[Said]:
+    def said_at(self, number: int, most: int) -> list[MessageWords]:
         """Return the last messages in words at the end of a moment, the last one first."""
-        said: list[Said] = []
+        said: list[MessageWords] = []
         for moment in reversed(self.moments[: number + 1]):
             said += reversed(moment.said)
             if len(said) >= most:

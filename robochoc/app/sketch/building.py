@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from robochoc.app.sketch.palette import Applied
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Decision, Kind, Sketch, SketchRule
+from robochoc.app.sketch.sketch import Decision, DecisionKind, Sketch, SketchRule
 from robochoc.model.problem import Team
 from robochoc.modelling.model import Model
 from robochoc.modelling.robots import ModelRobot
@@ -108,10 +108,10 @@ def add_constraint(model: Model, rule: SketchRule, name: str, term: Term, robots
 
 def add_topic(sketch: Sketch, robot: ModelRobot) -> None:
     """Add the topic for a robot's target, if it decides a place or a level."""
-    variables: dict[Kind, ModelVariable] = {}
+    variables: dict[DecisionKind, ModelVariable] = {}
     for decision in _decided_by(sketch, robot.name):
         variables.setdefault(decision.kind, robot.variables[decision.name])
-    place, level = variables.get(Kind.PLACE), variables.get(Kind.LEVEL)
+    place, level = variables.get(DecisionKind.PLACE), variables.get(DecisionKind.LEVEL)
     if place is None and level is None:
         return
     drawn = sketch.robot(robot.name)

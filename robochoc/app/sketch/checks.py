@@ -2,10 +2,141 @@
 
 from __future__ import annotations
 
-from robochoc.app.sketch import chances, fits, shape
-from robochoc.app.sketch.fits import Facts
-from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.sketch.troubles import Trouble
+from collections.abc import Iterator
+from itertools import product
+from math import prod
+
+from robochoc.app.sketch import element_checks, rule_checks
+from robochoc.app.sketch.palette import Applied, Links, PaletteRule
+from robochoc.app.sketch.rule_checks import SketchFacts
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sketch import Sketch, SketchRule
+from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
+from robochoc.solver.compiled_domain import MAX_SOLUTIONS
+
+MAX_PAIRS = 10_000
+"""The maximum number of pairs of values that are checked for two robots."""
+MAX_TRIED = 100_000
+"""The maximum number of pairs of values that are checked for a sketch."""
+MAX_CHECKED_LINKS = 5_000
+"""The maximum number of links of two robots that are checked."""
+
+Values = frozenset[int | str]
+Own = dict[tuple[str, str], Values]
+"""The values that rules of a single robot allow, by robot and decision."""
+_Link = tuple[str, str, str]
+"""A decision, and two robots."""
+
+
+def hopeless(facts: SketchFacts) -> Iterator[Trouble]:
+    """Yield rules that cannot be satisfied."""
+    hard = [rule for rule in facts.sound if rule.cost is None and not PALETTE[rule.kind].graded]
+    own: Own = {}
+    found = [*_alone(facts, [rule for rule in hard if PALETTE[rule.kind].links == Links.EACH], own)]
+    yield from found
+    if found:
+        return
+    found = [*_of_two(facts, hard, own)]
+    yield from found
+    lost = {trouble.element for trouble in found}
+    for rule in hard:
+        if rule.id not in lost:
+            yield from _of_all(facts, rule, own)
+
+
+def _alone(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
+    """Remove from `own` the values that each rule forbids. Yield the rules that leave a robot no values."""
+    for rule in rules:
+        given, entry = Applied(facts.sketch, rule), PALETTE[rule.kind]
+        for (robot,) in entry.groups(facts.sketch, rule):
+            left = _left(facts, own, robot, rule.decision)
+            own[robot, rule.decision] = allowed = _allowed(entry, given, left)
+            if left and not allowed:
+                yield _hint(rule, "alone", robot=shortened(robot), decision=shortened(rule.decision))
+                break
+
+
+def _allowed(entry: PaletteRule, given: Applied, left: Values) -> Values:
+    return frozenset(value for value in left if entry.holds(given, (value,)))
+
+
+def _left(facts: SketchFacts, own: Own, robot: str, decision: str) -> Values:
+    found = own.get((robot, decision))
+    return frozenset(facts.values[decision]) if found is None else found
+
+
+def _of_two(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
+    """Yield the last one of rules that two robots cannot satisfy together."""
+    links: dict[_Link, list[tuple[int, bool]]] = {}
+    for place, rule in enumerate(rules):
+        entry = PALETTE[rule.kind]
+        if entry.links not in {Links.EACH, Links.GROUP}:
+            for one, other in entry.groups(facts.sketch, rule):
+                links.setdefault((rule.decision, *sorted((one, other))), []).append((place, one > other))  # type: ignore[arg-type] # two
+                if len(links) > MAX_CHECKED_LINKS:
+                    return
+    tried: dict[object, bool] = {}
+    reported: set[str] = set()
+    budget = MAX_TRIED
+    for (decision, one, other), applied in links.items():
+        left = _left(facts, own, one, decision), _left(facts, own, other, decision)
+        key = (*left, *applied)
+        if key not in tried:
+            size = prod(map(len, left))
+            if size > min(MAX_PAIRS, budget):
+                continue
+            budget -= size
+            tried[key] = _is_satisfiable(facts, left, [(rules[place], turned) for place, turned in applied])
+        last = rules[applied[-1][0]]
+        if not tried[key] and last.id not in reported:
+            reported.add(last.id)
+            others = ", ".join(rules[place].id for place, _ in applied)
+            yield _hint(last, "two", one=shortened(one), other=shortened(other), rules=others)
+
+
+def _is_satisfiable(facts: SketchFacts, left: tuple[Values, Values], applied: list[tuple[SketchRule, bool]]) -> bool:
+    asked = [(PALETTE[rule.kind], Applied(facts.sketch, rule), turned) for rule, turned in applied]
+    return any(
+        all(entry.holds(given, pair[::-1] if turned else pair) for entry, given, turned in asked)
+        for pair in product(*left)
+    )
+
+
+def _of_all(facts: SketchFacts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
+    """Yield a rule that its robots cannot satisfy together."""
+    robots = facts.sketch.bound(rule)
+    left = [_left(facts, own, robot, rule.decision) for robot in robots]
+    if rule.kind == "different":
+        values = len(frozenset().union(*{*left}))
+        if values < len(robots):
+            yield _hint(rule, "crowded", count=len(robots), values=values, decision=shortened(rule.decision))
+    if rule.kind == "at-least":
+        wanted = Applied(facts.sketch, rule)
+        able = sum(wanted.value("value") in values for values in left)
+        if able < wanted.number("count"):
+            yield _hint(rule, "at-least", count=able, wanted=wanted.number("count"))
+
+
+def large(facts: SketchFacts) -> Iterator[Trouble]:
+    """Yield one robot of each group with equal decisions that have too many combinations."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for robot in facts.sketch.robots:
+        decisions = tuple(name for name, robots in facts.deciders.items() if robot.name in robots)
+        if prod(len(facts.values[name]) for name in decisions) > MAX_SOLUTIONS:
+            groups.setdefault(decisions, []).append(robot.name)
+    for decisions, robots in groups.items():
+        named: dict[str, str | int] = {
+            "robot": shortened(robots[0]),
+            "robots": len(robots),
+            "decisions": ", ".join(map(shortened, decisions)),
+            "count": prod(len(facts.values[name]) for name in decisions),
+            "most": MAX_SOLUTIONS,
+        }
+        yield Trouble(About.ROBOT, robots[0], "trouble.robot-large", named, Severity.HINT)
+
+
+def _hint(rule: SketchRule, key: str, **named: str | int) -> Trouble:
+    return Trouble(About.RULE, rule.id, f"trouble.never-{key}", named | {"rule": shortened(rule.id)}, Severity.HINT)
 
 
 def troubles(sketch: Sketch) -> list[Trouble]:
@@ -15,7 +146,7 @@ def troubles(sketch: Sketch) -> list[Trouble]:
     """
     found, facts = _checked(sketch)
     if facts and not any(trouble.is_error for trouble in found):
-        found += [*chances.hopeless(facts), *chances.large(facts)]
+        found += [*hopeless(facts), *large(facts)]
     return sorted(found, key=lambda trouble: not trouble.is_error)
 
 
@@ -24,11 +155,11 @@ def errors_of(sketch: Sketch) -> list[Trouble]:
     return [trouble for trouble in _checked(sketch)[0] if trouble.is_error]
 
 
-def _checked(sketch: Sketch) -> tuple[list[Trouble], Facts | None]:
+def _checked(sketch: Sketch) -> tuple[list[Trouble], SketchFacts | None]:
     """Return all errors and quick hints, and the facts about a sketch that is within bounds."""
-    found = [*shape.of_bounds(sketch)]
+    found = [*element_checks.of_bounds(sketch)]
     if found:
         return found, None
-    found += [*shape.of_names(sketch), *shape.of_robots(sketch), *shape.of_decisions(sketch)]
-    facts = Facts(sketch)
-    return [*found, *facts.unfit.values(), *fits.of_secrets(facts), *fits.of_number(facts)], facts
+    found += [*element_checks.of_names(sketch), *element_checks.of_robots(sketch), *element_checks.of_decisions(sketch)]
+    facts = SketchFacts(sketch)
+    return [*found, *facts.unfit.values(), *rule_checks.of_secrets(facts), *rule_checks.of_number(facts)], facts

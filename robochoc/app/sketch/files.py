@@ -17,7 +17,7 @@ import msgspec
 
 from robochoc.app.sketch.building import saved_team
 from robochoc.app.sketch.checks import errors_of
-from robochoc.app.sketch.shape import is_sound
+from robochoc.app.sketch.element_checks import is_sound
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import Diagnostic, InvalidInputError, encodable, write_team

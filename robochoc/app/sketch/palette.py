@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import cast
 
-from robochoc.app.sketch.sketch import NUMBERED, Kind, Sketch, SketchRule
-from robochoc.app.sketch.written import Each, Operand, Written
+from robochoc.app.sketch.python_text import Each, Operand, PythonText
+from robochoc.app.sketch.sketch import NUMBERED, DecisionKind, Sketch, SketchRule
 from robochoc.modelling import functions
 from robochoc.modelling.terms import Term
 
-ALL_KINDS = frozenset(Kind)
-PLACES = frozenset({Kind.PLACE})
+ALL_KINDS = frozenset(DecisionKind)
+PLACES = frozenset({DecisionKind.PLACE})
 NAMED = ALL_KINDS - NUMBERED
 
 
@@ -100,7 +100,7 @@ class Applied:
         return [(row[0], row[1]) for row in rows if isinstance(row, list)]
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> DecisionKind:
         """The kind of the rule's decision."""
         decision = self.sketch.decision(self.rule.decision)
         assert decision is not None, "the decision of an applied rule exists"  # noqa: S101
@@ -124,7 +124,7 @@ class PaletteRule:
     """
 
     key: str
-    kinds: frozenset[Kind]
+    kinds: frozenset[DecisionKind]
     links: Links
     condition: Callable[[Applied, Sequence[Operand]], Operand]
     openings: tuple[RuleField, ...] = ()
@@ -158,8 +158,8 @@ class PaletteRule:
 
 def allowed(pair: Sequence[Operand], rows: list[tuple[int | str, int | str]]) -> Operand:
     """Return the condition that a pair of decisions is one of `rows`."""
-    if isinstance(pair[0], Written):
-        return Written.call("robochoc.allowed", [*pair], rows)
+    if isinstance(pair[0], PythonText):
+        return PythonText.call("robochoc.allowed", [*pair], rows)
     if isinstance(pair[0], Term):
         return functions.allowed([*pair], rows)
     return cast("Operand", cast("object", tuple(pair)) in rows)
@@ -167,15 +167,15 @@ def allowed(pair: Sequence[Operand], rows: list[tuple[int | str, int | str]]) ->
 
 def within(one: Operand, values: list[int | str]) -> Operand:
     """Return the condition that a decision is one of `values`."""
-    return one.is_in(values) if isinstance(one, (Written, Term)) else cast("Operand", cast("object", one) in values)
+    return one.is_in(values) if isinstance(one, (PythonText, Term)) else cast("Operand", cast("object", one) in values)
 
 
 def count(group: Sequence[Operand], value: int | str) -> Operand:
     """Return the number of decisions that are `value`."""
     if isinstance(group[0], Each):
-        return Written(f"sum({equal(group[0], value)} for a in {group[0].over})")
-    if isinstance(group[0], Written):
-        return Written.call("sum", [equal(one, value) for one in group])
+        return PythonText(f"sum({equal(group[0], value)} for a in {group[0].over})")
+    if isinstance(group[0], PythonText):
+        return PythonText.call("sum", [equal(one, value) for one in group])
     return cast("Operand", sum(cast("list[int]", [equal(one, value) for one in group])))
 
 

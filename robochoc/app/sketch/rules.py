@@ -18,8 +18,8 @@ from robochoc.app.sketch.palette import (
     unequal,
     within,
 )
-from robochoc.app.sketch.sketch import NUMBERED, Kind
-from robochoc.app.sketch.written import Operand
+from robochoc.app.sketch.python_text import Operand
+from robochoc.app.sketch.sketch import NUMBERED, DecisionKind
 
 _RADIUS = RuleField("radius", Form.NUMBER, 1, 100, 3)
 _GAP = RuleField("gap", Form.NUMBER, 1, 100, 2)
@@ -43,12 +43,12 @@ def _squared(given: Applied, pair: Group) -> Operand:
 
 def _apart(given: Applied, pair: Group) -> Operand:
     gap = given.number("gap")
-    return _squared(given, pair) >= gap * gap if given.kind == Kind.PLACE else abs(pair[0] - pair[1]) >= gap
+    return _squared(given, pair) >= gap * gap if given.kind == DecisionKind.PLACE else abs(pair[0] - pair[1]) >= gap
 
 
 def _close(given: Applied, pair: Group) -> Operand:
     gap = given.number("gap")
-    return _squared(given, pair) <= gap * gap if given.kind == Kind.PLACE else abs(pair[0] - pair[1]) <= gap
+    return _squared(given, pair) <= gap * gap if given.kind == DecisionKind.PLACE else abs(pair[0] - pair[1]) <= gap
 
 
 def _different(_: Applied, pair: Group) -> Operand:
@@ -91,7 +91,7 @@ def _prefers(given: Applied, alone: Group) -> Operand:
 
 def _rather(given: Applied, alone: Group) -> Operand:
     wish, step = given.value("value"), given.number("step")
-    if given.kind != Kind.PLACE or not isinstance(wish, int):
+    if given.kind != DecisionKind.PLACE or not isinstance(wish, int):
         return abs(alone[0] - wish) * step
     columns = given.sketch.area.columns  # the number of horizontal and vertical steps on the map
     return (abs(alone[0] % columns - wish % columns) + abs(alone[0] // columns - wish // columns)) * step

@@ -28,7 +28,7 @@ Setting = Value | list[Value | list[Value]]
 """The value of a rule's field: a number or a value, several values, or rows of values."""
 
 
-class Kind(StrEnum):
+class DecisionKind(StrEnum):
     """The kind of a decision, which determines the form of its values and how they are shown."""
 
     LEVEL = "level"
@@ -45,7 +45,7 @@ class Kind(StrEnum):
     """Anything else: names."""
 
 
-NUMBERED = frozenset({Kind.LEVEL, Kind.PLACE, Kind.SLOT, Kind.CHANNEL})
+NUMBERED = frozenset({DecisionKind.LEVEL, DecisionKind.PLACE, DecisionKind.SLOT, DecisionKind.CHANNEL})
 """Kinds whose values are numbers, which can be compared and subtracted."""
 
 
@@ -109,7 +109,7 @@ class Decision(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """
 
     name: str
-    kind: Kind
+    kind: DecisionKind
     values: tuple[int | str, ...] = ()
     robots: tuple[str, ...] = ()
 
@@ -166,7 +166,7 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     @property
     def flies(self) -> bool:
         """Whether some decisions are positions of robots: levels or places."""
-        return any(decision.kind in {Kind.LEVEL, Kind.PLACE} for decision in self.decisions)
+        return any(decision.kind in {DecisionKind.LEVEL, DecisionKind.PLACE} for decision in self.decisions)
 
     def robot(self, name: str) -> SketchRobot | None:
         """Return the robot with this name, if there is one."""
@@ -187,7 +187,7 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     def values(self, decision: Decision) -> tuple[int | str, ...]:
         """Return the values of a decision."""
-        return self.area.free if decision.kind == Kind.PLACE and not decision.values else decision.values
+        return self.area.free if decision.kind == DecisionKind.PLACE and not decision.values else decision.values
 
     def bound(self, rule: SketchRule) -> tuple[str, ...]:
         """Return the robots of a rule that have its decision, in the rule's order."""

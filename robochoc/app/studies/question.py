@@ -6,8 +6,8 @@ import msgspec
 
 from robochoc.app.runs.fitting import fitting_protocols, team_of
 from robochoc.app.runs.prepared_team import TeamFiles
+from robochoc.app.sketch.sentences import listed
 from robochoc.app.sketch.sketch import MAX_LABEL, Sketch
-from robochoc.app.sketch.words import listed
 from robochoc.app.studies.families import Family, family_of
 from robochoc.app.texts import say
 from robochoc.experiments.study import toml_of
@@ -23,7 +23,7 @@ _COMMON = ("afc-ng", "abt", "sfb", "dpop", "afb")
 """The candidates for the second protocol, besides the choice of `auto`."""
 
 
-class Question(msgspec.Struct, frozen=True):
+class StudyQuestion(msgspec.Struct, frozen=True):
     """The question of a study.
 
     Attributes:
@@ -41,7 +41,7 @@ class Question(msgspec.Struct, frozen=True):
     ordered: bool = False
 
 
-class Possible(msgspec.Struct, frozen=True):
+class PossibleQuestions(msgspec.Struct, frozen=True):
     """The possible questions for a team.
 
     Attributes:
@@ -59,7 +59,7 @@ class Possible(msgspec.Struct, frozen=True):
     ordered: bool = False
 
 
-def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
+def possible(sketch: Sketch, files: TeamFiles | None = None) -> PossibleQuestions:
     """Return the possible questions for the team of a sketch, or of files.
 
     Raises:
@@ -75,7 +75,7 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
     usual = tuple(name for name in (chosen, beside) if name in names)
     family = None if files else family_of(sketch)
     partial = Facts(team).partially_known
-    return Possible(fit, usual, team.kind == ProblemKind.DISWCSP, family, ordered=partial)
+    return PossibleQuestions(fit, usual, team.kind == ProblemKind.DISWCSP, family, ordered=partial)
 
 
 def folder_of(sketch: Sketch) -> str:
@@ -83,19 +83,19 @@ def folder_of(sketch: Sketch) -> str:
     return sketch.name if is_name(sketch.name) and len(sketch.name) <= MAX_LABEL else "team"
 
 
-def number_of_runs(question: Question, family: Family | None) -> int:
+def number_of_runs(question: StudyQuestion, family: Family | None) -> int:
     """Return the total number of runs."""
     kinds = family.points if question.family and family else 1
     return len(question.protocols) * question.runs * kinds
 
 
-def title_of(sketch: Sketch, question: Question) -> str:
+def title_of(sketch: Sketch, question: StudyQuestion) -> str:
     """Return the title of the report."""
     key = "compare.title-family" if question.family else "compare.title-team"
     return say(key, protocols=listed(question.protocols), team=folder_of(sketch))
 
 
-def study_of(sketch: Sketch, question: Question, family: Family | None) -> str:
+def study_of(sketch: Sketch, question: StudyQuestion, family: Family | None) -> str:
     """Return the TOML text of the study."""
     seeds = f"1..{question.runs}"
     runs: dict[str, object] = {"protocol": [*question.protocols]}

@@ -21,7 +21,7 @@ from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.studies.families import family_of
-from robochoc.app.studies.question import Question, folder_of, number_of_runs, study_of
+from robochoc.app.studies.question import StudyQuestion, folder_of, number_of_runs, study_of
 from robochoc.experiments.task import Status
 from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.modelling.errors import ModelError
@@ -36,7 +36,7 @@ _MAX_MESSAGE = 2_000
 _FINISHED = frozenset({Status.DONE, Status.ENDED})
 
 
-class Stage(StrEnum):
+class StudyStage(StrEnum):
     """The stage of a study."""
 
     PREPARING = "preparing"
@@ -47,7 +47,7 @@ class Stage(StrEnum):
     FAILED = "failed"
 
 
-ENDED = frozenset({Stage.DONE, Stage.STOPPED, Stage.FAILED})
+ENDED = frozenset({StudyStage.DONE, StudyStage.STOPPED, StudyStage.FAILED})
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -65,16 +65,16 @@ class Line(msgspec.Struct, frozen=True):
 class StudyState(msgspec.Struct):
     """The state of a study, with the results of each protocol in `lines`."""
 
-    question: Question
+    question: StudyQuestion
     text: str
     total: int
     done: int = 0
-    stage: Stage = Stage.PREPARING
+    stage: StudyStage = StudyStage.PREPARING
     message: str = ""
     lines: list[Line] = []
 
 
-class Study:
+class TeamStudy:
     """The study of a team: one at a time; the last one is saved."""
 
     def __init__(self, project: Project) -> None:
@@ -93,9 +93,9 @@ class Study:
     def report(self) -> Path | None:
         """The report, if there is one."""
         file = self._folder / REPORT
-        return file if self.facts and self.facts.stage == Stage.DONE and file.is_file() else None
+        return file if self.facts and self.facts.stage == StudyStage.DONE and file.is_file() else None
 
-    def start(self, sketch: Sketch, question: Question, files: TeamFiles | None = None) -> None:
+    def start(self, sketch: Sketch, question: StudyQuestion, files: TeamFiles | None = None) -> None:
         """Start a study of the team of a sketch or of files. Results of equal earlier runs are reused."""
         if self.running:
             return
@@ -127,33 +127,33 @@ class Study:
             if not self._is_stopped(job, facts):
                 self._run(facts, job)
         except (ModelError, InvalidInputError, ValueError, sqlite3.Error) as error:
-            self._set_stage(facts, Stage.FAILED, str(error))
+            self._set_stage(facts, StudyStage.FAILED, str(error))
 
     def _run(self, facts: StudyState, job: Job[None]) -> None:
-        self._set_stage(facts, Stage.RUNNING)
+        self._set_stage(facts, StudyStage.RUNNING)
         finished = self._command(job, "run", STUDY, "-o", ROWS)
         facts.done = self._rows()
         if self._is_stopped(job, facts):
             return
         if finished.status:
-            self._set_stage(facts, Stage.FAILED, _error_of(finished))
+            self._set_stage(facts, StudyStage.FAILED, _error_of(finished))
             return
-        self._set_stage(facts, Stage.REPORTING)
+        self._set_stage(facts, StudyStage.REPORTING)
         facts.lines = lines_of(self._folder / ROWS, facts.question.protocols)
         (self._folder / REPORT).unlink(missing_ok=True)
         reported = self._command(job, "report", ROWS, "-o", REPORT)
         if not self._is_stopped(job, facts):
-            self._set_stage(facts, Stage.DONE, _error_of(reported) if reported.status else "")
+            self._set_stage(facts, StudyStage.DONE, _error_of(reported) if reported.status else "")
 
     def _is_stopped(self, job: Job[None], facts: StudyState) -> bool:
         """Return whether the study was stopped; if so, set its stage."""
         stopped = job.stopped_at is not None
         if stopped:
-            self._set_stage(facts, Stage.STOPPED)
+            self._set_stage(facts, StudyStage.STOPPED)
         return stopped
 
     def _interrupted(self, facts: StudyState, why: str) -> None:
-        self._set_stage(facts, Stage.FAILED if why else Stage.STOPPED, why)
+        self._set_stage(facts, StudyStage.FAILED if why else StudyStage.STOPPED, why)
 
     def _prepare(self, sketch: Sketch, files: TeamFiles | None, facts: StudyState) -> None:
         self._folder.mkdir(mode=0o700, exist_ok=True)  # without parents: if they do not exist, the team was removed
@@ -187,7 +187,7 @@ class Study:
         except sqlite3.Error:  # the file is being created
             return self.facts.done if self.facts else 0
 
-    def _set_stage(self, facts: StudyState, stage: Stage, message: str = "") -> None:
+    def _set_stage(self, facts: StudyState, stage: StudyStage, message: str = "") -> None:
         if facts.stage in ENDED:
             return
         facts.message, facts.stage = message, stage
@@ -233,6 +233,6 @@ def _opened(file: Path) -> Iterator[sqlite3.Connection]:
         yield rows
 
 
-def study_on(project: Project) -> Study:
+def study_on(project: Project) -> TeamStudy:
     """Return the study of a team; the same object for all pages."""
-    return project.part(Study)
+    return project.part(TeamStudy)

@@ -6,19 +6,19 @@ from collections.abc import Iterator
 
 import pytest
 
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.leftovers import shared_by_tests
 
 
 @pytest.fixture(scope="package")
-def teams(tmp_path_factory: pytest.TempPathFactory) -> Store:
+def teams(tmp_path_factory: pytest.TempPathFactory) -> TeamStore:
     """The teams of the application."""
-    return Store(tmp_path_factory.mktemp("app") / "teams")
+    return TeamStore(tmp_path_factory.mktemp("app") / "teams")
 
 
 @pytest.fixture(scope="package")
-def application(teams: Store) -> Iterator[AppServer]:
+def application(teams: TeamStore) -> Iterator[AppServer]:
     """The application. Each test adds teams of its own to `teams`."""
     with shared_by_tests(with_children=True):
         running = AppServer(teams.folder)

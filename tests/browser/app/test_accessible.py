@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.app.pages.shell import AREAS
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, Page, connected, watched_page
 from tests.support.cases import cases
@@ -51,7 +51,9 @@ def _found(page: Page, axe: str) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("area", SHOWN, ids=lambda area: area or "gallery")
-def test_nothing_serious_is_found(browser: Browser, application: AppServer, teams: Store, axe: str, area: str) -> None:
+def test_nothing_serious_is_found(
+    browser: Browser, application: AppServer, teams: TeamStore, axe: str, area: str
+) -> None:
     team = teams.add(cube())
     kept_run(teams.path(team), cube())
     with watched_page(browser, reduced_motion="reduce") as tab, cases() as each:

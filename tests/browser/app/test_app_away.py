@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer, app_server
 from tests.support.browser_pages import Browser, Page, connected, watched_page
 from tests.support.limits import wait_until
@@ -19,13 +19,13 @@ AWAY, BACK = "#popup[aria-hidden=false]", "#popup[aria-hidden=true]"
 SAYS = "getComputedStyle(document.getElementById('popup'), '::after').content"
 
 
-def _renamed(page: Page, teams: Store, team: str, name: str) -> None:
+def _renamed(page: Page, teams: TeamStore, team: str, name: str) -> None:
     page.fill(NAME, name)
     wait_until(lambda: teams.load(team).now.name == name, lambda: f"it is {teams.load(team).now.name} still")
 
 
 def test_a_server_that_was_killed_and_begun_again_has_all_that_was_saved(browser: Browser, tmp_path: Path) -> None:
-    teams = Store(tmp_path / "teams")
+    teams = TeamStore(tmp_path / "teams")
     team = teams.add(Sketch("first"))
     first = AppServer(teams.folder)
     with watched_page(browser, may_complain=True) as old, watched_page(browser, may_complain=True) as new:
@@ -46,7 +46,7 @@ def test_a_server_that_was_killed_and_begun_again_has_all_that_was_saved(browser
 
 @pytest.mark.slow
 def test_a_server_that_sleeps_for_longer_than_pages_wait_comes_back(browser: Browser, tmp_path: Path) -> None:
-    teams = Store(tmp_path / "teams")
+    teams = TeamStore(tmp_path / "teams")
     team = teams.add(Sketch("first"))
     with app_server(teams.folder) as server, watched_page(browser, may_complain=True) as tab:
         connected(tab.page, f"{server.url}team/{team}/model")
@@ -65,7 +65,7 @@ def test_a_server_that_sleeps_for_longer_than_pages_wait_comes_back(browser: Bro
 
 @pytest.mark.slow
 def test_a_browser_without_a_network_for_a_while_comes_back(browser: Browser, tmp_path: Path) -> None:
-    teams = Store(tmp_path / "teams")
+    teams = TeamStore(tmp_path / "teams")
     team = teams.add(Sketch("first"))
     context = browser.new_context()
     try:

@@ -10,9 +10,9 @@ import msgspec
 import pytest
 
 from robochoc.app.runs.runs import Runs
-from robochoc.app.sketch.examples import example
-from robochoc.app.sketch.sketch import Decision, Kind, Sketch
-from robochoc.app.store import Store
+from robochoc.app.sketch.example_sketches import example
+from robochoc.app.sketch.sketch import Decision, DecisionKind, Sketch
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer, app_server
 from tests.support.browser_pages import Browser, WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
@@ -31,7 +31,7 @@ def _told(tab: WatchedPage, words: str) -> None:
     tab.page.wait_for_selector(f"{HEADLINE}:has-text({words!r})")
 
 
-def test_a_team_decides_and_another_tab_sees_it(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_team_decides_and_another_tab_sees_it(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(slots(5, 5))
     with watched_page(browser, reduced_motion="reduce") as one, watched_page(browser) as other:
         _opened(one, application, team)
@@ -49,7 +49,7 @@ def test_a_team_decides_and_another_tab_sees_it(browser: Browser, application: A
 
 
 def test_a_short_conversation_is_played_slowly_and_in_steps(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team = teams.add(slots(5, 5))
     with watched_page(browser, reduced_motion="no-preference") as tab:
@@ -79,7 +79,7 @@ def _at(tab: WatchedPage, message: int) -> None:
     tab.page.wait_for_selector(f".where:text-is('{message} of 38 messages')")
 
 
-def test_a_long_search_is_watched_and_stopped(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_long_search_is_watched_and_stopped(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(slots(14, 14))
     with watched_page(browser) as tab:
         _opened(tab, application, team)
@@ -91,7 +91,7 @@ def test_a_long_search_is_watched_and_stopped(browser: Browser, application: App
         _told(tab, "It was stopped; this is the best so far. It costs 105.")
 
 
-def test_a_double_click_begins_once(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_double_click_begins_once(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(slots(14, 14))
     with watched_page(browser) as tab:
         _opened(tab, application, team)
@@ -102,7 +102,7 @@ def test_a_double_click_begins_once(browser: Browser, application: AppServer, te
         assert len(Runs(_Team(slots(14, 14), teams.path(team))).all()) == 1
 
 
-def test_rules_that_are_in_the_way_are_clicked_away(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_rules_that_are_in_the_way_are_clicked_away(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(slots(3, 2))
     with watched_page(browser, {"width": 360, "height": 740}, reduced_motion="reduce") as tab:
         _opened(tab, application, team)
@@ -124,7 +124,7 @@ def test_rules_that_are_in_the_way_are_clicked_away(browser: Browser, applicatio
         tab.page.wait_for_selector(".costs >> text=Together: 3")
 
 
-def test_places_are_shown_on_the_map(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_places_are_shown_on_the_map(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(example("coverage"))
     with watched_page(browser, {"width": 360, "height": 740}, color_scheme="dark") as tab:
         _opened(tab, application, team)
@@ -137,10 +137,10 @@ def test_places_are_shown_on_the_map(browser: Browser, application: AppServer, t
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
 
 
-def test_hostile_values_are_text(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_hostile_values_are_text(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     hostile = "<img src=x onerror=alert(1)>"
     sketch = slots(2, 2, little=False)
-    sketch = msgspec.structs.replace(sketch, decisions=(Decision("slot", Kind.TASK, (hostile, "{{7*7}}'\"")),))
+    sketch = msgspec.structs.replace(sketch, decisions=(Decision("slot", DecisionKind.TASK, (hostile, "{{7*7}}'\"")),))
     team = teams.add(sketch)
     with watched_page(browser) as tab:
         _opened(tab, application, team)
@@ -150,7 +150,7 @@ def test_hostile_values_are_text(browser: Browser, application: AppServer, teams
         assert tab.page.locator("main img").count() == 0
 
 
-def test_a_team_that_is_not_ready_says_so(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_team_that_is_not_ready_says_so(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(Sketch("nobody"))
     with watched_page(browser) as tab:
         _opened(tab, application, team)
@@ -160,7 +160,7 @@ def test_a_team_that_is_not_ready_says_so(browser: Browser, application: AppServ
 
 @pytest.mark.slow
 def test_a_server_that_is_killed_leaves_no_process(browser: Browser, tmp_path: Path) -> None:
-    teams = Store(tmp_path)
+    teams = TeamStore(tmp_path)
     sketch = slots(14, 14)
     team = teams.add(sketch)
     with watched_page(browser, may_complain=True) as tab:

@@ -11,8 +11,8 @@ from urllib.request import urlopen
 import msgspec
 import pytest
 
-from robochoc.app.sketch.sketch import Kind, SketchRule
-from robochoc.app.store import Store
+from robochoc.app.sketch.sketch import DecisionKind, SketchRule
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, WatchedPage, app_page, connected, watched_page
 from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided
@@ -31,7 +31,7 @@ def _numbers(tab: WatchedPage) -> tuple[float, int, float]:
 
 
 def test_from_a_finished_run_to_scene_and_conversation_in_step(
-    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:
     team, run = decided(teams, cube(3, "Trio"))
     with app_page(browser, f"{application.url}team/{team.id}/fly", reduced_motion="reduce") as tab:
@@ -76,7 +76,7 @@ def test_from_a_finished_run_to_scene_and_conversation_in_step(
 
 
 def test_a_report_opens_by_itself_without_a_network(
-    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:
     sketch = msgspec.structs.replace(cube(2, "Duo"), story=HOSTILE)
     team, _ = decided(teams, sketch)
@@ -105,9 +105,9 @@ def test_a_report_opens_by_itself_without_a_network(
 
 
 def test_who_decides_no_place_does_not_fly_and_is_told_why(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
-    team, _ = decided(teams, cube(2, "Slots", Kind.SLOT))
+    team, _ = decided(teams, cube(2, "Slots", DecisionKind.SLOT))
     with app_page(
         browser, f"{application.url}team/{team.id}/fly", {"width": 360, "height": 800}, color_scheme="dark"
     ) as tab:
@@ -120,16 +120,18 @@ def test_who_decides_no_place_does_not_fly_and_is_told_why(
         tab.page.wait_for_url("**/model")
 
 
-def test_where_nobody_says_a_word_no_page_is_waited_for(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_where_nobody_says_a_word_no_page_is_waited_for(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     never = SketchRule("R1", "never", "level", settings={"value": 1})
-    team, _ = decided(teams, msgspec.structs.replace(cube(1, "Alone", Kind.SLOT), rules=(never,)))
+    team, _ = decided(teams, msgspec.structs.replace(cube(1, "Alone", DecisionKind.SLOT), rules=(never,)))
     with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         tab.page.wait_for_selector(READY)
         assert tab.page.locator("text=The pages are being read.").count() == 0
 
 
 def test_a_flight_that_is_looked_at_stays_where_it_is_as_the_conversation_comes(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team, _ = decided(teams, cube(2, "Duo"))
     with watched_page(browser) as tab:
@@ -166,7 +168,7 @@ PARTS: list[tuple[list[tuple[int | None, int]], int, list[float], float, list[tu
 
 
 def test_they_talk_then_fly_epoch_by_epoch(browser: Browser) -> None:
-    source = (files("robochoc.app.pages.fly") / "stage.js").read_text(encoding="utf-8")
+    source = (files("robochoc.app.pages.fly") / "frames.js").read_text(encoding="utf-8")
     script = source.partition("export default")[0].replace("export function", "function")
     with watched_page(browser) as tab:
         for runs, steps, begins, duration, expected in PARTS:
@@ -180,7 +182,7 @@ def test_they_talk_then_fly_epoch_by_epoch(browser: Browser) -> None:
             assert [one["begins"] for one in parts[1:]] == [one["ends"] for one in parts[:-1]]
 
 
-def test_what_has_not_decided_is_sent_to_decide(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_what_has_not_decided_is_sent_to_decide(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     with app_page(browser, f"{application.url}team/{teams.add(cube())}/fly") as tab:
         tab.page.wait_for_selector("text=Nothing has been decided yet.")
         tab.page.click("text=Go to Decide")
@@ -188,7 +190,7 @@ def test_what_has_not_decided_is_sent_to_decide(browser: Browser, application: A
 
 
 def test_the_state_is_opened_from_the_gallery(
-    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:
     team, _ = decided(teams, cube(2, "Moved"))
     state = tmp_path / "Moved.robochoc.zip"
@@ -205,7 +207,7 @@ def test_the_state_is_opened_from_the_gallery(
         tab.page.wait_for_selector(READY)
 
 
-def test_nothing_else_is_served(application: AppServer, teams: Store) -> None:
+def test_nothing_else_is_served(application: AppServer, teams: TeamStore) -> None:
     team = teams.add(cube(2))
     kept_run(teams.path(team), cube(2))
     for path in ("00001/run.json", "00001/flight.html", "00009/report.html"):

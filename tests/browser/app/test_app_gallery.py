@@ -10,9 +10,9 @@ from typing import Any
 
 from robochoc.app.error_log import ERRORS
 from robochoc.app.sketch import files
-from robochoc.app.sketch.examples import examples, title_of
+from robochoc.app.sketch.example_sketches import examples, title_of
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from robochoc.app.texts import say
 from robochoc.system.temporary_files import temporary_folder
 from tests.support.app_server import AppServer
@@ -34,14 +34,14 @@ def _sent(tab: WatchedPage, file: Path) -> None:
     tab.page.set_input_files("input[type=file]", str(file))
 
 
-def test_an_example_becomes_a_team_of_the_users_own(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_an_example_becomes_a_team_of_the_users_own(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     with app_page(browser, application.url) as tab:
         tab.page.click(f"text={title_of('charging')}")
         assert teams.load(_made(tab)).now == examples()["charging"]
 
 
 def test_a_team_that_was_saved_comes_back_from_its_archive(
-    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:
     sketch = examples()["patrol"]
     archive = tmp_path / "patrol.zip"
@@ -54,7 +54,7 @@ def test_a_team_that_was_saved_comes_back_from_its_archive(
 
 
 def test_files_of_another_tool_are_opened_as_what_they_are(
-    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:
     file = tmp_path / "graph.yaml"
     file.write_text(
@@ -65,10 +65,10 @@ def test_files_of_another_tool_are_opened_as_what_they_are(
         _sent(tab, file)
         name = _made(tab)
         tab.page.wait_for_selector("text=This team was not drawn here")
-        assert f"robochoc solve {teams.foreign(name)}" in tab.page.inner_text(".command-text")
+        assert f"robochoc solve {teams.import_folder(name)}" in tab.page.inner_text(".command-text")
         assert "graph.yaml" in tab.page.inner_text("main")
         tab.page.wait_for_selector("text=What it keeps to")
-    foreign = teams.foreign(name)
+    foreign = teams.import_folder(name)
     assert foreign is not None
     assert [robot.name for robot in teams.load(name).now.robots] == sorted(one.stem for one in foreign.glob("*.xml"))
 
@@ -104,7 +104,7 @@ def test_an_archive_that_leads_out_of_its_folder_writes_nothing_there(
     assert [place for place in places if place.exists()] == []
 
 
-def test_a_team_is_removed_when_that_is_confirmed(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_team_is_removed_when_that_is_confirmed(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(Sketch("unwanted"))
     with app_page(browser, application.url) as tab:
         tab.page.click("[aria-label='Remove unwanted']")
@@ -117,7 +117,7 @@ def test_a_team_is_removed_when_that_is_confirmed(browser: Browser, application:
 
 
 def test_text_in_place_of_a_file_is_refused_with_a_sentence(
-    browser: Browser, application: AppServer, teams: Store, tmp_path: Path
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
 ) -> None:
     wrong = tmp_path / "wrong.txt"
     wrong.write_text("no team")

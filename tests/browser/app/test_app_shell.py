@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer, app_server
 from tests.support.browser_pages import Browser, app_page, connected, watched_page
 from tests.support.cases import looped
@@ -20,11 +20,13 @@ NAME = "[aria-label='Name of the team']"
 UNDO, REDO = "[aria-label^='Undo']", "[aria-label^='Redo']"
 
 
-def _saved(teams: Store, team: str, name: str) -> None:
+def _saved(teams: TeamStore, team: str, name: str) -> None:
     wait_until(lambda: teams.load(team).now.name == name, lambda: f"it is {teams.load(team).now.name} still")
 
 
-def test_a_team_is_renamed_undone_and_seen_in_both_tabs(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_team_is_renamed_undone_and_seen_in_both_tabs(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     team = teams.add(Sketch("first"))
     with watched_page(browser) as one, watched_page(browser) as other:
         for tab in (one, other):
@@ -46,7 +48,7 @@ def test_a_team_is_renamed_undone_and_seen_in_both_tabs(browser: Browser, applic
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_light_or_dark_is_kept_from_page_to_page(
-    browser: Browser, application: AppServer, teams: Store, scheme: str
+    browser: Browser, application: AppServer, teams: TeamStore, scheme: str
 ) -> None:
     team = teams.add(Sketch("first"))
     chosen = "light" if scheme == "dark" else "dark"
@@ -67,7 +69,9 @@ def test_light_or_dark_is_kept_from_page_to_page(
             tab.page.evaluate("localStorage.clear()")
 
 
-def test_what_can_be_no_name_is_told_where_it_was_typed(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_what_can_be_no_name_is_told_where_it_was_typed(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     team = teams.add(Sketch("first"))
     with app_page(browser, f"{application.url}team/{team}/model") as tab:
         for name in (" ", "<script>alert(1)</script>", "a b", "{{7*7}}", "scenario", "ä", "1st"):
@@ -87,7 +91,7 @@ def test_a_team_that_there_is_not_is_told(browser: Browser, application: AppServ
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_whatever_ends_the_server_an_edit_is_kept(browser: Browser, tmp_path: Path, by: int) -> None:
-    teams = Store(tmp_path / "teams")
+    teams = TeamStore(tmp_path / "teams")
     team = teams.add(Sketch("first"))
     server = AppServer(teams.folder)
     with watched_page(browser, may_complain=True) as tab:
@@ -103,7 +107,7 @@ def test_whatever_ends_the_server_an_edit_is_kept(browser: Browser, tmp_path: Pa
 
 
 def test_a_damaged_team_does_not_keep_the_others_from_the_gallery(browser: Browser, tmp_path: Path) -> None:
-    teams = Store(tmp_path / "teams")
+    teams = TeamStore(tmp_path / "teams")
     teams.save(teams.add(Sketch()), History(Sketch("whole")))
     broken = teams.add(Sketch("broken"))
     (teams.path(broken) / "history.json").write_bytes(b"{")

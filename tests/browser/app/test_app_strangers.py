@@ -7,7 +7,7 @@ from http.client import HTTPConnection, HTTPResponse
 import pytest
 
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.limits import HANG_S
 
@@ -35,7 +35,7 @@ def _asked(application: AppServer, path: str, method: str = "GET", **headers: st
      "team/{up}/kept/00001/report.html", "team/{up}/study/report.html", "team/{up}/model", "lessons/{up}",
      "_nicegui/{up}/secret.txt", "team/{team}/kept/00001/history.json"],
 )  # fmt: skip
-def test_no_path_leads_out_of_what_is_served(application: AppServer, teams: Store, route: str) -> None:
+def test_no_path_leads_out_of_what_is_served(application: AppServer, teams: TeamStore, route: str) -> None:
     team = teams.add(Sketch(story=SECRET))
     (teams.folder / "secret.txt").write_text(SECRET)
     (teams.path(team) / "secret.txt").write_text(SECRET)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
-from robochoc.app.store import Store
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, Page, app_page, connected, watched_page
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABCD"))
-SLOT = Decision("slot", Kind.SLOT, (1, 2, 3, 4))
+SLOT = Decision("slot", DecisionKind.SLOT, (1, 2, 3, 4))
 TEAM = Sketch("team", Area(4, 1), ROBOTS, (SLOT,), (SketchRule("R1", "different", "slot"),))
 
 
@@ -17,7 +17,7 @@ def _asked(page: Page, application: AppServer, team: str) -> None:
     page.wait_for_selector("text=Runs of each")
 
 
-def test_two_protocols_are_compared(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_two_protocols_are_compared(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(TEAM)
     with watched_page(browser, {"width": 360, "height": 740}) as tab:
         page = tab.page
@@ -41,7 +41,7 @@ def test_two_protocols_are_compared(browser: Browser, application: AppServer, te
             page.wait_for_selector("text=There are no pictures")
 
 
-def test_a_study_is_stopped(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_study_is_stopped(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(TEAM)
     with watched_page(browser) as tab:
         _asked(tab.page, application, team)
@@ -53,7 +53,7 @@ def test_a_study_is_stopped(browser: Browser, application: AppServer, teams: Sto
         tab.page.wait_for_selector("button:has-text('Compare again'):not([disabled])")
 
 
-def test_what_has_to_be_mended_first_is_told(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_what_has_to_be_mended_first_is_told(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     nowhere = SketchRule("R1", "prefers", "slot", settings={})
     team = teams.add(Sketch("team", Area(4, 1), ROBOTS, (SLOT,), (nowhere,)))
     with app_page(browser, f"{application.url}team/{team}/compare") as tab:

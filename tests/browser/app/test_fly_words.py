@@ -6,10 +6,10 @@ import msgspec
 
 from robochoc.app.flights.flight_result import FLOWN, refused
 from robochoc.app.runs.options import JOURNAL, RunOptions
-from robochoc.app.runs.run import RECORD, Record, Run, State
+from robochoc.app.runs.run import RECORD, Record, Run, RunState
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRule
-from robochoc.app.store import Store
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRule
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, app_page, watched_page
 from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided
@@ -26,12 +26,12 @@ def walled() -> Sketch:
     for row in range(sketch.area.rows):
         sketch = edits.with_cell_blocked(sketch, Cell(3, row), blocked=True)
     places = tuple(sketch.area.number(Cell(6, row)) for row in (1, 2))
-    sketch = edits.with_decision(sketch, Decision("place", Kind.PLACE, places))
+    sketch = edits.with_decision(sketch, Decision("place", DecisionKind.PLACE, places))
     return edits.with_rule(sketch, SketchRule("", "different", "place"))
 
 
 def test_there_is_one_line_of_time_and_the_flight_begins_on_the_map(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team, run = decided(teams, walled())
     with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
@@ -66,7 +66,7 @@ def test_there_is_one_line_of_time_and_the_flight_begins_on_the_map(
         assert all(alone.page.evaluate(SHOWN, one) for one in ("line", "play", "clock"))
 
 
-def earlier(teams: Store, team: str, number: int, purpose: str, state: State = State.ENDED) -> Run:
+def earlier(teams: TeamStore, team: str, number: int, purpose: str, state: RunState = RunState.ENDED) -> Run:
     """Keep a copy of the first run for another purpose."""
     folder = teams.path(team) / "runs"
     place = folder / f"{number:05}"
@@ -78,10 +78,12 @@ def earlier(teams: Store, team: str, number: int, purpose: str, state: State = S
     return Run(place, record, cube())
 
 
-def test_runs_are_named_and_one_that_is_gone_is_told(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_runs_are_named_and_one_that_is_gone_is_told(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     team = teams.add(cube())
     (kept_run(teams.path(team), cube()).folder / JOURNAL).unlink()
-    earlier(teams, team, 2, "whatif", State.STOPPED)
+    earlier(teams, team, 2, "whatif", RunState.STOPPED)
     with app_page(browser, f"{application.url}team/{team}/fly?run=00042", {"width": 360, "height": 800}) as tab:
         page = tab.page
         page.wait_for_selector("text=The run 00042 is not kept any more")
@@ -96,7 +98,7 @@ def test_runs_are_named_and_one_that_is_gone_is_told(browser: Browser, applicati
 
 
 def test_a_flight_that_was_refused_says_why_and_is_tried_again(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team = teams.add(cube())
     run = kept_run(teams.path(team), cube())

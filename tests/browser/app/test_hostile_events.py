@@ -12,8 +12,8 @@ from random import Random
 
 import pytest
 
-from robochoc.app.sketch.examples import examples
-from robochoc.app.store import Store
+from robochoc.app.sketch.example_sketches import examples
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.examples import count
 from tests.support.hostile_client import HostileClient, faults_of_ours
@@ -42,7 +42,7 @@ def server(tmp_path: Path) -> Iterator[AppServer]:
         server.end(signal.SIGKILL)
 
 
-async def _attack(server: AppServer, teams: Store, chance: Random, events: int) -> None:
+async def _attack(server: AppServer, teams: TeamStore, chance: Random, events: int) -> None:
     aiohttp = pytest.importorskip("aiohttp")
     sketches = [*examples().values()]
     async with aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(HANG_S)) as session:
@@ -59,7 +59,7 @@ async def _attack(server: AppServer, teams: Store, chance: Random, events: int) 
 @count("events", 100, 3_000)
 def test_events_that_no_page_sends_break_nothing(server: AppServer, tmp_path: Path, events: int) -> None:
     before = _memory_kb(server)
-    attack = partial(_attack, server, Store(tmp_path / "teams"), Random(SEED), events)
+    attack = partial(_attack, server, TeamStore(tmp_path / "teams"), Random(SEED), events)
     with ThreadPoolExecutor(1) as thread:  # Playwright keeps the loop of this one, after tests with a browser
         thread.submit(lambda: asyncio.run(attack())).result()
     assert _memory_kb(server) - before < MOST_GROWN_KB

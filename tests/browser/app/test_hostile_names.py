@@ -6,8 +6,8 @@ from http.client import HTTPConnection
 from itertools import product
 
 from robochoc.app.sketch.history import History
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
-from robochoc.app.store import Store
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
+from robochoc.app.store import TeamStore
 from robochoc.app.texts import say
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, connected, watched_page
@@ -25,7 +25,10 @@ SCRIPTS = (f'<img src=x onerror="{PAINTED}">', f'x" :onx="{PAINTED}" innerHTML="
 def _sketch(text: str) -> Sketch:
     """A sketch that has `text` wherever a text can stand. No edit makes it: somebody has written the file."""
     robots = tuple(SketchRobot(f"{text}{number}", Cell(number, 0)) for number in range(3))
-    slot, task = Decision(f"{text}s", Kind.SLOT, (1, 2, 3)), Decision(f"{text}t", Kind.TASK, (text, f"{text}2"))
+    slot, task = (
+        Decision(f"{text}s", DecisionKind.SLOT, (1, 2, 3)),
+        Decision(f"{text}t", DecisionKind.TASK, (text, f"{text}2")),
+    )
     rules = (
         SketchRule(f"{text}a", "different", slot.name),
         SketchRule(f"{text}b", "only", task.name, (robots[0].name,), {"values": [text]}),
@@ -34,13 +37,13 @@ def _sketch(text: str) -> Sketch:
     return Sketch(text, Area(4, 2), robots, (slot, task), rules, text)
 
 
-def _kept(teams: Store, text: str) -> str:
+def _kept(teams: TeamStore, text: str) -> str:
     team = teams.add(Sketch())
     teams.save(team, History(_sketch(text)))
     return team
 
 
-def test_no_name_is_executed(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_no_name_is_executed(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     with watched_page(browser, may_complain=True) as tab, cases() as each:
         for text, area in product(SCRIPTS, ("", *AREAS)):
             with each((area, text)):
@@ -55,7 +58,7 @@ def test_no_name_is_executed(browser: Browser, application: AppServer, teams: St
                 teams.remove(team)
 
 
-def test_no_name_breaks_a_page(application: AppServer, teams: Store) -> None:
+def test_no_name_breaks_a_page(application: AppServer, teams: TeamStore) -> None:
     connection = HTTPConnection("127.0.0.1", application.port, timeout=HANG_S)
     for number, text in enumerate(TEXTS):
         team = _kept(teams, text)

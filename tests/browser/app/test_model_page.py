@@ -6,14 +6,14 @@ import zipfile
 from collections.abc import Callable
 from typing import Any
 
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
-from robochoc.app.store import Store
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, Page, WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
 
 HOSTILE = """<img src=x onerror="alert(1)">'"`${1}{{1}}\\"""
-LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3))
+LEVEL = Decision("level", DecisionKind.LEVEL, (1, 2, 3))
 
 
 def drones(count: int, columns: int = 8) -> tuple[SketchRobot, ...]:
@@ -28,7 +28,7 @@ def opened(tab: WatchedPage, application: AppServer, team: str) -> Any:  # noqa:
     return tab.page
 
 
-def becomes(teams: Store, team: str, holds: Callable[[Sketch], bool]) -> Sketch:
+def becomes(teams: TeamStore, team: str, holds: Callable[[Sketch], bool]) -> Sketch:
     """Wait until what is on disk is so."""
     wait_until(lambda: holds(teams.load(team).now), lambda: f"it is {teams.load(team).now}")
     return teams.load(team).now
@@ -47,7 +47,7 @@ def pick(page: Page, rule: str) -> None:
 
 
 def test_five_drones_and_five_charging_slots_are_modelled_by_clicks(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team = teams.add(Sketch("charging"))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
@@ -56,7 +56,7 @@ def test_five_drones_and_five_charging_slots_are_modelled_by_clicks(
             click_cell(page, number, 2)
             page.wait_for_selector(f"[data-robot=Drone{number + 1}]")
         page.get_by_role("button", name="Add a decision: Slot").click()
-        becomes(teams, team, lambda sketch: sketch.decisions == (Decision("slot", Kind.SLOT, (1, 2, 3, 4, 5)),))
+        becomes(teams, team, lambda sketch: sketch.decisions == (Decision("slot", DecisionKind.SLOT, (1, 2, 3, 4, 5)),))
         page.get_by_role("button", name="Select", exact=True).click()
         page.wait_for_selector("[data-robot=Drone5].chosen")  # since it was added: rules are for all
         pick(page, "All different")
@@ -103,7 +103,7 @@ OLD_ROBOTS = """async () => {
 
 
 def test_keys_are_not_undone_by_updates_that_were_under_way(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team = teams.add(Sketch("fast", robots=drones(1)))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
@@ -114,7 +114,7 @@ def test_keys_are_not_undone_by_updates_that_were_under_way(
         becomes(teams, team, lambda sketch: sketch.robots[0].at == Cell(2, 2))
 
 
-def test_a_team_is_modelled_by_keys_alone(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_team_is_modelled_by_keys_alone(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(Sketch("keys"))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
         page = opened(tab, application, team)
@@ -152,7 +152,9 @@ def test_a_team_is_modelled_by_keys_alone(browser: Browser, application: AppServ
         page.wait_for_function("document.activeElement.matches('[data-robot=Drone2]')")
 
 
-def test_robots_are_dragged_and_both_tabs_stay_in_step(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_robots_are_dragged_and_both_tabs_stay_in_step(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     team = teams.add(Sketch("drag", robots=drones(2), decisions=(LEVEL,)))
     with watched_page(browser) as one, watched_page(browser) as other:
         page, there = opened(one, application, team), opened(other, application, team)
@@ -173,7 +175,7 @@ def test_robots_are_dragged_and_both_tabs_stay_in_step(browser: Browser, applica
         )
 
 
-def test_cells_under_links_can_be_clicked(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_cells_under_links_can_be_clicked(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     corners = tuple(SketchRobot(f"At{x}{y}", Cell(x, y)) for x, y in ((0, 0), (7, 0), (0, 5), (7, 5)))
     rules = (
         SketchRule("R1", "at-most", "level", (), {"value": 1, "count": 1}),
@@ -200,9 +202,9 @@ def test_cells_under_links_can_be_clicked(browser: Browser, application: AppServ
         page.wait_for_selector(".rule.opened >> text=all robots choose different values")
 
 
-def test_what_is_wrong_is_told_where_it_is(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_what_is_wrong_is_told_where_it_is(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     rules = (SketchRule("R1", "apart", "level", (), {"gap": 9}), SketchRule("R2", "only", "level", ("Drone1",)))
-    slot = Decision("slot", Kind.SLOT, (1,), ("Ghost", "Drone1"))
+    slot = Decision("slot", DecisionKind.SLOT, (1,), ("Ghost", "Drone1"))
     blocked = Area(8, 6, frozenset({Cell(0, 0)}))
     team = teams.add(Sketch("wrong", blocked, drones(2), (LEVEL, slot), rules))
     with watched_page(browser) as tab:
@@ -226,9 +228,11 @@ def test_what_is_wrong_is_told_where_it_is(browser: Browser, application: AppSer
     assert teams.load(team).now.area.columns == 8
 
 
-def test_hostile_words_stay_words(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_hostile_words_stay_words(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     task = Decision(
-        "task", Kind.TASK, (HOSTILE, "```\N{LEFT-POINTING ANGLE BRACKET}", "</textarea><script>alert(1)</script>")
+        "task",
+        DecisionKind.TASK,
+        (HOSTILE, "```\N{LEFT-POINTING ANGLE BRACKET}", "</textarea><script>alert(1)</script>"),
     )
     rules = (
         SketchRule("R1", "never", "task", (), {"value": HOSTILE}),
@@ -262,7 +266,7 @@ def test_hostile_words_stay_words(browser: Browser, application: AppServer, team
 
 
 def test_121_robots_on_a_large_map_are_drawn_and_dragged(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     rules = (
         SketchRule("R1", "different", "level"),
@@ -279,9 +283,9 @@ def test_121_robots_on_a_large_map_are_drawn_and_dragged(
         becomes(teams, team, lambda sketch: sketch.robots[120].at == Cell(10, 11))
 
 
-def test_a_large_table_is_clicked_together_by_keys(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_large_table_is_clicked_together_by_keys(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     rules = (SketchRule("R1", "table", "level", ("Drone1", "Drone2"), {"rows": [[1, 1]]}),)
-    levels = Decision("level", Kind.LEVEL, tuple(range(1, 101)))
+    levels = Decision("level", DecisionKind.LEVEL, tuple(range(1, 101)))
     team = teams.add(Sketch("pairs", robots=drones(2), decisions=(levels,), rules=rules))
     with watched_page(browser) as tab:
         page = opened(tab, application, team)
@@ -301,10 +305,10 @@ def test_a_large_table_is_clicked_together_by_keys(browser: Browser, application
 
 
 def test_a_range_becomes_what_its_start_became_before_the_server_has_answered(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     rules = (SketchRule("R1", "table", "level", ("Drone1", "Drone2"), {"rows": [[1, 1]]}),)
-    levels = Decision("level", Kind.LEVEL, tuple(range(1, 6)))
+    levels = Decision("level", DecisionKind.LEVEL, tuple(range(1, 6)))
     team = teams.add(Sketch("pairs", robots=drones(2), decisions=(levels,), rules=rules))
     with watched_page(browser) as tab:
         page = opened(tab, application, team)
@@ -322,9 +326,9 @@ def test_a_range_becomes_what_its_start_became_before_the_server_has_answered(
 
 
 def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
-    place = Decision("place", Kind.PLACE, (40,))
+    place = Decision("place", DecisionKind.PLACE, (40,))
     rules = (
         SketchRule("R1", "prefers", "level", ("Drone1",), {"value": 1}, 3),
         SketchRule("R2", "apart", "level", (), {"gap": 1}),
@@ -348,12 +352,14 @@ def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
         assert page.get_by_role("switch", name="Private").get_attribute("aria-disabled") == "true"
 
 
-def test_a_narrow_screen_needs_no_scrolling_to_the_side(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_narrow_screen_needs_no_scrolling_to_the_side(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     rules = (
         SketchRule("R1", "apart", "level", (), {"gap": 1}, 3),
         SketchRule("R2", "table", "level", ("Drone1", "Drone2")),
     )
-    levels = Decision("level", Kind.LEVEL, tuple(range(30)))
+    levels = Decision("level", DecisionKind.LEVEL, tuple(range(30)))
     team = teams.add(Sketch("narrow", Area(60, 20), drones(9), (levels,), rules))
     with watched_page(browser, {"width": 360, "height": 740}) as tab:
         page = opened(tab, application, team)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from robochoc.app.sketch.sketch import Cell, SketchRobot
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, Page, connected, watched_page
 from tests.support.limits import HANG_S, wait_until
@@ -58,7 +58,9 @@ class Newcomer:
         self.page.wait_for_selector(".robot.chosen", state="detached")
 
 
-def test_from_the_gallery_to_a_report(browser: Browser, application: AppServer, teams: Store, tmp_path: Path) -> None:
+def test_from_the_gallery_to_a_report(
+    browser: Browser, application: AppServer, teams: TeamStore, tmp_path: Path
+) -> None:
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
         page, newcomer = tab.page, Newcomer(tab.page)
         connected(page, application.url)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
-from robochoc.app.store import Store
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
+from robochoc.app.store import TeamStore
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import Browser, app_page, connected, watched_page
 from tests.support.limits import wait_until
@@ -11,17 +11,17 @@ from tests.support.limits import wait_until
 ROBOTS = tuple(
     SketchRobot(name, Cell(place, place % 3)) for place, name in enumerate(("North", "East", "South", "West"))
 )
-LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3, 4))
+LEVEL = Decision("level", DecisionKind.LEVEL, (1, 2, 3, 4))
 DIFFERENT = SketchRule("R1", "different", "level")
 LITTLE = SketchRule("R2", "little", "level", (), {"step": 1})
 TEAM = Sketch("team", Area(5, 4), ROBOTS, (LEVEL,), (DIFFERENT,))
 
 
-def _names(teams: Store, team: str) -> list[str]:
+def _names(teams: TeamStore, team: str) -> list[str]:
     return [robot.name for robot in teams.load(team).now.robots]
 
 
-def test_one_fails_and_the_team_decides_again(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_one_fails_and_the_team_decides_again(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(TEAM)
     with app_page(browser, f"{application.url}team/{team}/whatif") as tab:
         page = tab.page
@@ -44,7 +44,7 @@ def test_one_fails_and_the_team_decides_again(browser: Browser, application: App
 
 
 def test_by_keyboard_alone_with_costs_and_two_changes_of_which_one_is_taken_back(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team = teams.add(Sketch("team", Area(5, 4), ROBOTS, (LEVEL,), (DIFFERENT, LITTLE)))
     with app_page(browser, f"{application.url}team/{team}/whatif", {"width": 360, "height": 740}) as tab:
@@ -64,7 +64,7 @@ def test_by_keyboard_alone_with_costs_and_two_changes_of_which_one_is_taken_back
 
 
 def test_it_happens_where_the_robot_is_by_two_clicks_or_by_keys(
-    browser: Browser, application: AppServer, teams: Store
+    browser: Browser, application: AppServer, teams: TeamStore
 ) -> None:
     team = teams.add(TEAM)
     with app_page(browser, f"{application.url}team/{team}/whatif", {"width": 360, "height": 740}) as tab:
@@ -93,7 +93,7 @@ def test_it_happens_where_the_robot_is_by_two_clicks_or_by_keys(
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
 
 
-def test_without_a_solution_there_are_ways_out(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_without_a_solution_there_are_ways_out(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(Sketch("team", Area(5, 4), ROBOTS, (LEVEL,), (DIFFERENT, LITTLE)))
     with app_page(browser, f"{application.url}team/{team}/whatif") as tab:
         page = tab.page
@@ -111,14 +111,16 @@ def test_without_a_solution_there_are_ways_out(browser: Browser, application: Ap
         wait_until(lambda: not teams.load(team).now.rules[0].on, lambda: str(teams.load(team).now.rules))
 
 
-def test_a_team_without_decisions_is_told_what_it_lacks(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_a_team_without_decisions_is_told_what_it_lacks(
+    browser: Browser, application: AppServer, teams: TeamStore
+) -> None:
     with watched_page(browser) as tab:
         for sketch in (Sketch("empty"), Sketch("idle", robots=ROBOTS)):
             connected(tab.page, f"{application.url}team/{teams.add(sketch)}/whatif")
             tab.page.wait_for_selector("text=nothing to decide yet")
 
 
-def test_what_cannot_happen_is_told_at_once(browser: Browser, application: AppServer, teams: Store) -> None:
+def test_what_cannot_happen_is_told_at_once(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(Sketch("team", Area(5, 4), ROBOTS[:1], (LEVEL,)))
     with app_page(browser, f"{application.url}team/{team}/whatif") as tab:
         tab.page.click("text=It fails")

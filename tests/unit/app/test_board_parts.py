@@ -13,9 +13,19 @@ from hypothesis import strategies as st
 
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError, with_rule, without_decision
-from robochoc.app.sketch.fits import why_no_cost, why_not_private
+from robochoc.app.sketch.rule_checks import why_no_cost, why_not_private
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import MAX_VALUES, Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule, Value
+from robochoc.app.sketch.sketch import (
+    MAX_VALUES,
+    Area,
+    Cell,
+    Decision,
+    DecisionKind,
+    Sketch,
+    SketchRobot,
+    SketchRule,
+    Value,
+)
 from robochoc.app.sketch.troubles import About
 from tests.support.cases import looped
 from tests.support.examples import examples
@@ -24,10 +34,10 @@ from tests.support.sketches import random_sketch
 pytest.importorskip("nicegui")
 
 from robochoc.app.pages.model import picture
-from robochoc.app.pages.model.clicks import with_cell_clicked, with_robot_clicked
 from robochoc.app.pages.model.desk import Desk
-from robochoc.app.pages.model.pair_table import filled
-from robochoc.app.pages.model.palette_menu import first_rule
+from robochoc.app.pages.model.page import with_cell_clicked, with_robot_clicked
+from robochoc.app.pages.model.rule_form import filled
+from robochoc.app.pages.model.rules_panel import first_rule
 from robochoc.app.pages.model.values import (
     first_values,
     free_decision_name,
@@ -39,7 +49,7 @@ from robochoc.app.pages.model.values import (
 if TYPE_CHECKING:
     from robochoc.app.projects import Project
 
-LEVEL, PLACE = Decision("level", Kind.LEVEL, (1, 2, 3)), Decision("place", Kind.PLACE)
+LEVEL, PLACE = Decision("level", DecisionKind.LEVEL, (1, 2, 3)), Decision("place", DecisionKind.PLACE)
 ROBOTS = tuple(SketchRobot(name, Cell(x, 0)) for x, name in enumerate(("North", "South", "East")))
 TEAM = Sketch("team", Area(4, 3), ROBOTS, (LEVEL, PLACE))
 
@@ -64,32 +74,32 @@ class Held:
     ],
 )
 def test_numbers_are_read_as_they_are_typed(text: str, values: tuple[int, ...]) -> None:
-    assert typed_values(Kind.LEVEL, text) == values
+    assert typed_values(DecisionKind.LEVEL, text) == values
 
 
 @looped("text", ["a", "1-", "1.5", "1-2-3", "\u0663", "9" * 30, "0-999999999", "1000001", "<b>"])
 def test_what_is_no_number_is_told(text: str) -> None:
     with pytest.raises(EditError):
-        typed_values(Kind.SLOT, text)
+        typed_values(DecisionKind.SLOT, text)
 
 
 def test_so_many_values_and_no_more() -> None:
-    assert len(typed_values(Kind.LEVEL, f"1-{MAX_VALUES}")) == MAX_VALUES
+    assert len(typed_values(DecisionKind.LEVEL, f"1-{MAX_VALUES}")) == MAX_VALUES
     with pytest.raises(EditError):
-        typed_values(Kind.LEVEL, f"1-{MAX_VALUES}, 0")
+        typed_values(DecisionKind.LEVEL, f"1-{MAX_VALUES}, 0")
 
 
 def test_names_stay_as_they_are_typed() -> None:
-    assert typed_values(Kind.TASK, " wash, <b>dry</b>, wash,, 1-5 ") == ("wash", "<b>dry</b>", "1-5")
+    assert typed_values(DecisionKind.TASK, " wash, <b>dry</b>, wash,, 1-5 ") == ("wash", "<b>dry</b>", "1-5")
     for text in ("x" * 61, "a\x00b", "a\u202eb"):
         with pytest.raises(EditError):
-            typed_values(Kind.TASK, text)
+            typed_values(DecisionKind.TASK, text)
 
 
 @given(st.lists(st.integers(-1000, 1000), unique=True))
 @examples(100)
 def test_numbers_that_are_written_are_read_again(values: list[int]) -> None:
-    assert typed_values(Kind.LEVEL, written_values(tuple(values))) == tuple(values)
+    assert typed_values(DecisionKind.LEVEL, written_values(tuple(values))) == tuple(values)
 
 
 def test_ranges_are_written_as_such() -> None:
@@ -98,7 +108,7 @@ def test_ranges_are_written_as_such() -> None:
 
 
 def test_a_decision_begins_with_something_to_choose_from() -> None:
-    for kind in Kind:
+    for kind in DecisionKind:
         sketch = Sketch(robots=ROBOTS, decisions=(Decision("it", kind, first_values(TEAM, kind, "one, two")),))
         assert troubles(sketch) == []
     assert free_decision_name(TEAM, "slot") == "slot"
@@ -120,7 +130,7 @@ def test_cells_are_those_of_the_named_place_alone() -> None:
 
 
 def test_the_last_cell_and_the_last_robot_stay() -> None:
-    one = msgspec.structs.replace(TEAM, decisions=(Decision("place", Kind.PLACE, (0,)),))
+    one = msgspec.structs.replace(TEAM, decisions=(Decision("place", DecisionKind.PLACE, (0,)),))
     with pytest.raises(EditError, match=r"edit\.last-cell"):
         with_cell_clicked(one, Cell(0, 0), "place", None)
     named = with_rule(TEAM, SketchRule("", "different", "level", ("North",)))
@@ -217,7 +227,7 @@ def test_a_rule_is_for_whom_is_selected() -> None:
     assert first_rule(TEAM, leader, LEVEL, ["East"]).robots == ()
     assert first_rule(TEAM, PALETTE["table"], LEVEL, []).robots == ("North", "South")
     assert first_rule(TEAM, PALETTE["prefers"], LEVEL, ["East"]).cost == 1
-    some = Decision("place", Kind.PLACE, (0, 6, 8))
+    some = Decision("place", DecisionKind.PLACE, (0, 6, 8))
     assert first_rule(TEAM, PALETTE["rather"], some, ["East"]).settings == {"value": 6, "step": 1}
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.checks import errors_of, troubles
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Setting, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Setting, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.troubles import Trouble, shortened
 from robochoc.app.texts import catalogue
 from tests.support.brute_force import solutions
@@ -20,9 +20,9 @@ from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, spoiled, without_costs
 
-LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3))
-TASK = Decision("task", Kind.TASK, ("wash", "dry"), ("North", "South"))
-PLACE = Decision("place", Kind.PLACE)
+LEVEL = Decision("level", DecisionKind.LEVEL, (1, 2, 3))
+TASK = Decision("task", DecisionKind.TASK, ("wash", "dry"), ("North", "South"))
+PLACE = Decision("place", DecisionKind.PLACE)
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate(("North", "South", "East")))
 TEAM = Sketch("team", Area(4, 2), ROBOTS, (LEVEL, TASK, PLACE))
 
@@ -72,7 +72,7 @@ ERRORS: list[tuple[str, Sketch, str]] = [
         "decision-clash",
         changed(
             robots=(SketchRobot("a", Cell(0, 0)), SketchRobot("a.b", Cell(0, 0))),
-            decisions=(Decision("c", Kind.LEVEL, (1,)), Decision("b.c", Kind.LEVEL, (1,))),
+            decisions=(Decision("c", DecisionKind.LEVEL, (1,)), Decision("b.c", DecisionKind.LEVEL, (1,))),
         ),
         "b.c",
     ),
@@ -81,14 +81,16 @@ ERRORS: list[tuple[str, Sketch, str]] = [
     ("decision-empty", with_decision(values=()), "level"),
     ("decision-no-cell", changed(area=Area(1, 1, frozenset({Cell(0, 0)}))), "place"),
     ("decision-no-number", with_decision(values=(1, "two")), "level"),
-    ("decision-no-text", with_decision(kind=Kind.TASK), "level"),
-    ("decision-text", with_decision(kind=Kind.TASK, values=("a\0",)), "level"),
-    ("decision-text", with_decision(kind=Kind.TASK, values=("",)), "level"),
+    ("decision-no-text", with_decision(kind=DecisionKind.TASK), "level"),
+    ("decision-text", with_decision(kind=DecisionKind.TASK, values=("a\0",)), "level"),
+    ("decision-text", with_decision(kind=DecisionKind.TASK, values=("",)), "level"),
     ("decision-large", with_decision(values=(10**5_000,)), "level"),
-    ("decision-outside", with_decision(kind=Kind.PLACE, values=(8,)), "level"),
+    ("decision-outside", with_decision(kind=DecisionKind.PLACE, values=(8,)), "level"),
     (
         "decision-blocked",
-        msgspec.structs.replace(with_decision(kind=Kind.PLACE, values=(7,)), area=Area(4, 2, frozenset({Cell(3, 1)}))),
+        msgspec.structs.replace(
+            with_decision(kind=DecisionKind.PLACE, values=(7,)), area=Area(4, 2, frozenset({Cell(3, 1)}))
+        ),
         "level",
     ),
     ("decision-value-twice", with_decision(values=(1, 1)), "level"),
@@ -120,14 +122,16 @@ HINTS: list[tuple[str, Sketch, str]] = [
     ("robot-blocked", changed(area=Area(4, 2, frozenset({Cell(0, 0)}))), "North"),
     (
         "never-crowded",
-        changed(decisions=(Decision("level", Kind.LEVEL, (1, 2)),), rules=(SketchRule("R1", "different", "level"),)),
+        changed(
+            decisions=(Decision("level", DecisionKind.LEVEL, (1, 2)),), rules=(SketchRule("R1", "different", "level"),)
+        ),
         "R1",
     ),
     ("never-at-least", with_rule("at-least", settings={"value": 1, "count": 4}), "R1"),
     ("never-two", with_rule("apart", settings={"gap": 3}), "R1"),
     (
         "robot-large",
-        changed(area=Area(60, 60), decisions=(PLACE, Decision("level", Kind.LEVEL, tuple(range(30))))),
+        changed(area=Area(60, 60), decisions=(PLACE, Decision("level", DecisionKind.LEVEL, tuple(range(30))))),
         "North",
     ),
 ]
@@ -234,7 +238,7 @@ def test_errors_are_found_without_the_hints_that_take_long(seed: int) -> None:
         sketch = spoiled(random, sketch)
     errors = [trouble for trouble in troubles(sketch) if trouble.is_error]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.app.sketch.checks.chances", None)
+        patch.setattr("robochoc.app.sketch.checks.hopeless", None)
         assert errors_of(sketch) == errors
 
 

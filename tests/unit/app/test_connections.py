@@ -11,8 +11,8 @@ import pytest
 import uvicorn
 from tornado.web import RequestHandler
 
-from robochoc.app import connections
-from robochoc.app.connections import BoundedConnection
+from robochoc.app import guard
+from robochoc.app.guard import BoundedConnection
 from robochoc.view import loopback
 from robochoc.view.address import loopback_socket
 from tests.support.limits import HANG_S
@@ -71,7 +71,7 @@ async def served_by_tornado(here: socket, look: Callable[[int], Awaitable[None]]
 def test_unfinished_requests_end_and_finished_ones_are_answered(
     serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "HEAD_S", 1.0)
+    monkeypatch.setattr(guard, "HEAD_S", 1.0)
     monkeypatch.setattr(loopback, "REQUEST_S", 1.0)
 
     async def look(port: int) -> None:
@@ -86,7 +86,7 @@ def test_unfinished_requests_end_and_finished_ones_are_answered(
 
 @pytest.mark.parametrize("serve", [served_by_uvicorn, served_by_tornado])
 def test_too_many_connections_are_closed_at_once(serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "MAX_CONNECTIONS", 2)
+    monkeypatch.setattr(guard, "MAX_CONNECTIONS", 2)
     monkeypatch.setattr(loopback, "MAX_CONNECTIONS", 2)
 
     async def look(port: int) -> None:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.changing_model import FromScratchError, changing_model
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.differences import AnewError, changing_model
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.app.texts import say
 from robochoc.model.change import apply_changes, describe_change
 from robochoc.model.problem import Team
@@ -25,7 +25,7 @@ from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, without_costs
 
-LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3))
+LEVEL = Decision("level", DecisionKind.LEVEL, (1, 2, 3))
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABCD"))
 
 
@@ -133,7 +133,7 @@ def test_the_last_epoch_is_the_second_sketch(seed: int) -> None:
 def _team_or_why(before: Sketch, after: Sketch) -> tuple[Team | None, str]:
     try:
         return changing_model(before, after).team, ""
-    except AnewError as anew:
+    except FromScratchError as anew:
         return None, anew.key
 
 
@@ -181,8 +181,8 @@ def _with(**changes: object) -> Sketch:
     [
         (_with(robots=(SketchRobot("Z", Cell(0, 0)),)), "nobody"),
         (_with(area=Area(5, 1)), "map"),
-        (_with(decisions=(LEVEL, Decision("slot", Kind.SLOT, (1, 2)))), "decision"),
-        (_with(decisions=(Decision("level", Kind.SLOT, (1, 2)),)), "decision"),
+        (_with(decisions=(LEVEL, Decision("slot", DecisionKind.SLOT, (1, 2)))), "decision"),
+        (_with(decisions=(Decision("level", DecisionKind.SLOT, (1, 2)),)), "decision"),
         (_with(robots=(*ROBOTS[:3], SketchRobot("D", Cell(3, 0), 7))), "importance"),
         (_with(robots=(*ROBOTS[:3], SketchRobot("D", Cell(0, 0)))), "moved"),
         (_sketch(SketchRule("R1", "little", "level", ("A",), {"step": 1})), "wish"),
@@ -191,7 +191,7 @@ def _with(**changes: object) -> Sketch:
     ],
 )
 def test_what_cannot_be_said_is_told(after: Sketch, key: str) -> None:
-    with pytest.raises(AnewError) as told:
+    with pytest.raises(FromScratchError) as told:
         changing_model(_sketch(), after)
     assert told.value.key == f"whatif.anew-{key}"
     assert "{" not in say(told.value.key, **told.value.named)

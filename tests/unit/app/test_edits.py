@@ -15,14 +15,17 @@ from robochoc.app.sketch import sketch as limits
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.history import MAX_STEPS, History
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.app.texts import say
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import HOSTILE, random_sketch
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate(("Ann", "Bob", "Cid")))
-DECISIONS = (Decision("level", Kind.LEVEL, (1, 2, 3)), Decision("task", Kind.TASK, ("wash", "dry"), ("Ann",)))
+DECISIONS = (
+    Decision("level", DecisionKind.LEVEL, (1, 2, 3)),
+    Decision("task", DecisionKind.TASK, ("wash", "dry"), ("Ann",)),
+)
 RULES = (
     SketchRule("R1", "different", "level"),
     SketchRule("R2", "leader-above", "level", ("Ann", "Bob")),
@@ -67,7 +70,7 @@ def test_a_robot_is_renamed_everywhere() -> None:
 
 def test_with_a_decision_go_its_rules_and_they_follow_its_name() -> None:
     assert ids(edits.without_decision(TEAM, "level")) == ["R4"]
-    renamed = edits.with_decision(TEAM, Decision("height", Kind.LEVEL, (1, 1, 2)), instead_of="level")
+    renamed = edits.with_decision(TEAM, Decision("height", DecisionKind.LEVEL, (1, 1, 2)), instead_of="level")
     assert [rule.decision for rule in renamed.rules] == ["height", "height", "height", "task"]
     assert renamed.decisions[0].values == (1, 2)
 
@@ -102,8 +105,10 @@ REFUSED: dict[str, Callable[[], Sketch]] = {
     "edit.name": lambda: edits.renamed(TEAM, "a b"),
     "edit.name-taken": lambda: edits.with_robot(TEAM, Cell(0, 0), "Ann"),
     "edit.too-many-robots": lambda: edits.with_robot(FULL, Cell(0, 0)),
-    "edit.too-many-decisions": lambda: edits.with_decision(FULL, Decision("more", Kind.LEVEL, (1,))),
-    "edit.too-many-values": lambda: edits.with_decision(TEAM, Decision("more", Kind.LEVEL, tuple(range(4_001)))),
+    "edit.too-many-decisions": lambda: edits.with_decision(FULL, Decision("more", DecisionKind.LEVEL, (1,))),
+    "edit.too-many-values": lambda: edits.with_decision(
+        TEAM, Decision("more", DecisionKind.LEVEL, tuple(range(4_001)))
+    ),
     "edit.too-many-rules": lambda: edits.with_rule(FULL, SketchRule("", "same", "level")),
     "edit.weight": lambda: edits.with_importance(TEAM, "Ann", weight=0),
     "edit.rank": lambda: edits.with_importance(TEAM, "Ann", rank=10**9),
@@ -127,7 +132,7 @@ def test_a_hostile_name_is_refused_everywhere(name: str) -> None:
         lambda: edits.renamed(TEAM, name),
         lambda: edits.with_robot(TEAM, Cell(0, 0), name),
         lambda: edits.with_robot_renamed(TEAM, "Ann", name),
-        lambda: edits.with_decision(TEAM, Decision(name, Kind.LEVEL, (1,))),
+        lambda: edits.with_decision(TEAM, Decision(name, DecisionKind.LEVEL, (1,))),
     ]
     for change in changes:
         with pytest.raises(EditError):
@@ -147,7 +152,7 @@ def edited(random: Random, sketch: Sketch) -> Sketch:
         lambda: edits.with_robot_renamed(sketch, robot, random.choice(("Zoe", "x.y", "a"))),
         lambda: edits.with_area(sketch, random.randint(0, 6), random.randint(1, 5)),
         lambda: edits.with_cell_blocked(sketch, cell, blocked=random.random() < 0.7),
-        lambda: edits.with_decision(sketch, Decision("more", Kind.SLOT, (1, 2))),
+        lambda: edits.with_decision(sketch, Decision("more", DecisionKind.SLOT, (1, 2))),
         lambda: edits.with_decision(sketch, msgspec.structs.replace(decision, name="other"), instead_of=decision.name),
         lambda: edits.without_decision(sketch, decision.name),
         lambda: edits.with_rule(sketch, msgspec.structs.replace(rule, id="")) if sketch.rules else sketch,

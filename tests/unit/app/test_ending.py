@@ -13,9 +13,9 @@ import pytest
 pytest.importorskip("nicegui")
 
 from robochoc.app.projects import Projects
-from robochoc.app.runs.run import Record, State
+from robochoc.app.runs.run import Record, RunState
 from robochoc.app.runs.runs import runs_of
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from tests.support.limits import HANG_S
 
 SERVER = """
@@ -71,7 +71,7 @@ def _ended(folder: Path, phase: str, by: int, runtime: str = "simulator") -> int
             server.kill()
 
 
-def _states(folder: Path) -> list[State]:
+def _states(folder: Path) -> list[RunState]:
     return [msgspec.json.decode(one.read_bytes(), type=Record).state for one in folder.glob("*/runs/*/run.json")]
 
 
@@ -79,7 +79,7 @@ def _states(folder: Path) -> list[State]:
 @pytest.mark.parametrize(("phase", "by"), [("decides", signal.SIGINT), ("prepares", signal.SIGTERM)])
 def test_a_run_is_stopped_with_the_application(tmp_path: Path, phase: str, by: int) -> None:
     _ended(tmp_path, phase, by)
-    assert _states(tmp_path) == [State.STOPPED]
+    assert _states(tmp_path) == [RunState.STOPPED]
     assert not (tmp_path / "errors.log").exists()
 
 
@@ -93,8 +93,8 @@ def test_who_computes_does_not_keep_it_from_its_end(tmp_path: Path, phase: str) 
 @pytest.mark.parametrize("runtime", ["simulator", "processes"])
 def test_after_kill_9_no_run_goes_on(tmp_path: Path, runtime: str) -> None:
     assert _ended(tmp_path, "decides", signal.SIGKILL, runtime) == -signal.SIGKILL
-    assert _states(tmp_path) == [State.RUNNING]
-    projects = Projects(Store(tmp_path))
+    assert _states(tmp_path) == [RunState.RUNNING]
+    projects = Projects(TeamStore(tmp_path))
     (run,) = runs_of(projects.open(projects.store.ids()[0])).all()
-    assert (run.state, run.message) == (State.FAILED, "lost")
-    assert _states(tmp_path) == [State.FAILED]
+    assert (run.state, run.message) == (RunState.FAILED, "lost")
+    assert _states(tmp_path) == [RunState.FAILED]

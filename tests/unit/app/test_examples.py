@@ -11,10 +11,10 @@ from lxml import etree
 
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.examples import KEYS, example, examples, shows, title_of
-from robochoc.app.sketch.picture import picture
+from robochoc.app.sketch.example_sketches import KEYS, example, examples, shows, title_of
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.thumbnail import thumbnail
 from tests.support.cases import looped
 from tests.support.examples import examples as draws
 from tests.support.sketches import HOSTILE, random_sketch, spoiled
@@ -51,14 +51,14 @@ def test_together_they_show_most_of_the_palette() -> None:
 
 @looped("key", KEYS)
 def test_an_example_has_a_picture_of_its_robots(key: str) -> None:
-    drawn = etree.fromstring(picture(example(key)).encode())
+    drawn = etree.fromstring(thumbnail(example(key)).encode())
     assert len(drawn.findall("{*}circle")) == len(example(key).robots)
 
 
 def test_a_picture_is_small_and_quick_for_the_largest_team() -> None:
     robots = tuple(SketchRobot(f"D{number}", Cell(number % 60, number // 60)) for number in range(1_000))
     sketch = Sketch("team", Area(60, 60), robots, (), (SketchRule("R1", "different", "level"),))
-    assert len(picture(sketch)) < 100_000
+    assert len(thumbnail(sketch)) < 100_000
 
 
 @given(st.integers(0, 10**9))
@@ -68,7 +68,7 @@ def test_nothing_hostile_leaves_its_place_in_a_picture(seed: int) -> None:
     sketch = random_sketch(random)
     robots = tuple(SketchRobot(f"{random.choice(HOSTILE)}{robot.name}<b>\"'&", robot.at) for robot in sketch.robots)
     hostile = Sketch(random.choice(HOSTILE), sketch.area, robots, sketch.decisions, spoiled(random, sketch).rules)
-    drawn = etree.fromstring(picture(hostile).encode())
+    drawn = etree.fromstring(thumbnail(hostile).encode())
     assert {etree.QName(one).localname for one in drawn.iter()} <= {"svg", "path", "circle", "text"}
     names = {name for one in drawn.iter() for name in one.attrib}
     assert not {str(name) for name in names if str(name).startswith("on") or "href" in str(name)}
@@ -81,4 +81,4 @@ def test_what_is_far_too_large_has_a_picture_of_nothing() -> None:
         Sketch(robots=(SketchRobot("A", Cell(10**5_000, 0)),)),
         Sketch(robots=(SketchRobot("A", Cell(0, 0)),) * 10_000),
     ):
-        assert etree.fromstring(picture(sketch).encode()).findall("{*}circle") == []
+        assert etree.fromstring(thumbnail(sketch).encode()).findall("{*}circle") == []

@@ -13,13 +13,13 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from robochoc.app.flights.state import unpack_run
-from robochoc.app.sketch import archives, files, opening
+from robochoc.app.flights.saved_state import unpack_run
+from robochoc.app.sketch import files, open_from_disk
 from robochoc.app.sketch.building import decided, model_of
-from robochoc.app.sketch.examples import KEYS, example
+from robochoc.app.sketch.example_sketches import KEYS, example
 from robochoc.app.sketch.files import save, xml_sources, zipped
-from robochoc.app.sketch.opening import ForeignTeam, opened
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.open_from_disk import ImportedTeam, open_team
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import InvalidInputError, read_team
 from tests.support.cases import looped
 from tests.support.examples import examples
@@ -27,7 +27,7 @@ from tests.support.program import ROOT, robochoc_within
 from tests.support.sketches import random_sketch, without_costs
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0), weight=place + 1) for place, name in enumerate(("Ann", "Bob", "Cid")))
-LEVEL, TASK = Decision("level", Kind.LEVEL, (1, 2, 3)), Decision("task", Kind.TASK, ("wash up", "dry"))
+LEVEL, TASK = Decision("level", DecisionKind.LEVEL, (1, 2, 3)), Decision("task", DecisionKind.TASK, ("wash up", "dry"))
 RULES = (
     SketchRule("R1", "different", "level"),
     SketchRule("R2", "little", "level", settings={"step": 2}),
@@ -45,13 +45,13 @@ def folder(tmp_path: Path) -> Path:
 def refused(path: Path) -> str:
     """What is told of a path that cannot be opened: one line."""
     with pytest.raises(InvalidInputError) as told:
-        opened(path)
+        open_team(path)
     assert len(told.value.diagnostics) == 1
     return str(told.value)
 
 
 def test_what_was_saved_is_opened_as_it_was(folder: Path) -> None:
-    assert opened(folder) == TEAM
+    assert open_team(folder) == TEAM
 
 
 def test_the_files_are_those_that_are_shown(folder: Path) -> None:
@@ -64,7 +64,7 @@ def test_the_files_are_those_that_are_shown(folder: Path) -> None:
 def test_any_sketch_comes_back_and_is_the_same_team(tmp_path: Path, seed: int) -> None:
     sketch = without_costs(random_sketch(Random(seed)))
     save(sketch, tmp_path / "team", replace=True)
-    assert opened(tmp_path / "team") == sketch
+    assert open_team(tmp_path / "team") == sketch
     here, there = model_of(sketch).team, read_team(tmp_path / "team")
     assert {robot.name: robot.weight for robot in there.robots} == {robot.name: robot.weight for robot in here.robots}
     assert sorted(str(one.name) for one in there.constraints()) == sorted(str(one.name) for one in here.constraints())
@@ -78,7 +78,7 @@ def test_the_commands_take_it_and_decide_the_same(folder: Path) -> None:
     values = dict(outcome.values)
     assert {f"{robot}.{name}": value for (robot, name), value in decided(TEAM, told["assignment"]).items()} == values
     assert "wash up" in values.values()
-    assert opened(folder) == TEAM
+    assert open_team(folder) == TEAM
 
 
 @pytest.mark.slow
@@ -91,7 +91,7 @@ def test_every_example_is_decided_by_the_commands_as_in_this_process(tmp_path: P
     outcome = model_of(sketch).solve(runtime="simulator")
     assert (told["verdict"], told["cost"]) == (outcome.verdict, outcome.cost)
     assert len(decided(sketch, told["assignment"])) == len(outcome.values)
-    assert opened(folder) == sketch
+    assert open_team(folder) == sketch
 
 
 def test_a_team_that_is_there_is_replaced_only_when_asked(folder: Path) -> None:
@@ -99,7 +99,7 @@ def test_a_team_that_is_there_is_replaced_only_when_asked(folder: Path) -> None:
         save(TEAM, folder)
     other = msgspec.structs.replace(TEAM, rules=())
     save(other, folder, replace=True)
-    assert opened(folder) == other
+    assert open_team(folder) == other
 
 
 def test_a_sketch_with_errors_is_not_saved(tmp_path: Path) -> None:
@@ -111,8 +111,8 @@ def test_a_sketch_with_errors_is_not_saved(tmp_path: Path) -> None:
 def test_files_that_were_changed_by_hand_are_opened_as_what_they_are(folder: Path) -> None:
     file = folder / "Ann.xml"
     file.write_text(file.read_text().replace("<presentation", '<presentation weight="9"', 1))
-    found = opened(folder)
-    assert isinstance(found, ForeignTeam)
+    found = open_team(folder)
+    assert isinstance(found, ImportedTeam)
     assert (found.changed, found.name, found.robots) == (("Ann.xml",), "kept", ("Ann", "Bob", "Cid"))
     assert found.team["Ann"].weight == 9
 
@@ -120,14 +120,14 @@ def test_files_that_were_changed_by_hand_are_opened_as_what_they_are(folder: Pat
 def test_a_file_more_or_less_is_a_change(folder: Path) -> None:
     (folder / "Dan.xml").write_bytes((folder / "Ann.xml").read_bytes())
     with pytest.raises(InvalidInputError):
-        opened(folder)
+        open_team(folder)
 
 
 @looped("name", ["patrol", "rescue", "hangar"])
 def test_a_team_of_others_is_opened_as_what_it_is(tmp_path: Path, name: str) -> None:
     path = ROOT / "docs/examples" / name
-    found = opened(path)
-    assert isinstance(found, ForeignTeam)
+    found = open_team(path)
+    assert isinstance(found, ImportedTeam)
     assert (found.changed, found.path, found.team) == ((), path, read_team(path))
     assert found.variables >= len(found.robots) > 0 < found.constraints
     found.save(tmp_path / name)
@@ -139,14 +139,14 @@ def test_a_file_of_another_tool_is_opened(tmp_path: Path) -> None:
         "export", ROOT / "docs/examples/patrol", "-o", tmp_path / "patrol.yaml", "--format", "pydcop"
     )
     assert done.returncode == 0, done.stderr
-    found = opened(tmp_path / "patrol.yaml")
-    assert isinstance(found, ForeignTeam)
+    found = open_team(tmp_path / "patrol.yaml")
+    assert isinstance(found, ImportedTeam)
     assert set(found.robots) == set(read_team(ROOT / "docs/examples/patrol").order)
 
 
 def test_an_archive_is_opened_as_its_folder(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_bytes(zipped(TEAM))
-    assert opened(tmp_path / "a.zip") == TEAM
+    assert open_team(tmp_path / "a.zip") == TEAM
 
 
 def archive(path: Path, *members: tuple[str, bytes]) -> Path:
@@ -161,8 +161,8 @@ def test_an_archive_of_a_team_with_a_scenario_is_opened(tmp_path: Path) -> None:
     files = [(str(file.relative_to(folder)), file.read_bytes()) for file in folder.rglob("*.xml")]
     for prefix in ("", "rescue/"):
         path = archive(tmp_path / "rescue.zip", *((prefix + name, content) for name, content in files))
-        found = opened(path)
-        assert isinstance(found, ForeignTeam)
+        found = open_team(path)
+        assert isinstance(found, ImportedTeam)
         assert (found.path, found.team) == (path, read_team(folder))
 
 
@@ -177,9 +177,9 @@ def test_nothing_of_an_archive_leaves_its_folder(tmp_path: Path) -> None:
 def test_an_archive_that_is_much_larger_than_it_looks_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(opening, "MAX_BYTES", 100_000)
+    monkeypatch.setattr(open_from_disk, "MAX_BYTES", 100_000)
     assert "has more than" in refused(archive(tmp_path / "a.zip", ("A.xml", b" " * 200_000)))
-    monkeypatch.setattr(opening, "MAX_FILES", 3)
+    monkeypatch.setattr(open_from_disk, "MAX_FILES", 3)
     assert "has more than" in refused(archive(tmp_path / "b.zip", *((f"A{number}.xml", b"") for number in range(5))))
 
 
@@ -189,7 +189,7 @@ def test_mistakes_in_an_archive_are_told_by_the_names_in_it(tmp_path: Path) -> N
     kept = xml_sources(TEAM).items()
     path = archive(tmp_path / "b.zip", *((name, text.encode()) for name, text in kept if name != "Ann.xml"))
     with pytest.raises(InvalidInputError, match=r"there is no b/Ann\.xml"):
-        opened(path)
+        open_team(path)
 
 
 def test_an_archive_of_two_teams_is_refused(tmp_path: Path) -> None:
@@ -199,11 +199,11 @@ def test_an_archive_of_two_teams_is_refused(tmp_path: Path) -> None:
 def test_an_archive_that_lists_a_million_files_is_refused_before_the_list_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(archives.Bounded, "most", 5_000)
+    monkeypatch.setattr(open_from_disk.BoundedFile, "most", 5_000)
     assert "lists too many files" in refused(archive(tmp_path / "a.zip", *((f"{n}.txt", b"") for n in range(100))))
     assert not unpack_run(tmp_path / "a.zip", tmp_path)
     archive(tmp_path / "b.zip", ("A.txt", b"0" * 10_000))
-    with archives.bounded_archive(tmp_path / "b.zip") as found:
+    with open_from_disk.bounded_archive(tmp_path / "b.zip") as found:
         assert len(found.read("A.txt")) == 10_000
 
 
@@ -254,8 +254,8 @@ def test_a_sketch_that_was_changed_by_hand_is_not_taken_for_the_team(folder: Pat
     kept = json.loads((folder / "sketch.json").read_text())
     kept["sketch"]["rules"][1]["settings"]["step"] = 9
     (folder / "sketch.json").write_text(json.dumps(kept))
-    found = opened(folder)
-    assert isinstance(found, ForeignTeam)
+    found = open_team(folder)
+    assert isinstance(found, ImportedTeam)
     assert found.changed
 
 
@@ -271,7 +271,7 @@ def test_what_is_nothing_of_ours_is_told(tmp_path: Path) -> None:
 
 
 def test_a_team_of_too_many_files_is_told_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(opening, "MAX_FILES", 3)
+    monkeypatch.setattr(open_from_disk, "MAX_FILES", 3)
     for number in range(4):
         (tmp_path / f"A{number}.xml").touch()
     assert "robochoc solve" in refused(tmp_path)

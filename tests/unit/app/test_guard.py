@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 
 from robochoc.app import guard
-from robochoc.app.guard import Guard, Served
+from robochoc.app.guard import AccessGuard, Served
 from tests.support.cases import looped
 
 SECRET = "secret"  # noqa: S105 - of a test
@@ -52,7 +52,7 @@ def _asked(
 
     named = [(name.encode(), value) for name, value in headers.items()]
     scope = {"type": kind, "path": path, "headers": named} | ({"method": method} if kind == "http" else {})
-    asyncio.run(Guard(served, SECRET, 8000)(scope, receive, send))
+    asyncio.run(AccessGuard(served, SECRET, 8000)(scope, receive, send))
     return answers
 
 
@@ -74,7 +74,7 @@ def test_a_request_with_a_late_body_is_dropped(monkeypatch: pytest.MonkeyPatch) 
 
     named = [(name.encode(), value) for name, value in SAME.items()]
     scope = {"type": "http", "path": "/secret/", "headers": named, "method": "POST"}
-    asyncio.run(Guard(reads, SECRET, 8000)(scope, receive, send))
+    asyncio.run(AccessGuard(reads, SECRET, 8000)(scope, receive, send))
     assert answers[0]["status"] == 408
 
 
@@ -171,7 +171,7 @@ def _failing(*, left: bool, why: str) -> None:
         """Nobody listens."""
 
     scope = {"type": "http", "path": "/secret/", "headers": [(b"host", HERE)], "method": "GET"}
-    asyncio.run(Guard(fails, SECRET, 8000)(scope, receive, send))
+    asyncio.run(AccessGuard(fails, SECRET, 8000)(scope, receive, send))
 
 
 def test_a_page_loads_nothing_from_elsewhere_unless_it_says_what() -> None:

@@ -7,18 +7,18 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from robochoc.app.lessons.lesson import COUNT, ROBOTS, Lesson, Step, lesson
+from robochoc.app.lessons.lesson import COUNT, ROBOTS, Lesson, LessonStep, lesson
 from robochoc.app.lessons.picture import HEIGHT, WIDTH, picture
-from robochoc.app.lessons.progress import Progress
+from robochoc.app.lessons.progress import LessonProgress
 from robochoc.app.lessons.record import recorded
-from robochoc.app.lessons.recording import Recording, after, before, reasons, recordings
+from robochoc.app.lessons.recording import RecordedRun, after, before, reasons, recordings
 from tests.support.cases import looped
 from tests.support.lesson_truth import breaks, is_true
 
 NUMBERS = range(1, COUNT + 1)
 
 
-def steps() -> list[tuple[int, Step]]:
+def steps() -> list[tuple[int, LessonStep]]:
     """All steps of all lessons, each with its lesson's number."""
     return [(number, step) for number in NUMBERS for step in lesson(number).steps]
 
@@ -51,7 +51,7 @@ def test_the_recorded_runs_are_what_the_protocols_do_today(number: int) -> None:
 
 
 @looped(("number", "step"), steps)
-def test_the_answer_is_true_and_the_other_choices_are_not(number: int, step: Step) -> None:
+def test_the_answer_is_true_and_the_other_choices_are_not(number: int, step: LessonStep) -> None:
     taught, runs = lesson(number), recordings(number)
     for choice in step.choices:
         assert is_true(taught, runs, step, choice) == choice.right, choice.shown
@@ -63,12 +63,12 @@ def test_what_protocols_no_longer_say_is_noticed() -> None:
     taught = lesson(3)
     runs = recordings(3)
     run = runs["abt"]
-    others = {"abt": Recording(run.protocol, messages=run.messages[::-1], turns=run.turns)}
+    others = {"abt": RecordedRun(run.protocol, messages=run.messages[::-1], turns=run.turns)}
     assert not any(is_true(taught, others, step, step.answer) for step in taught.steps[:2])
 
 
 @looped(("number", "step"), steps)
-def test_pictures_are_well_formed_and_show_levels_messages_and_names(number: int, step: Step) -> None:
+def test_pictures_are_well_formed_and_show_levels_messages_and_names(number: int, step: LessonStep) -> None:
     team = lesson(number).team_of(step)
     for moment in (before(number, step), after(number, step)):
         drawn = picture(team, moment)
@@ -93,26 +93,26 @@ def test_a_robots_reasons_come_from_the_replay() -> None:
 
 
 def test_progress_is_kept(tmp_path: Path) -> None:
-    progress = Progress(tmp_path)
+    progress = LessonProgress(tmp_path)
     assert progress.next() == 1
     for step in range(len(lesson(1).steps)):
         assert not progress.is_over(1)
         progress.answered(1, step)
     progress.answered(1, 0)
-    again = Progress(tmp_path)
+    again = LessonProgress(tmp_path)
     assert again.is_over(1)
     assert again.next() == 2
     again.begin_again(1)
-    assert Progress(tmp_path).done(1) == 0
+    assert LessonProgress(tmp_path).done(1) == 0
 
 
 @looped("content", [b"", b"{", b"[]", b'{"1":"x"}', b'{"1":-5}', b'{"99":3}'])
 def test_a_damaged_file_of_progress_is_begun_again(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "lessons.json").write_bytes(content)
-    assert Progress(tmp_path).done(1) == 0
+    assert LessonProgress(tmp_path).done(1) == 0
 
 
 def test_a_folder_that_cannot_be_written_ends_no_lesson(tmp_path: Path) -> None:
-    progress = Progress(tmp_path / "gone")
+    progress = LessonProgress(tmp_path / "gone")
     progress.answered(1, 0)
     assert progress.done(1) == 1

@@ -9,8 +9,8 @@ import pytest
 
 from robochoc.app import open_file
 from robochoc.app.open_file import open_file_job
-from robochoc.app.sketch.opening import ForeignTeam
-from robochoc.app.store import FILES, Store
+from robochoc.app.sketch.open_from_disk import ImportedTeam
+from robochoc.app.store import FILES, TeamStore
 from tests.support.limits import HANG_S
 from tests.support.small_teams import pair
 
@@ -23,9 +23,9 @@ agents: [a1, a2]
 """
 
 
-def opened(text: str, folder: Path, *, within_s: float = HANG_S) -> tuple[Store, open_file.OpenedFile]:
+def opened(text: str, folder: Path, *, within_s: float = HANG_S) -> tuple[TeamStore, open_file.OpenedFile]:
     """Return a store, and the result of opening a file with `text` as a team of it."""
-    file, store = folder / "t.yaml", Store(folder / "store")
+    file, store = folder / "t.yaml", TeamStore(folder / "store")
     file.write_text(text)
     return store, open_file_job(file, store, within_s=within_s).future.result(HANG_S)
 
@@ -53,10 +53,10 @@ def test_a_team_is_there_once_its_files_are_complete(tmp_path: Path, monkeypatch
         assert store.ids() == []
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    store = Store(tmp_path)
-    monkeypatch.setattr(ForeignTeam, "save", full)
+    store = TeamStore(tmp_path)
+    monkeypatch.setattr(ImportedTeam, "save", full)
     with pytest.raises(OSError, match="No space"):
-        store.add_foreign(ForeignTeam(tmp_path, pair()))
+        store.add_imported(ImportedTeam(tmp_path, pair()))
     assert list(store.folder.iterdir()) == []
     (tmp_path / ".new-0123").mkdir()
     with store.locked():

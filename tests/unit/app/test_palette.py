@@ -19,7 +19,7 @@ from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.files import xml_sources
 from robochoc.app.sketch.palette import Applied
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.model.problem import INFINITE
 from tests.support.brute_force import solutions
 from tests.support.cases import looped
@@ -36,7 +36,7 @@ class Drawn:
         decision = sketch.decision(rule.decision)
         assert decision is not None
         self.columns = sketch.area.columns
-        self.is_place = decision.kind is Kind.PLACE
+        self.is_place = decision.kind is DecisionKind.PLACE
         self.robots = list(rule.robots or sketch.deciders(decision))
         self.at = {robot.name: robot.at for robot in sketch.robots}
         self.values = values
@@ -193,13 +193,13 @@ def test_neighbours_are_those_within_the_radius_in_order(seed: int) -> None:
     robots = tuple(SketchRobot(f"D{number}", cell) for number, cell in enumerate(cells))
     radius = random.randint(1, 25)
     rule = SketchRule("R1", "neighbours-different", "level", tuple(names), {"radius": radius})
-    sketch = Sketch("team", Area(20, 20), robots, (Decision("level", Kind.LEVEL, (1, 2)),), (rule,))
+    sketch = Sketch("team", Area(20, 20), robots, (Decision("level", DecisionKind.LEVEL, (1, 2)),), (rule,))
     drawn = Drawn(sketch, rule, {})
     assert [*PALETTE[rule.kind].groups(sketch, rule)] == drawn.near()
 
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate(("Ann", "Bob", "Cid")))
-LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3))
+LEVEL = Decision("level", DecisionKind.LEVEL, (1, 2, 3))
 PRIVATE = (
     SketchRule("R1", "apart", "level", ("Ann", "Bob"), {"gap": 2}, private=True),
     SketchRule("R2", "leader-above", "level", ("Cid", "Ann", "Bob"), private=True),
@@ -260,7 +260,7 @@ def test_near_places_are_preferred_step_by_step() -> None:
         SketchRule(f"H{number}", "never", "place", (), {"value": area.number(cell)})
         for number, cell in enumerate(homes.values())
     )
-    sketch = Sketch("near", area, robots, (Decision("place", Kind.PLACE, values),), (*rules, *never_home))
+    sketch = Sketch("near", area, robots, (Decision("place", DecisionKind.PLACE, values),), (*rules, *never_home))
     assert not [trouble for trouble in troubles(sketch) if trouble.is_error]
     best = min(
         sum(2 * (abs(cell.x - home.x) + abs(cell.y - home.y)) for cell, home in zip(some, homes.values(), strict=True))

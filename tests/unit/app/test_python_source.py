@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.python_source import names_in_python, python_source
+from robochoc.app.sketch.python_program import names_in_python, python_source
+from robochoc.app.sketch.python_text import PythonText, python_literal, text_with
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
-from robochoc.app.sketch.written import Written, text_with, written
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.model.problem import Team
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import HOSTILE, random_sketch, without_costs
 
-LEVEL = Decision("level", Kind.LEVEL, (1, 2, 3, 4))
+LEVEL = Decision("level", DecisionKind.LEVEL, (1, 2, 3, 4))
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate(("A", "B", "C", "D")))
 
 
@@ -99,16 +99,16 @@ def test_a_program_can_be_read() -> None:
 
 
 def test_decisions_have_names_of_their_own_in_python() -> None:
-    decisions = tuple(Decision(name, Kind.LEVEL, (1,)) for name in ("a.b", "a_b", "a-b", "class", "robots"))
+    decisions = tuple(Decision(name, DecisionKind.LEVEL, (1,)) for name in ("a.b", "a_b", "a-b", "class", "robots"))
     names = [*names_in_python(Sketch(decisions=decisions)).values()]
     assert names == ["a_b_of", "a_b__of", "a_b___of", "class_of", "robots_of"]
 
 
 @looped("text", [*HOSTILE, "'", '"', "\\", '{"', '"""', "\\'", "{0}", "a\rb"])
 def test_no_text_leaves_its_quotes(text: str) -> None:
-    assert ast.literal_eval(written(text)) == text
-    assert ast.literal_eval(written([(text,), [text, 1]])) == [(text,), [text, 1]]
-    told = eval(text_with([text, Written("a"), text]), {"a": "mid"})  # noqa: S307 - the same
+    assert ast.literal_eval(python_literal(text)) == text
+    assert ast.literal_eval(python_literal([(text,), [text, 1]])) == [(text,), [text, 1]]
+    told = eval(text_with([text, PythonText("a"), text]), {"a": "mid"})  # noqa: S307 - the same
     assert told == f"{text}.mid.{text}"
 
 
@@ -117,7 +117,7 @@ def test_a_hostile_sketch_writes_nothing_else(name: str) -> None:
     """Not even a sketch that has errors writes a program that does anything but what its texts say."""
     robots = (SketchRobot(name, Cell(0, 0)), *ROBOTS)
     rule = SketchRule(name, "only", name, (), {"values": [name, "x"]})
-    sketch = Sketch(name, Area(), robots, (Decision(name, Kind.TASK, (name, "x")),), (rule,))
+    sketch = Sketch(name, Area(), robots, (Decision(name, DecisionKind.TASK, (name, "x")),), (rule,))
     calls = {
         node.func.attr if isinstance(node.func, ast.Attribute) else ast.unparse(node.func)
         for node in ast.walk(ast.parse(python_source(sketch)))

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.app.conflicts.found import ConflictSearch
+from robochoc.app.conflicts.search import ConflictSearch
 from robochoc.app.flights.builder import FlightBuilder
 from robochoc.app.jobs.job import Job, end_all, jobs_alive
 from robochoc.app.projects import Projects
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.run import State
+from robochoc.app.runs.run import RunState
 from robochoc.app.runs.runs import Runs, runs_of
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.store import Store
-from robochoc.app.studies.question import MOST_SECONDS, Question
+from robochoc.app.store import TeamStore
+from robochoc.app.studies.question import MOST_SECONDS, StudyQuestion
 from robochoc.app.studies.study import study_on
 from tests.support.kept_runs import cube, kept_run
 from tests.support.limits import HANG_S, wait_until
@@ -35,7 +35,7 @@ def nothing_stays() -> Iterator[None]:
 @pytest.fixture
 def projects(tmp_path: Path) -> Projects:
     """Teams in a folder of their own."""
-    return Projects(Store(tmp_path / "teams"))
+    return Projects(TeamStore(tmp_path / "teams"))
 
 
 def _nothing_left(projects: Projects) -> None:
@@ -48,7 +48,7 @@ def test_all_that_it_does_is_ended(projects: Projects) -> None:
     kept = kept_run(project.folder, cube())
     run = runs_of(project).start(RunOptions(protocol="syncbb", runtime="processes"))
     its = runs_of(other).start(RunOptions(protocol="syncbb"))
-    study_on(project).start(project.sketch, Question(("syncbb", "afb"), timeout=MOST_SECONDS))
+    study_on(project).start(project.sketch, StudyQuestion(("syncbb", "afb"), timeout=MOST_SECONDS))
     search = ConflictSearch(project.sketch, folder=project.folder)
     FlightBuilder(kept).request(lambda: None)
     assert len(jobs_alive()) == 5
@@ -56,8 +56,8 @@ def test_all_that_it_does_is_ended(projects: Projects) -> None:
     projects.remove(project.id)
     assert search.result() is None
     wait_until(lambda: len(jobs_alive()) == 1, lambda: f"at work: {[job.name for job in jobs_alive()]}")
-    assert run.state is State.STOPPED
-    assert its.state is State.RUNNING
+    assert run.state is RunState.STOPPED
+    assert its.state is RunState.RUNNING
     assert not study_on(project).running
     assert [path.name for path in projects.store.folder.iterdir()] == [other.id]
     projects.remove(other.id)
@@ -98,7 +98,7 @@ def test_nothing_begins_in_a_team_that_is_gone(projects: Projects) -> None:
     with pytest.raises(EditError, match="removed"):
         Runs(project).start()
     study = study_on(project)
-    study.start(project.sketch, Question(("abt", "afc-ng")))
+    study.start(project.sketch, StudyQuestion(("abt", "afc-ng")))
     wait_until(lambda: not study.running, "the study runs on")
     assert study.facts
     assert "No such file" in study.facts.message

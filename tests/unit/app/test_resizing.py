@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.app.sketch.edits import with_area
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch
 
 AREA = Area(4, 3, frozenset({Cell(0, 0), Cell(3, 2)}))
-PLACE = Decision("place", Kind.PLACE, tuple(AREA.number(cell) for cell in (Cell(1, 1), Cell(3, 0), Cell(0, 2))))
+PLACE = Decision("place", DecisionKind.PLACE, tuple(AREA.number(cell) for cell in (Cell(1, 1), Cell(3, 0), Cell(0, 2))))
 RULES = (
     SketchRule("R1", "never", "place", (), {"value": AREA.number(Cell(1, 1))}),
     SketchRule("R2", "never", "place", (), {"value": AREA.number(Cell(3, 0))}),
@@ -22,7 +22,7 @@ RULES = (
     SketchRule("R5", "apart", "place", (), {"gap": 5}),
     SketchRule("R6", "never", "level", (), {"value": 5}),
 )
-DECISIONS = (PLACE, Decision("level", Kind.LEVEL, (5, 6)))
+DECISIONS = (PLACE, Decision("level", DecisionKind.LEVEL, (5, 6)))
 TEAM = Sketch("team", AREA, (SketchRobot("A", Cell(3, 2)),), DECISIONS, RULES)
 
 

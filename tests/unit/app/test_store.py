@@ -28,19 +28,22 @@ from robochoc.app.sketch.sketch import (
     Area,
     Cell,
     Decision,
-    Kind,
+    DecisionKind,
     Sketch,
     SketchRobot,
     SketchRule,
 )
-from robochoc.app.store import InUseError, Store
+from robochoc.app.store import InUseError, TeamStore
 from tests.support.cases import looped
 from tests.support.limits import wait_until
 
 SKETCH = with_robot(
     Sketch(
         "charging",
-        decisions=(Decision("slot", Kind.SLOT, (1, 2, 3)), Decision("task", Kind.TASK, ("look", "carry"))),
+        decisions=(
+            Decision("slot", DecisionKind.SLOT, (1, 2, 3)),
+            Decision("task", DecisionKind.TASK, ("look", "carry")),
+        ),
         rules=(SketchRule("R1", "table", "task", ("A", "B"), {"rows": [["look", "carry"]], "n": 1}, 3),),
     ),
     Cell(1, 2),
@@ -49,12 +52,12 @@ SKETCH = with_robot(
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
+def store(tmp_path: Path) -> TeamStore:
     """An empty store."""
-    return Store(tmp_path / "teams")
+    return TeamStore(tmp_path / "teams")
 
 
-def test_a_team_comes_back_as_it_was(store: Store) -> None:
+def test_a_team_comes_back_as_it_was(store: TeamStore) -> None:
     history = History(SKETCH).edited(renamed(SKETCH, "other")).undone()
     name = store.add(Sketch())
     store.save(name, history)
@@ -63,11 +66,11 @@ def test_a_team_comes_back_as_it_was(store: Store) -> None:
 
 def test_a_relative_folder_is_the_same_in_all_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    project = Projects(Store(Path("teams"))).add(Sketch("a"))
+    project = Projects(TeamStore(Path("teams"))).add(Sketch("a"))
     assert project.folder == tmp_path / "teams" / project.id
 
 
-def test_the_team_that_was_changed_last_is_the_first(store: Store) -> None:
+def test_the_team_that_was_changed_last_is_the_first(store: TeamStore) -> None:
 
     names = [store.add(Sketch()) for _ in range(3)]
     for second, name in enumerate(names):
@@ -75,14 +78,14 @@ def test_the_team_that_was_changed_last_is_the_first(store: Store) -> None:
     assert store.ids() == names[::-1]
 
 
-def test_nothing_is_left_of_a_team_that_is_removed(store: Store) -> None:
+def test_nothing_is_left_of_a_team_that_is_removed(store: TeamStore) -> None:
     name = store.add(SKETCH)
     store.remove(name)
     assert (store.ids(), [*store.folder.iterdir()]) == ([], [])
 
 
 @looped("name", ["", "..", "../../etc", "a" * 11, "a" * 13, "a/../b/../c/", "ä" * 12, "A.b.C.d.E.f."])
-def test_what_is_no_id_is_no_path(store: Store, name: str) -> None:
+def test_what_is_no_id_is_no_path(store: TeamStore, name: str) -> None:
     with pytest.raises(KeyError):
         store.load(name)
 
@@ -94,7 +97,7 @@ def test_what_is_no_id_is_no_path(store: Store, name: str) -> None:
         b'{"x":' + b"[" * 200_000, b'{"now":{"rules":[{"settings":' + b"[" * 200_000,
     ],
 )  # fmt: skip
-def test_a_damaged_file_is_told(store: Store, content: bytes) -> None:
+def test_a_damaged_file_is_told(store: TeamStore, content: bytes) -> None:
     name = store.add(SKETCH)
     (store.path(name) / "history.json").write_bytes(content)
     for read in (store.load, store.now):
@@ -102,7 +105,7 @@ def test_a_damaged_file_is_told(store: Store, content: bytes) -> None:
             read(name)
 
 
-def test_an_edit_is_saved_by_itself(store: Store) -> None:
+def test_an_edit_is_saved_by_itself(store: TeamStore) -> None:
     name = store.add(SKETCH)
 
     async def edit() -> None:
@@ -114,7 +117,7 @@ def test_an_edit_is_saved_by_itself(store: Store) -> None:
     asyncio.run(edit())
 
 
-def test_all_that_look_are_told_of_each_change(store: Store) -> None:
+def test_all_that_look_are_told_of_each_change(store: TeamStore) -> None:
     async def edit() -> list[str]:
         projects = Projects(store)
         project = projects.add(SKETCH)
@@ -155,8 +158,8 @@ UNSOUND = {
     "twins": Sketch(robots=(SketchRobot("A", Cell(0, 0)),) * 2),
     "map": Sketch(area=Area(MAX_SIDE + 1, 1)),
     "no map": Sketch(area=Area(0, 1)),
-    "values": Sketch(decisions=(Decision("slot", Kind.SLOT, tuple(range(MAX_VALUES + 1))),)),
-    "number": Sketch(decisions=(Decision("slot", Kind.SLOT, (10**400,)),)),
+    "values": Sketch(decisions=(Decision("slot", DecisionKind.SLOT, tuple(range(MAX_VALUES + 1))),)),
+    "number": Sketch(decisions=(Decision("slot", DecisionKind.SLOT, (10**400,)),)),
     "far away": Sketch(robots=(SketchRobot("A", Cell(-(10**30), 0)),)),
     "name": Sketch("n" * 100_000),
     "story": Sketch(story="s" * 100_000),
@@ -182,7 +185,7 @@ def full(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
 
 
 @looped("why", UNSOUND)
-def test_a_sketch_beyond_all_bounds_is_damaged(store: Store, why: str) -> None:
+def test_a_sketch_beyond_all_bounds_is_damaged(store: TeamStore, why: str) -> None:
     name = store.add(Sketch())
     (store.path(name) / "history.json").write_bytes(msgspec.json.encode(History(UNSOUND[why])))
     for read in (store.load, store.now):
@@ -190,21 +193,21 @@ def test_a_sketch_beyond_all_bounds_is_damaged(store: Store, why: str) -> None:
             read(name)
 
 
-def test_steps_beyond_all_bounds_cannot_be_undone(store: Store) -> None:
+def test_steps_beyond_all_bounds_cannot_be_undone(store: TeamStore) -> None:
     name = store.add(Sketch())
     hostile = History(Sketch("now"), (UNSOUND["number"],), (Sketch("next"),))
     (store.path(name) / "history.json").write_bytes(msgspec.json.encode(hostile))
     assert store.load(name) == History(Sketch("now"))
 
 
-def test_a_file_that_is_too_large_is_damaged(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_too_large_is_damaged(store: TeamStore, monkeypatch: pytest.MonkeyPatch) -> None:
     name = store.add(Sketch())
     monkeypatch.setattr(app_store, "MAX_BYTES", 10)
     with pytest.raises(ValueError, match="more than"):
         store.load(name)
 
 
-def test_a_long_history_is_kept_with_fewer_steps(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_history_is_kept_with_fewer_steps(store: TeamStore, monkeypatch: pytest.MonkeyPatch) -> None:
     name = store.add(Sketch())
     monkeypatch.setattr(app_store, "MAX_BYTES", 3_000)
     store.save(name, History(Sketch("now"), tuple(Sketch(f"s{step}") for step in range(100))))
@@ -214,7 +217,7 @@ def test_a_long_history_is_kept_with_fewer_steps(store: Store, monkeypatch: pyte
     assert 1 < len(kept.before) < 100
 
 
-def test_an_edit_that_could_not_be_read_again_is_refused(store: Store) -> None:
+def test_an_edit_that_could_not_be_read_again_is_refused(store: TeamStore) -> None:
     project = Project(store, store.add(Sketch()))
     for sketch in UNSOUND.values():
         with pytest.raises(EditError, match="unsound"):
@@ -222,7 +225,7 @@ def test_an_edit_that_could_not_be_read_again_is_refused(store: Store) -> None:
 
 
 def test_a_full_disk_is_told_and_tried_again(
-    store: Store, full: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    store: TeamStore, full: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(app_projects, "SAVE_S", 0.0)
     monkeypatch.setattr(app_projects, "AGAIN_S", 0.0)
@@ -255,14 +258,14 @@ def test_a_full_disk_is_told_and_tried_again(
     assert "the last edits of after could not be saved" in caplog.text
 
 
-def test_a_full_disk_leaves_no_half_of_a_new_team(store: Store, full: Callable[[bool], None]) -> None:
+def test_a_full_disk_leaves_no_half_of_a_new_team(store: TeamStore, full: Callable[[bool], None]) -> None:
     full(True)
     with pytest.raises(OSError, match="space"):
         store.add(Sketch())
     assert [*store.folder.iterdir()] == []
 
 
-def test_a_team_that_was_removed_is_not_edited_and_not_made_again(store: Store) -> None:
+def test_a_team_that_was_removed_is_not_edited_and_not_made_again(store: TeamStore) -> None:
     async def edit() -> None:
         projects = Projects(store)
         project = projects.add(Sketch())
@@ -282,12 +285,12 @@ def test_a_team_that_was_removed_is_not_edited_and_not_made_again(store: Store) 
     wait_until(lambda: not [*store.folder.iterdir()], "something is left of it")
 
 
-def test_two_applications_do_not_share_a_folder(store: Store) -> None:
+def test_two_applications_do_not_share_a_folder(store: TeamStore) -> None:
     with store.locked():
-        with pytest.raises(InUseError, match="--folder"), Store(store.folder).locked():
+        with pytest.raises(InUseError, match="--folder"), TeamStore(store.folder).locked():
             pass
         assert store.ids() == []
-    with Store(store.folder).locked():
+    with TeamStore(store.folder).locked():
         pass
 
 
@@ -296,8 +299,8 @@ import sys
 from pathlib import Path
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.sketch import Cell, Sketch, SketchRobot
-from robochoc.app.store import Store
-store = Store(Path(sys.argv[1]))
+from robochoc.app.store import TeamStore
+store = TeamStore(Path(sys.argv[1]))
 history = History(Sketch(robots=tuple(SketchRobot(f"R{i}", Cell(0, 0)) for i in range(900))))
 while True:
     history = history.edited(Sketch(f"n{len(history.before)}", robots=history.now.robots))
@@ -306,7 +309,7 @@ while True:
 """
 
 
-def test_a_history_is_never_half_whenever_the_server_dies(store: Store) -> None:
+def test_a_history_is_never_half_whenever_the_server_dies(store: TeamStore) -> None:
     name = store.add(Sketch())
     command: list[Any] = [sys.executable, "-c", _SAVES, store.folder, name]
     with store.locked(), subprocess.Popen(command, stdout=subprocess.PIPE) as saving:

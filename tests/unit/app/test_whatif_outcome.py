@@ -6,13 +6,13 @@ import msgspec
 
 from robochoc.app.pages.whatif.outcome import Fate, compare, part_of, parts_of_epochs
 from robochoc.app.runs.result import RunResult
-from robochoc.app.sketch.changes import AnyChange, Battery, Blocked, Fails, Joins, changed
-from robochoc.app.sketch.differences import changing_model
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.changing_model import changing_model
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.team_changes import AnyTeamChange, CellBlocked, LowBattery, RobotFails, RobotJoins, changed
 from robochoc.model.outcome import Verdict
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABC"))
-TASK = Decision("task", Kind.TASK, ("two words", "wash", "dry"))
+TASK = Decision("task", DecisionKind.TASK, ("two words", "wash", "dry"))
 TEAM = Sketch("team", Area(3, 1), ROBOTS, (TASK,), (SketchRule("R1", "different", "task"),))
 
 
@@ -25,7 +25,7 @@ def result(*epochs: tuple[str, dict[str, int | str], int], protocol: str = "dyna
 
 
 def test_robots_stay_move_leave_and_come() -> None:
-    after = changed(TEAM, [Fails("A"), Joins(Cell(0, 0), "D")])
+    after = changed(TEAM, [RobotFails("A"), RobotJoins(Cell(0, 0), "D")])
     said = result(
         ("solution", {"A.task": "two_words", "B.task": "wash", "C.task": "dry"}, 9),
         ("solution", {"B.task": "wash", "C.task": "two_words", "D.task": "dry"}, 4),
@@ -62,5 +62,10 @@ def test_a_team_alone_is_told_by_its_result() -> None:
 
 
 def test_what_has_happened_is_kept_on_disk() -> None:
-    changes: tuple[AnyChange, ...] = (Fails("A"), Blocked(Cell(1, 0)), Battery("B", 40), Joins(Cell(0, 0)))
-    assert msgspec.json.decode(msgspec.json.encode(changes), type=tuple[AnyChange, ...]) == changes
+    changes: tuple[AnyTeamChange, ...] = (
+        RobotFails("A"),
+        CellBlocked(Cell(1, 0)),
+        LowBattery("B", 40),
+        RobotJoins(Cell(0, 0)),
+    )
+    assert msgspec.json.decode(msgspec.json.encode(changes), type=tuple[AnyTeamChange, ...]) == changes

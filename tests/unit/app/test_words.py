@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 
 import robochoc.app
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
-from robochoc.app.sketch.words import listed, robot_words, sentence, short, value_words, weight_of
+from robochoc.app.sketch.sentences import listed, robot_words, sentence, short, value_words, weight_of
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.app.texts import catalogue, say
 from tests.support.cases import looped
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, spoiled
 
-LEVEL, PLACE = Decision("level", Kind.LEVEL, (1, 2, 3)), Decision("place", Kind.PLACE)
+LEVEL, PLACE = Decision("level", DecisionKind.LEVEL, (1, 2, 3)), Decision("place", DecisionKind.PLACE)
 ROBOTS = tuple(SketchRobot(name, Cell(0, 0)) for name in ("North", "South", "East"))
 TEAM = Sketch("team", Area(4, 3), ROBOTS, (LEVEL, PLACE))
 
@@ -65,7 +65,7 @@ def test_cells_are_told_by_column_and_row() -> None:
 
 
 def test_braces_in_a_value_mean_nothing() -> None:
-    task = Decision("task", Kind.TASK, ("{decision} {robots}",))
+    task = Decision("task", DecisionKind.TASK, ("{decision} {robots}",))
     rule = SketchRule("R1", "never", "task", ("North",), {"value": "{decision} {robots}"})
     sketch = msgspec.structs.replace(TEAM, decisions=(task,))
     assert sentence(sketch, rule) == "For North, task is never: {decision} {robots}."

@@ -2,21 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-from nicegui import ui
+from fastapi import Response
+from fastapi.responses import FileResponse
+from nicegui import app, ui
 
 from robochoc.app.pages.background_query import ErrorText, run_query
-from robochoc.app.pages.compare.lines import show_lines
-from robochoc.app.pages.compare.served import REPORT
-from robochoc.app.pages.numbers import bounded_integer
 from robochoc.app.pages.shell import on_leave
-from robochoc.app.projects import Project
+from robochoc.app.pages.widgets import bounded_integer
+from robochoc.app.projects import Project, Projects
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, Possible, Question, possible, study_of
-from robochoc.app.studies.study import ENDED, Stage, StudyState, study_on
+from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, PossibleQuestions, StudyQuestion, possible, study_of
+from robochoc.app.studies.study import ENDED, Line, StudyStage, StudyState, study_on
 from robochoc.app.texts import say
+
+REPORT = "study/report.html"
+"""The address of the report, relative to the pages of its team."""
+
+
+def install_reports(projects: Projects) -> None:
+    """Install the address of reports."""
+
+    @app.get("/team/{name}/" + REPORT)
+    async def report(name: str) -> Response:  # in the event loop, as in all code that opens teams
+        try:
+            file = study_on(projects.open(name)).report
+        except (KeyError, ValueError):
+            file = None
+        if file is None:
+            return Response(status_code=404)
+        policy = "sandbox allow-popups; frame-ancestors 'self'"
+        return FileResponse(file, media_type="text/html", headers={"Content-Security-Policy": policy})
+
+
+def show_lines(lines: Sequence[Line], *, worth: bool = False) -> None:
+    """Show the medians of each protocol. `worth`: whether costs are utilities."""
+    if not lines:
+        return
+    costs = any(line.cost for line in lines)
+    most = max(1.0, *(line.messages for line in lines))
+    heads = ["protocol", "messages", "ncccs", "bytes", *([("worth" if worth else "cost")] if costs else []), "finished"]
+    with ui.element("div").classes("panel compare-lines"), ui.element("table"):
+        with ui.element("caption"):
+            ui.label(say("compare.medians"))
+        with ui.element("thead"), ui.element("tr"):
+            for head in heads:
+                with ui.element("th").props("scope=col"):
+                    ui.label(say(f"compare.head.{head}"))
+        with ui.element("tbody"):
+            for line in lines:
+                _row(line, most, costs=costs)
+
+
+def _row(line: Line, most: float, *, costs: bool) -> None:
+    with ui.element("tr"):
+        with ui.element("th").props("scope=row"):
+            ui.label(line.protocol)
+        with ui.element("td").classes("measured"):
+            ui.label(_count(line.messages))
+            with ui.element("div").classes("track").props("aria-hidden=true"):
+                ui.element("div").classes("fill").style(f"width: {100 * line.messages / most:.1f}%")
+        cells = [_count(line.ncccs), _count(line.bytes)]
+        cells += [("-" if line.cost is None else _count(line.cost))] if costs else []
+        for text in [*cells, say("compare.finished", finished=line.finished, runs=line.runs)]:
+            with ui.element("td"):
+                ui.label(text)
+
+
+def _count(number: float) -> str:
+    return f"{number:,.0f}" if number == int(number) else f"{number:,.1f}"
+
 
 _DELAY_S = 0.2
 _TEAM, _FAMILY = "team", "family"
@@ -29,7 +87,7 @@ def build_compare(project: Project) -> None:
     with ui.element("div"):
         _heading("h1", "compare.title")
         ui.label(say("compare.intro")).classes("soft")
-    if not project.foreign and (not project.sketch.robots or not project.sketch.decisions):
+    if not project.import_folder and (not project.sketch.robots or not project.sketch.decisions):
         with ui.element("div").classes("panel"):
             ui.label(say("compare.empty"))
             ui.link(say("compare.empty-remedy"), f"/team/{project.id}/model")
@@ -43,9 +101,9 @@ class ComparePage:
     def __init__(self, project: Project) -> None:
         self._project = project
         self._study = study_on(project)
-        self._worth = project.foreign is not None and project.facts.maximised
+        self._worth = project.import_folder is not None and project.facts.maximised
         self._sketch: Sketch | None = None
-        self._possible: Possible | None = None
+        self._possible: PossibleQuestions | None = None
         self._boxes: dict[str, ui.checkbox] = {}
         self._text: ui.label | None = None
         self._start: ui.button | None = None
@@ -83,7 +141,7 @@ class ComparePage:
 
     # The form
 
-    def _build_question(self, sketch: Sketch, found: Possible) -> None:
+    def _build_question(self, sketch: Sketch, found: PossibleQuestions) -> None:
         last = self._study.facts.question if self._study.facts else None
         names = [name for name, _ in found.protocols]
         chosen = [name for name in last.protocols if name in names] if last else []
@@ -102,7 +160,7 @@ class ComparePage:
         self._build_study()
         self._follow_start()
 
-    def _build_protocols(self, found: Possible, chosen: list[str]) -> None:
+    def _build_protocols(self, found: PossibleQuestions, chosen: list[str]) -> None:
         with ui.element("fieldset"):
             with ui.element("legend"):
                 ui.label(say("compare.protocols"))
@@ -116,7 +174,7 @@ class ComparePage:
                         ui.tooltip(say(complete if is_complete else "compare.incomplete"))
                     self._boxes[name] = box
 
-    def _build_problems(self, sketch: Sketch, found: Possible, *, of_family: bool) -> None:
+    def _build_problems(self, sketch: Sketch, found: PossibleQuestions, *, of_family: bool) -> None:
         family = found.family
         hint = "ranked" if sketch.is_ranked else "partial" if found.ordered else "drawn"
         with ui.element("fieldset"):
@@ -131,7 +189,7 @@ class ComparePage:
             }
             self._hint = ui.label(self._hints[self._kind.value]).classes("soft small")
             if family is None:
-                none = "compare.family-files" if self._project.foreign else "compare.family-none"
+                none = "compare.family-files" if self._project.import_folder else "compare.family-none"
                 ui.label(say(none)).classes("soft small")
 
     def _build_study(self) -> None:
@@ -149,8 +207,8 @@ class ComparePage:
         self._hint.set_text(self._hints[self._kind.value])
         self._show_study()
 
-    def _question(self) -> Question:
-        return Question(
+    def _question(self) -> StudyQuestion:
+        return StudyQuestion(
             tuple(name for name, box in self._boxes.items() if box.value),
             family=self._kind.value == _FAMILY,
             runs=bounded_integer(self._runs.value, 1, MOST_RUNS, otherwise=1),
@@ -199,18 +257,18 @@ class ComparePage:
 
     def _show(self, facts: StudyState) -> None:
         match facts.stage:
-            case Stage.PREPARING | Stage.RUNNING | Stage.REPORTING:
+            case StudyStage.PREPARING | StudyStage.RUNNING | StudyStage.REPORTING:
                 self._show_progress(facts)
-            case Stage.STOPPED:
+            case StudyStage.STOPPED:
                 _message(say("compare.stopped", done=facts.done, total=facts.total))
-            case Stage.FAILED:
+            case StudyStage.FAILED:
                 _message(say("compare.failed", message=facts.message), bad=True)
-            case Stage.DONE if not facts.lines:
+            case StudyStage.DONE if not facts.lines:
                 _message(say("compare.nothing"), bad=True)
-            case Stage.DONE if self._study.report is not None:
+            case StudyStage.DONE if self._study.report is not None:
                 show_lines(facts.lines, worth=self._worth)
                 self._show_report()
-            case Stage.DONE:
+            case StudyStage.DONE:
                 show_lines(facts.lines, worth=self._worth)
                 _message(say("compare.no-pictures", message=facts.message))
 
@@ -226,9 +284,9 @@ class ComparePage:
 
     def _advance(self, facts: StudyState) -> None:
         words = {
-            Stage.PREPARING: say("compare.preparing"),
-            Stage.RUNNING: say("compare.progress", done=facts.done, total=facts.total),
-            Stage.REPORTING: say("compare.reporting"),
+            StudyStage.PREPARING: say("compare.preparing"),
+            StudyStage.RUNNING: say("compare.progress", done=facts.done, total=facts.total),
+            StudyStage.REPORTING: say("compare.reporting"),
         }[facts.stage]
         self._words.set_text(words)
         self._bar.props["aria-label"] = words

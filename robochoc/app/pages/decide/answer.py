@@ -1,34 +1,76 @@
-"""An answer as a headline in words, and as a table of robots."""
+"""An answer as a headline in words, as a table of robots, and as the costs of its rules."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from html import escape
 
+from nicegui import run, ui
+
 from robochoc.app.flights.answer_check import claim_words
-from robochoc.app.foreign.facts import Facts
-from robochoc.app.pages.foreign.answer import robots_of
+from robochoc.app.imported.facts import ImportedFacts
+from robochoc.app.pages.imported.answer import robots_of
 from robochoc.app.runs.result import RunResult
-from robochoc.app.runs.rule_costs import rules_with_costs
-from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.rule_costs import rule_costs, rules_with_costs
+from robochoc.app.runs.run import Run, RunState
+from robochoc.app.sketch.sentences import listed, sentence, value_words
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.sketch.words import listed, value_words
 from robochoc.app.texts import say
 from robochoc.model.cost_units import cost_shown
+
+MOST_BARS = 40
+"""The maximum number of rules with a bar; the cost of the others is summed up in one line."""
+
+
+async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> None:
+    """Fill `where` with the costs of rules, if there are any. They are computed in a thread."""
+    costs = await run.io_bound(rule_costs, sketch, result.assignment)
+    if not costs or where.is_deleted:
+        return
+    with where, ui.element("section").classes("panel costs"):
+        with ui.element("h2"):
+            ui.label(say("decide.costs"))
+        if result.withdrawn:
+            ui.label(say("decide.costs-aside")).classes("soft")
+        _bars(sketch, costs)
+
+
+def _bars(sketch: Sketch, costs: Mapping[str, int]) -> None:
+    highest_first = sorted(costs.items(), key=lambda item: -item[1])
+    most = max(1, *costs.values())
+    with ui.element("ul").classes("rules"):
+        for name, cost in highest_first[:MOST_BARS]:
+            rule = sketch.rule(name)
+            _bar(f"{name}: {sentence(sketch, rule)}" if rule else name, cost, most)
+        if rest := highest_first[MOST_BARS:]:
+            _bar(say("decide.other-rules", count=len(rest)), sum(cost for _, cost in rest), most)
+    with ui.element("p").classes("together"):
+        ui.label(say("decide.together", cost=cost_shown(sum(costs.values()))))
+
+
+def _bar(words: str, cost: int, most: int) -> None:
+    with ui.element("li"):
+        ui.label(words).classes("words")
+        with ui.element("div").classes("track").props("aria-hidden=true"):
+            ui.element("div").classes("fill").style(f"width: {min(100.0, 100 * cost / most):.1f}%")
+        says = say("decide.rule-paid", cost=cost_shown(cost)) if cost else say("decide.rule-kept")
+        ui.label(says).classes("cost-paid" if cost else "soft")
+
 
 _WHOLE = frozenset({"solution", "optimal"})
 
 
-def headline(run: Run, foreign: Facts | None = None) -> str:
-    """Return the outcome of a run in one or two sentences. `foreign`: the facts about an imported team.
+def headline(run: Run, imported: ImportedFacts | None = None) -> str:
+    """Return the outcome of a run in one or two sentences. `imported`: the facts about an imported team.
 
     For a run from an opened file, the text says that it is a claim of the file, and whether it was checked.
     """
-    return claim_words(run, _headline(run, foreign))
+    return claim_words(run, _headline(run, imported))
 
 
-def _headline(run: Run, foreign: Facts | None) -> str:
+def _headline(run: Run, imported: ImportedFacts | None) -> str:
     result, sketch = run.result, run.sketch
-    if run.state == State.FAILED:
+    if run.state == RunState.FAILED:
         known = {"lost": "decide.lost", "broken": "decide.broken"}
         return say(known[run.message]) if run.message in known else say("decide.failed", why=run.message)
     if result is None:
@@ -37,12 +79,12 @@ def _headline(run: Run, foreign: Facts | None) -> str:
         return say("decide.no-solution")
     if not result.assignment:
         return say("decide.nothing-yet")
-    count = robots_of(foreign, result) if foreign else len(sketch.robots)
-    costs = foreign.costs if foreign else bool(rules_with_costs(sketch))
-    worth = foreign is not None and foreign.maximised
+    count = robots_of(imported, result) if imported else len(sketch.robots)
+    costs = imported.costs if imported else bool(rules_with_costs(sketch))
+    worth = imported is not None and imported.maximised
     words = [_who(count, result), _so_far(result, run.state)]
     words.append(_cost(result, worth=worth) if costs else "")
-    words.append(_bound(run, result, foreign, worth=worth) if costs or run.record.options.withdraw else "")
+    words.append(_bound(run, result, imported, worth=worth) if costs or run.record.options.withdraw else "")
     return " ".join(filter(None, words))
 
 
@@ -54,10 +96,10 @@ def _who(count: int, result: RunResult) -> str:
     return say("decide.one") if count == 1 else say("decide.all", count=count)
 
 
-def _so_far(result: RunResult, state: State) -> str:
+def _so_far(result: RunResult, state: RunState) -> str:
     if result.verdict in _WHOLE:
         return ""
-    return say("decide.stopped") if state == State.STOPPED else say("decide.limit")
+    return say("decide.stopped") if state == RunState.STOPPED else say("decide.limit")
 
 
 def _cost(result: RunResult, *, worth: bool) -> str:
@@ -65,21 +107,21 @@ def _cost(result: RunResult, *, worth: bool) -> str:
     if result.cost is None:
         return ""
     if result.verdict == "optimal" and not result.withdrawn:
-        key = "foreign.worth-proven" if worth else "decide.proven"
+        key = "imported.worth-proven" if worth else "decide.proven"
     else:
-        key = "foreign.worth" if worth else "decide.best"
+        key = "imported.worth" if worth else "decide.best"
     return say(key, cost=cost_shown(result.cost))
 
 
-def _bound(run: Run, result: RunResult, foreign: Facts | None, *, worth: bool) -> str:
+def _bound(run: Run, result: RunResult, imported: ImportedFacts | None, *, worth: bool) -> str:
     """Return the lower bound of the cost, or of the number of robots that must withdraw."""
     if result.verdict in _WHOLE or result.bound is None:
         return ""
     if not run.record.options.withdraw:
-        return say("foreign.worth-bound" if worth else "decide.bound", bound=cost_shown(result.bound))
+        return say("imported.worth-bound" if worth else "decide.bound", bound=cost_shown(result.bound))
     if result.bound <= 0:
         return ""
-    robots = foreign.robots if foreign else run.sketch.robots
+    robots = imported.robots if imported else run.sketch.robots
     weighted = any(robot.weight != 1 for robot in robots)
     return say("decide.aside-bound-weight" if weighted else "decide.aside-bound", bound=cost_shown(result.bound))
 

@@ -14,7 +14,7 @@ from robochoc.app.runs.options import JOURNAL
 from robochoc.app.runs.player import SPEEDS, Player
 from robochoc.app.runs.prepared_team import from_run
 from robochoc.app.runs.run import Run
-from robochoc.app.runs.tape import Said, Tape, recorded
+from robochoc.app.runs.tape import MessageWords, Tape, recorded
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 from robochoc.journal.entries import JournalError
@@ -73,7 +73,7 @@ class ConversationPlayer:
         """Whether the playback is running."""
         return self._player.playing
 
-    def show_live(self, said: Sequence[Said]) -> None:
+    def show_live(self, said: Sequence[MessageWords]) -> None:
         """Show the last messages of a run in progress."""
         self._reset()
         self._controls.set_visibility(False)
@@ -194,7 +194,7 @@ def conversation_of(run: Run, wanted: Callable[[], bool] = lambda: True) -> Tape
     return tape if tape.messages and wanted() else None
 
 
-def said_html(said: Sequence[Said]) -> str:
+def said_html(said: Sequence[MessageWords]) -> str:
     """Return messages as a list, the last one first. Names and texts are escaped."""
     if not said:
         return ""

@@ -8,16 +8,16 @@ from functools import partial
 import msgspec
 from nicegui import run, ui
 
-from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, Finder
 from robochoc.app.conflicts.rules import with_only
-from robochoc.app.pages.model.parts import TroubleLines
+from robochoc.app.conflicts.search import PATIENCE_S, Conflict, ConflictSearch, Finder
 from robochoc.app.pages.shell import edit_error_text, on_leave
+from robochoc.app.pages.widgets import TroubleLines
 from robochoc.app.projects import Project
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError, with_rule, with_rule_switched
+from robochoc.app.sketch.sentences import sentence
 from robochoc.app.sketch.sketch import MAX_COST, Sketch, SketchRule
 from robochoc.app.sketch.troubles import About, Trouble
-from robochoc.app.sketch.words import sentence
 from robochoc.app.texts import say
 
 _USUAL_COST = 10

@@ -10,21 +10,18 @@ from importlib.resources import files
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from robochoc.app.pages.decide.answer import effort, headline, table_html
+from robochoc.app.pages.decide.answer import effort, headline, show_costs, table_html
 from robochoc.app.pages.decide.conversation_player import ConversationPlayer
-from robochoc.app.pages.decide.costs import show_costs
-from robochoc.app.pages.decide.map_picture import decides_places, targets_of
 from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
-from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
+from robochoc.app.pages.decide.picture import decides_places, falling_svg, targets_of, team_svg, values_of
 from robochoc.app.pages.decide.run_options_panel import RunOptionsPanel
-from robochoc.app.pages.foreign.answer import says_of
-from robochoc.app.pages.foreign.answer import table_html as answers_html
-from robochoc.app.pages.foreign.below import ForeignNoSolutionPanel, show_foreign_below
+from robochoc.app.pages.imported.answer import ImportedNoSolutionPanel, says_of, show_imported_below
+from robochoc.app.pages.imported.answer import table_html as answers_html
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.player import Frames
 from robochoc.app.runs.result import RunResult
-from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.run import Run, RunState
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.runs.tape import Tape
 from robochoc.app.sketch.checks import errors_of
@@ -54,13 +51,13 @@ class _Page:
 
     def __init__(self, project: Project) -> None:
         self._project, self._runs = project, runs_of(project)
-        self._foreign = project.facts if project.foreign else None
+        self._imported = project.facts if project.import_folder else None
         """The facts about an imported team."""
         self._run: Run | None = None
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
         self._shown_below: tuple[object, ...] = ()
-        self._no_solution: NoSolutionPanel | ForeignNoSolutionPanel | None = None
+        self._no_solution: NoSolutionPanel | ImportedNoSolutionPanel | None = None
         self._pressed: Run | None = None
         self._frames = Frames()
         with ui.element("h1"):
@@ -94,7 +91,7 @@ class _Page:
         """Start or stop a run; the second click of a double click does not stop the run that the first one started."""
         if event.args not in _SINGLE_CLICKS:
             return
-        if self._run is not None and self._run.state == State.RUNNING:
+        if self._run is not None and self._run.state == RunState.RUNNING:
             self._run.stop()
             self._go.set_text(say("decide.stopping"))
             self._go.disable()
@@ -118,7 +115,7 @@ class _Page:
 
     def _follow_team(self) -> None:
         """Show errors of the team, or that it differs from the team of the shown run."""
-        errors = [] if self._foreign else errors_of(self._project.sketch)  # files were checked when they were opened
+        errors = [] if self._imported else errors_of(self._project.sketch)  # files were checked when they were opened
         self._not_ready.clear()
         if errors:
             with self._not_ready:
@@ -128,7 +125,7 @@ class _Page:
                         with ui.element("li"):
                             ui.label(f"{trouble.text} {trouble.remedy}")
                 ui.link(say("decide.to-model"), f"/team/{self._project.id}/model")
-        running = self._run is not None and self._run.state == State.RUNNING
+        running = self._run is not None and self._run.state == RunState.RUNNING
         self._go.set_enabled(running or not errors)
         self._show()
 
@@ -136,7 +133,7 @@ class _Page:
 
     def _show(self) -> None:
         shown, sketch = self._run, self._sketch()
-        running = shown is not None and shown.state == State.RUNNING
+        running = shown is not None and shown.state == RunState.RUNNING
         self._show_button(running=running)
         self._show_conversation(shown)  # first, since the playback may be of the previous run
         self._show_live(shown, sketch)
@@ -170,13 +167,13 @@ class _Page:
 
     def _show_conversation(self, shown: Run | None) -> None:
         """Show the messages. A short conversation is played back in the tab where the run was started."""
-        if shown is not None and shown.state == State.RUNNING:
+        if shown is not None and shown.state == RunState.RUNNING:
             self._player.show_live(shown.live.said)
             return
         self._player.offer(shown if shown and shown.result else None)
         if shown is not None and shown is self._pressed:
             self._pressed = None
-            if shown.state == State.ENDED and shown.result and _is_short(shown.result):
+            if shown.state == RunState.ENDED and shown.result and _is_short(shown.result):
                 self._player.start()
 
     def _draw(self) -> None:
@@ -188,7 +185,7 @@ class _Page:
 
     def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
         values, unsettled = tape.values_at(number), tape.unsettled_at(number)
-        says = says_of(self._foreign, values) if self._foreign else values_of(sketch, values)
+        says = says_of(self._imported, values) if self._imported else values_of(sketch, values)
         targets = targets_of(sketch, values)
         links = tape.moments[number].links
         self._picture.set_content(team_svg(sketch, says, unsettled=unsettled, spoken=links, targets=targets))
@@ -204,7 +201,7 @@ class _Page:
             self._show_moment(sketch, *played)
             return
         live, result = shown.live, shown.result
-        running = shown.state == State.RUNNING
+        running = shown.state == RunState.RUNNING
         if running and len(sketch.robots) > MOST_LIVE and self._picture.content:
             self._show_facts(shown)
             return
@@ -216,23 +213,23 @@ class _Page:
         unsettled = frozenset(robot.name for robot in sketch.robots if result is None and not live.settled(robot.name))
         aside = frozenset(result.withdrawn if result else ())
         spoken = dict(live.recent) if running else {}
-        says = says_of(self._foreign, values) if self._foreign else values_of(sketch, values)
+        says = says_of(self._imported, values) if self._imported else values_of(sketch, values)
         targets = targets_of(sketch, values)
         picture = team_svg(sketch, says, unsettled=unsettled, aside=aside, spoken=spoken, targets=targets)
         self._picture.set_content(picture)
-        falls = not (self._foreign and self._foreign.maximised)
+        falls = not (self._imported and self._imported.maximised)
         until = shown.seconds if running else 0.0
         self._falling.set_content(falling_svg([*live.costs], live.bound, until) if falls else "")
         self._show_facts(shown)
 
     def _show_facts(self, shown: Run) -> None:
-        live, running = shown.live, shown.state == State.RUNNING
+        live, running = shown.live, shown.state == RunState.RUNNING
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
-            now = "foreign.worth-now" if shown.record.maximised else "decide.best-now"
+            now = "imported.worth-now" if shown.record.maximised else "decide.best-now"
             facts.append(say(now, cost=cost_shown(live.costs[-1][1])))
         if running and live.bound is not None:
-            most = "foreign.worth-bound" if shown.record.maximised else "decide.bound"
+            most = "imported.worth-bound" if shown.record.maximised else "decide.bound"
             facts.append(say(most, bound=cost_shown(live.bound)))
         self._facts.set_text(" · ".join(facts))
 
@@ -242,32 +239,34 @@ class _Page:
             if shown is None:
                 ui.label(say("decide.nothing")).classes("soft")
                 return
-            if shown.state == State.RUNNING and shown.result is None:
+            if shown.state == RunState.RUNNING and shown.result is None:
                 ui.label(say("decide.running")).classes("soft")
                 return
             with ui.element("h2").classes("headline").props("aria-live=polite"):
-                ui.label(headline(shown, self._foreign))
+                ui.label(headline(shown, self._imported))
             if shown.result is None:
                 return
             ui.label(effort(shown)).classes("soft")
-            if shown.message and shown.state == State.ENDED:
+            if shown.message and shown.state == RunState.ENDED:
                 ui.label(say("decide.beside", why=shown.message)).classes("error")
             if why := shown.result.chosen.get("protocol"):
                 ui.label(say("decide.why-chosen", protocol=shown.result.protocol, why=why)).classes("soft")
             if changed:
                 ui.label(say("decide.changed")).classes("changed")
             if shown.result.assignment:
-                table = answers_html(self._foreign, shown.result) if self._foreign else table_html(sketch, shown.result)
+                table = (
+                    answers_html(self._imported, shown.result) if self._imported else table_html(sketch, shown.result)
+                )
                 ui.html(table, sanitize=False).classes("values")
 
     def _show_below(self, shown: Run, result: RunResult, sketch: Sketch) -> None:
-        if self._foreign:
-            self._no_solution = show_foreign_below(self._project, self._foreign, result, self._decide)
+        if self._imported:
+            self._no_solution = show_imported_below(self._project, self._imported, result, self._decide)
         elif result.verdict == "no-solution":
             self._no_solution = NoSolutionPanel(self._project, sketch, self._decide)
         if shown.live.is_cut:
             ui.label(say("decide.live-cut", messages=f"{shown.live.messages:,}")).classes("soft")
-        if result.assignment and not self._foreign:
+        if result.assignment and not self._imported:
             costs = ui.element("div")
             ui.timer(0, partial(show_costs, costs, sketch, result), once=True)
         _command(shown)

@@ -7,7 +7,7 @@ from math import inf
 from nicegui import ui
 
 from robochoc.app.pages.background_query import ErrorText, run_query
-from robochoc.app.pages.numbers import bounded_integer
+from robochoc.app.pages.widgets import bounded_integer
 from robochoc.app.projects import Project
 from robochoc.app.runs.fitting import Fitting, fitting
 from robochoc.app.runs.options import MAX_SEED, RunOptions

@@ -4,27 +4,70 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import datetime
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from nicegui import ui
 
-from robochoc.app.flights.builder import MOST_MESSAGES, FlightBuilder, Stage, builder_of, flies
+from robochoc.app.flights.builder import MOST_MESSAGES, BuildStage, FlightBuilder, builder_of, flies
 from robochoc.app.flights.flight_map import happened_in
-from robochoc.app.flights.flight_result import flight_result_of, flight_words
-from robochoc.app.flights.flying_robots import flying_robots_words
-from robochoc.app.flights.listing import run_words
+from robochoc.app.flights.flight_result import flight_result_of, flight_words, flying_robots_words
 from robochoc.app.flights.report import summary
+from robochoc.app.pages.fly.frames import RunFrames
 from robochoc.app.pages.fly.saved_files import relative_address
 from robochoc.app.pages.fly.share_panel import build_share_panel
-from robochoc.app.pages.fly.stage import Stage as Frames
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
-from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.run import Checked, Run, RunState
 from robochoc.app.runs.runs import MOST_KEPT, runs_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
+
+_PURPOSES = {"decide": "decide", "whatif": "whatif", "whatif-anew": "anew"}
+_VERDICTS = frozenset({"solution", "optimal", "no-solution"})
+
+
+def run_words(run: Run, now: datetime | None = None) -> str:
+    """Return a run in a line.
+
+    Args:
+        run: The run.
+        now: The local time; by default the present. The lines of runs on other days include the date.
+    """
+    began = datetime.fromtimestamp(run.record.started).astimezone()
+    when = (
+        f"{began:%H:%M}" if began.date() == (now or datetime.now().astimezone()).date() else f"{began:%Y-%m-%d %H:%M}"
+    )
+    return say("fly.run.line", when=when, purpose=purpose_words(run), verdict=_verdict(run))
+
+
+def purpose_words(run: Run) -> str:
+    """Return the purpose of a run in words."""
+    key = "opened" if run.record.opened else _PURPOSES.get(run.record.purpose, "other")
+    return say(f"fly.run.{key}")
+
+
+def _verdict(run: Run) -> str:
+    result = run.result
+    if result is None:
+        return say("fly.verdict.nothing")
+    key = result.verdict if result.verdict in _VERDICTS else "stopped" if run.state == RunState.STOPPED else "limit"
+    if key in {"stopped", "limit"} and not result.assignment:
+        return say("fly.verdict.nothing")
+    words = [say(f"fly.verdict.{key}")]
+    if result.withdrawn:
+        words.append(say("fly.verdict.aside", count=len(result.withdrawn)))
+    if result.cost:
+        words.append(
+            say("fly.verdict.worth" if run.record.maximised else "fly.verdict.cost", cost=cost_shown(result.cost))
+        )
+    if run.record.checked in {Checked.BROKEN, Checked.COST}:
+        words.append(say("fly.verdict.wrong"))
+    return ", ".join(words)
+
 
 _TICK_S = 0.5
 _LONGEST_ID = 20
@@ -44,7 +87,7 @@ class _Page:
         self._runs = runs_of(project)
         request = ui.context.client.request
         self._asked = request.query_params.get("run", "")[:_LONGEST_ID] if request else ""
-        self._shown: tuple[str, State] | None = None
+        self._shown: tuple[str, RunState] | None = None
         self._leave: Callable[[], None] = _nothing
         self._body = ui.element("div").classes("fly")
         self._follow()
@@ -65,7 +108,7 @@ class _Page:
         if shown == self._shown and shown is not None:
             return
         self._leave()
-        self._leave = run.on_change(self._follow) if run and run.state == State.RUNNING else _nothing
+        self._leave = run.on_change(self._follow) if run and run.state == RunState.RUNNING else _nothing
         self._shown = shown
         self._body.clear()
         with self._body:
@@ -84,12 +127,12 @@ class _Page:
             _title()
             ui.label(say("fly.damaged", why=damaged)).classes("error")
             return
-        if run.state == State.RUNNING:
+        if run.state == RunState.RUNNING:
             _title()
             with ui.row(align_items="center").props("role=status"):
                 ui.spinner(size="1.4rem")
                 ui.label(say("fly.running"))
-        elif run.state == State.FAILED:
+        elif run.state == RunState.FAILED:
             why = say("fly.failed", why=run.message)
             _empty_page(why, "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
         else:
@@ -109,7 +152,7 @@ class _Page:
             ui.label(say("fly.old")).classes("note")
         making = builder_of(run)
         if not flies(run):
-            remedy = "fly.no-places-files" if self._project.foreign else "fly.no-places-remedy"
+            remedy = "fly.no-places-files" if self._project.import_folder else "fly.no-places-remedy"
             _note("fly.no-places", remedy, "fly.to-model", f"/team/{self._project.id}/model")
         elif not making.has_answer:
             ui.label(say("fly.no-answer")).classes("note")
@@ -121,7 +164,7 @@ class _Page:
 
     def _choice(self, run: Run) -> None:
         """Add the choice of earlier runs, if there are any."""
-        runs = [one for one in self._runs.all() if one.state in {State.ENDED, State.STOPPED}]
+        runs = [one for one in self._runs.all() if one.state in {RunState.ENDED, RunState.STOPPED}]
         if len(runs) < 2:  # noqa: PLR2004 - nothing to choose
             return
         options = {one.id: run_words(one) for one in runs}
@@ -145,7 +188,7 @@ class _BuiltFrames:
             self._cancel = ui.button(say("fly.cancel"), on_click=self._stop).props("flat no-caps dense")
             self._again = ui.button(say("fly.again"), on_click=self._begin).props("flat no-caps dense")
         self._troubles = ui.element("div").classes("fly-troubles").props("role=status")
-        self.frames = Frames(flies=making.has_flight, talks=making.has_conversation)
+        self.frames = RunFrames(flies=making.has_flight, talks=making.has_conversation)
         self._timer = ui.timer(_TICK_S, self._show_time)
         self._release: Callable[[], None] = _nothing
         self._begin()
@@ -165,11 +208,11 @@ class _BuiltFrames:
 
     def _update(self) -> None:
         making, stage = self._builder, self._builder.stage
-        works = stage in {Stage.FLIGHT, Stage.CONVERSATION}
-        self._line.set_visibility(stage != Stage.DONE)
+        works = stage in {BuildStage.FLIGHT, BuildStage.CONVERSATION}
+        self._line.set_visibility(stage != BuildStage.DONE)
         self._spinner.set_visibility(works)
         self._cancel.set_visibility(works)
-        self._again.set_visibility(stage == Stage.WAITING)
+        self._again.set_visibility(stage == BuildStage.WAITING)
         self._timer.active = works
         self._show_time()
         flight, talk = _framed(making, making.flight), _framed(making, making.conversation)
@@ -190,7 +233,7 @@ class _BuiltFrames:
         for sentence in words:
             ui.label(sentence).classes("error" if flown and flown.refused else "note")
         failed = making.troubles or (flown and flown.refused)
-        if making.stage == Stage.DONE and failed:
+        if making.stage == BuildStage.DONE and failed:
             ui.button(say("fly.try-again"), icon="refresh", on_click=self._try_again).props("flat no-caps dense")
 
     def _try_again(self) -> None:
@@ -202,9 +245,9 @@ class _BuiltFrames:
 
     def _show_time(self) -> None:
         stage = self._builder.stage
-        if stage == Stage.WAITING:
+        if stage == BuildStage.WAITING:
             self._says.set_text(say("fly.cancelled"))
-        elif stage != Stage.DONE:
+        elif stage != BuildStage.DONE:
             self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._builder.seconds)))
 
 

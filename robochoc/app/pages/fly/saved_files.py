@@ -15,9 +15,8 @@ from nicegui import app
 
 from robochoc import __version__
 from robochoc.app.flights.builder import CONVERSATION, FLIGHT, RECORDING
-from robochoc.app.flights.file_names import file_name
 from robochoc.app.flights.report import Pages, report
-from robochoc.app.flights.state import packed, team_archive
+from robochoc.app.flights.saved_state import file_name, packed, team_archive
 from robochoc.app.projects import Projects
 from robochoc.app.runs.run import Run
 from robochoc.app.runs.runs import runs_of

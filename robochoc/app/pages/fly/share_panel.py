@@ -8,14 +8,13 @@ from collections.abc import Callable
 from nicegui import ui
 
 from robochoc.app.flights.builder import RECORDING, CannotMakeError, FlightBuilder, can_record, flies
-from robochoc.app.flights.file_names import file_name
-from robochoc.app.flights.state import MOST_SAID, is_too_long
+from robochoc.app.flights.saved_state import MOST_SAID, file_name, is_too_long
+from robochoc.app.pages.fly.frames import RunFrames
 from robochoc.app.pages.fly.saved_files import REPORT, STATE, TEAM, relative_address
-from robochoc.app.pages.fly.stage import Stage
 from robochoc.app.texts import say
 
 
-def build_share_panel(making: FlightBuilder, stage: Stage | None) -> None:
+def build_share_panel(making: FlightBuilder, stage: RunFrames | None) -> None:
     """Fill the current container."""
     run = making.run
     name = run.sketch.name
@@ -60,7 +59,7 @@ def _recording(making: FlightBuilder) -> None:
             button.on_click(record)
 
 
-def _copy(run: str, stage: Stage | None) -> None:
+def _copy(run: str, stage: RunFrames | None) -> None:
     address = json.dumps(f"fly?run={run}")
     there = f"getElement({stage.id}).link({address})" if stage else f"new URL({address}, location.href).href"
     button = _button("tell.copy", "tell.link", lambda: ui.notify(say("tell.copied")))

@@ -20,14 +20,14 @@ SELECT = "select"
 MOST_MOVES = 2**53
 
 
-class Clicked(msgspec.Struct):
+class RobotClicked(msgspec.Struct):
     """A clicked robot; `more`: whether the selection is extended."""
 
     name: str
     more: bool = False
 
 
-class Act(msgspec.Struct):
+class BoardAction(msgspec.Struct):
     """An action that was chosen at a robot (`name`), or at a cell."""
 
     act: str
@@ -36,7 +36,7 @@ class Act(msgspec.Struct):
     y: int = 0
 
 
-class Moved(msgspec.Struct):
+class RobotDragged(msgspec.Struct):
     """A robot that was dragged to a cell. `sent`: the number of moves sent by this tab."""
 
     name: str
@@ -53,21 +53,21 @@ def _nothing(*_: object) -> None:
 class BoardEvents:
     """The handlers of a board's events, which the page defines."""
 
-    robot: Callable[[Clicked], object] = _nothing
+    robot: Callable[[RobotClicked], object] = _nothing
     cell: Callable[[Cell], object] = _nothing
-    moved: Callable[[Moved], object] = _nothing
+    moved: Callable[[RobotDragged], object] = _nothing
     removed: Callable[[str], object] = _nothing
     rule: Callable[[str], object] = _nothing
     cleared: Callable[[], object] = _nothing
-    act: Callable[[Act], object] = _nothing
+    act: Callable[[BoardAction], object] = _nothing
     types: dict[str, type] = field(
         default_factory=lambda: {
-            "robot": Clicked,
+            "robot": RobotClicked,
             "cell": Cell,
-            "moved": Moved,
+            "moved": RobotDragged,
             "removed": str,
             "rule": str,
-            "act": Act,
+            "act": BoardAction,
         }
     )
 
@@ -134,7 +134,7 @@ class Board(Element, component="board.js"):
             given: object = msgspec.convert(event.args, self._events.types[name])
         except msgspec.ValidationError:
             return  # not from our board
-        if isinstance(given, Moved):  # the board retains moves that are not confirmed by this
+        if isinstance(given, RobotDragged):  # the board retains moves that are not confirmed by this
             self._change("heard", given.sent)
         getattr(self._events, name)(given)
 

@@ -8,7 +8,9 @@ import msgspec
 from nicegui import ui
 
 from robochoc.app.pages.model.desk import Desk
-from robochoc.app.pages.model.parts import (
+from robochoc.app.pages.model.values import first_values, free_decision_name, typed_values, written_values
+from robochoc.app.pages.shell import edit_error_text
+from robochoc.app.pages.widgets import (
     Cards,
     TroubleLines,
     everybody_button,
@@ -18,20 +20,18 @@ from robochoc.app.pages.model.parts import (
     put,
     refuse_last,
 )
-from robochoc.app.pages.model.values import first_values, free_decision_name, typed_values, written_values
-from robochoc.app.pages.shell import edit_error_text
 from robochoc.app.sketch.edits import EditError, with_decision, without_decision
-from robochoc.app.sketch.sketch import NUMBERED, Decision, Kind, Sketch
+from robochoc.app.sketch.sketch import NUMBERED, Decision, DecisionKind, Sketch
 from robochoc.app.sketch.troubles import About
 from robochoc.app.texts import say
 
 ICONS = {
-    Kind.LEVEL: "height",
-    Kind.PLACE: "place",
-    Kind.SLOT: "schedule",
-    Kind.CHANNEL: "wifi",
-    Kind.TASK: "task_alt",
-    Kind.CHOICE: "tune",
+    DecisionKind.LEVEL: "height",
+    DecisionKind.PLACE: "place",
+    DecisionKind.SLOT: "schedule",
+    DecisionKind.CHANNEL: "wifi",
+    DecisionKind.TASK: "task_alt",
+    DecisionKind.CHOICE: "tune",
 }
 
 
@@ -45,7 +45,7 @@ class DecisionsPanel:
             with ui.element("div").classes("stack") as box:
                 self._cards = Cards(box, partial(_DecisionCard, desk))
             with ui.element("div").classes("adders").props(f'role=group aria-label="{say("model.add-decision")}"'):
-                for kind in Kind:
+                for kind in DecisionKind:
                     button = ui.button(say(f"kind.{kind}"), icon=ICONS[kind], on_click=partial(self._add, kind))
                     button.props("outline dense no-caps").classes("adder")
                     name_it(button, say("model.add-kind", kind=say(f"kind.{kind}")))
@@ -56,7 +56,7 @@ class DecisionsPanel:
         self._hint.set_visibility(not decisions)
         self._cards.follow([(place, decision.kind) for place, decision in enumerate(decisions)])
 
-    def _add(self, kind: Kind) -> None:
+    def _add(self, kind: DecisionKind) -> None:
         sketch = self._desk.sketch
         name = free_decision_name(sketch, kind.value)
         values = first_values(sketch, kind, say("model.first-names"))
@@ -66,7 +66,7 @@ class DecisionsPanel:
 class _DecisionCard:
     """A decision: its name, values and robots."""
 
-    def __init__(self, desk: Desk, key: tuple[int, Kind]) -> None:
+    def __init__(self, desk: Desk, key: tuple[int, DecisionKind]) -> None:
         self._desk, (self._place, self._kind) = desk, key
         self._following = False
         with ui.element("article").classes("entry") as self.element:
@@ -83,7 +83,7 @@ class _DecisionCard:
                 self._everybody = everybody_button(lambda: self._change(robots=()))
                 self._values: ui.input | None = None
                 self._cells: ui.switch | None = None
-                if self._kind == Kind.PLACE:
+                if self._kind == DecisionKind.PLACE:
                     self._about_cells()
                 else:
                     self._values = ui.input(say("model.values"), validation=self._given)

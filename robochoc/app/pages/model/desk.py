@@ -9,7 +9,7 @@ from robochoc.app.listeners import Listeners
 from robochoc.app.pages.shell import edit_error_text
 from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError
-from robochoc.app.sketch.sketch import Kind, Sketch
+from robochoc.app.sketch.sketch import DecisionKind, Sketch
 from robochoc.app.sketch.troubles import About, Trouble
 
 Edit = Callable[[Sketch], Sketch]
@@ -106,7 +106,7 @@ class Desk:
         if self.opened is not None and self.sketch.rule(self.opened) is None:
             self.opened = None
         decision = None if self.cells_of is None else self.sketch.decision(self.cells_of)
-        if decision is None or decision.kind != Kind.PLACE:
+        if decision is None or decision.kind != DecisionKind.PLACE:
             self.cells_of = None
         if self.just_added not in self.selected:
             self.just_added = None

@@ -5,25 +5,111 @@ from __future__ import annotations
 from functools import cache
 from importlib.resources import files
 
+import msgspec
 from nicegui import run, ui
 
-from robochoc.app.pages.model.board import SELECT, Board, BoardEvents, Clicked, Moved
-from robochoc.app.pages.model.clicks import with_cell_clicked, with_robot_clicked
+from robochoc.app.pages.model.board import SELECT, Board, BoardEvents, RobotClicked, RobotDragged
 from robochoc.app.pages.model.decisions_panel import DecisionsPanel
 from robochoc.app.pages.model.desk import Desk
-from robochoc.app.pages.model.map_fields import MapFields
-from robochoc.app.pages.model.parts import TroubleLines
 from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
 from robochoc.app.pages.model.robots_panel import RobotsPanel, without_robots
 from robochoc.app.pages.model.rules_panel import RulesPanel
 from robochoc.app.pages.model.sources import Sources
+from robochoc.app.pages.model.values import with_cell
 from robochoc.app.pages.shell import on_leave
+from robochoc.app.pages.widgets import TroubleLines, number_field, put
 from robochoc.app.projects import Project
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.edits import with_cell_blocked, with_robot, with_robot_moved
-from robochoc.app.sketch.sketch import Cell, Sketch
+from robochoc.app.sketch.edits import (
+    EditError,
+    check_cell,
+    with_area,
+    with_cell_blocked,
+    with_decision,
+    with_robot,
+    with_robot_moved,
+    with_rule,
+)
+from robochoc.app.sketch.palette import Form
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sketch import MAX_SIDE, Cell, DecisionKind, Setting, Sketch, SketchRule
 from robochoc.app.sketch.troubles import About, Trouble
 from robochoc.app.texts import say
+
+
+class MapFields:
+    """The columns and rows of the map."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        with ui.element("div").classes("map-size").props(f'role=group aria-label="{say("model.map-size")}"'):
+            self._columns = number_field("model.columns", 1, MAX_SIDE, lambda value: self._change(columns=value))
+            ui.label("×").props("aria-hidden=true").classes("soft")  # noqa: RUF001 - the sign of multiplication
+            self._rows = number_field("model.rows", 1, MAX_SIDE, lambda value: self._change(rows=value))
+        self._follow()
+        on_leave(desk.project.on_change(self._follow))
+
+    def _follow(self) -> None:
+        put(self._columns, self._desk.sketch.area.columns)
+        put(self._rows, self._desk.sketch.area.rows)
+
+    def _change(self, columns: int | None = None, rows: int | None = None) -> str | None:
+        area = self._desk.sketch.area
+        wanted = columns or area.columns, rows or area.rows
+        if wanted == (area.columns, area.rows):
+            return None
+        return self._desk.edit(lambda sketch: with_area(sketch, *wanted))
+
+
+def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
+    """Add a robot to a rule, or remove it. A rule of all robots becomes a rule of this robot.
+
+    Raises:
+        EditError: if it is the last robot of the rule: a rule without robots applies to all.
+    """
+    if sketch.robot(name) is None:
+        return sketch  # the robot was removed meanwhile
+    robots = rule.robots
+    if robots == (name,):
+        raise EditError("edit.last-of-rule", rule.id, robot=name)
+    kept = tuple(one for one in robots if one != name) if name in robots else (*robots, name)
+    return with_rule(sketch, msgspec.structs.replace(rule, robots=kept))
+
+
+def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: str | None) -> Sketch:
+    """Add a cell to the values of the decision `cells_of` or to the open rule, or remove it.
+
+    Raises:
+        EditError: if the cell is not on the map (any more), or is the last value.
+    """
+    check_cell(sketch, cell)
+    decision = None if cells_of is None else sketch.decision(cells_of)
+    if decision is not None and decision.kind == DecisionKind.PLACE:
+        values = with_cell(sketch, decision, sketch.area.number(cell))
+        made = msgspec.structs.replace(decision, values=values)
+        return with_decision(sketch, made, instead_of=decision.name)
+    rule = None if opened is None else sketch.rule(opened)
+    return sketch if rule is None else _with_cell_in_rule(sketch, rule, sketch.area.number(cell))
+
+
+def _with_cell_in_rule(sketch: Sketch, rule: SketchRule, number: int) -> Sketch:
+    decision = sketch.decision(rule.decision)
+    if decision is None or decision.kind != DecisionKind.PLACE or number not in sketch.values(decision):
+        return sketch
+    for opening in PALETTE[rule.kind].openings:
+        if opening.form == Form.VALUE:
+            return _filled(sketch, rule, opening.name, number)
+        if opening.form == Form.VALUES:
+            given = rule.settings.get(opening.name)
+            cells = [one for one in given if isinstance(one, int)] if isinstance(given, list) else []
+            kept = [one for one in cells if one != number] if number in cells else [*cells, number]
+            return _filled(sketch, rule, opening.name, [*kept])
+    return sketch
+
+
+def _filled(sketch: Sketch, rule: SketchRule, name: str, value: Setting) -> Sketch:
+    return with_rule(sketch, msgspec.structs.replace(rule, settings={**rule.settings, name: value}))
+
 
 TOOLS = {SELECT: "near_me", "add": "add_circle_outline", "block": "block"}
 """The tools, and their icons."""
@@ -92,7 +178,7 @@ class ModelPage:
             self._desk.looked()
         self._guide()
 
-    def _robot(self, clicked: Clicked) -> None:
+    def _robot(self, clicked: RobotClicked) -> None:
         desk = self._desk
         rule = None if desk.opened is None else desk.sketch.rule(desk.opened)
         if rule is not None:
@@ -118,7 +204,7 @@ class ModelPage:
             self._tools.set_value("add")
             self._cell(cell)
 
-    def _moved(self, moved: Moved) -> None:
+    def _moved(self, moved: RobotDragged) -> None:
         self._desk.do(lambda sketch: with_robot_moved(sketch, moved.name, Cell(moved.x, moved.y)))
 
     def _removed(self, name: str) -> None:

@@ -10,9 +10,9 @@ import msgspec
 
 from robochoc.app.sketch.palette import Links
 from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sentences import sentence, short, weight_of
 from robochoc.app.sketch.sketch import Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.troubles import About, Trouble
-from robochoc.app.sketch.words import sentence, short, weight_of
 from robochoc.app.texts import say
 
 COLOURS = 8

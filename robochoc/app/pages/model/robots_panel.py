@@ -7,7 +7,7 @@ from functools import partial
 from nicegui import ui
 
 from robochoc.app.pages.model.desk import Desk
-from robochoc.app.pages.model.parts import Cards, TroubleLines, number_field, panel, put
+from robochoc.app.pages.widgets import Cards, TroubleLines, number_field, panel, put
 from robochoc.app.sketch.edits import with_importance, with_robot_renamed, without_robot
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.troubles import About

@@ -7,10 +7,10 @@ from typing import NamedTuple
 from nicegui import run, ui
 
 from robochoc.app.pages.model.desk import Desk
-from robochoc.app.pages.model.parts import panel
+from robochoc.app.pages.widgets import panel
 from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.files import xml_sources, zipped
-from robochoc.app.sketch.python_source import python_source
+from robochoc.app.sketch.python_program import python_source
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError

@@ -6,8 +6,8 @@ import re
 
 from robochoc.app.sketch import sketch as limits
 from robochoc.app.sketch.edits import EditError
-from robochoc.app.sketch.shape import MAX_NUMBER
-from robochoc.app.sketch.sketch import NUMBERED, Decision, Kind, Sketch
+from robochoc.app.sketch.element_checks import MAX_NUMBER
+from robochoc.app.sketch.sketch import NUMBERED, Decision, DecisionKind, Sketch
 
 _RANGE = re.compile(r"(-?\d{1,9})\s*(?:-|\u2013|\.{2,3}|to)\s*(-?\d{1,9})", re.ASCII)
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
@@ -15,7 +15,7 @@ _FEW = 3
 """The minimum number of consecutive numbers that are written as a range."""
 
 
-def typed_values(kind: Kind, text: str) -> tuple[int | str, ...]:
+def typed_values(kind: DecisionKind, text: str) -> tuple[int | str, ...]:
     """Return the typed values without duplicates.
 
     Raises:
@@ -49,9 +49,9 @@ def written_values(values: tuple[int | str, ...]) -> str:
     return ", ".join([*parts, *_run(run)])
 
 
-def first_values(sketch: Sketch, kind: Kind, names: str) -> tuple[int | str, ...]:
+def first_values(sketch: Sketch, kind: DecisionKind, names: str) -> tuple[int | str, ...]:
     """Return the initial values of a decision: a number for each robot, or some names."""
-    if kind == Kind.PLACE:
+    if kind == DecisionKind.PLACE:
         return ()
     return tuple(range(1, max(len(sketch.robots), 3) + 1)) if kind in NUMBERED else typed_values(kind, names)
 

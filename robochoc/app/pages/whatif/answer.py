@@ -1,21 +1,85 @@
-"""The team's decision after a change: changed values, and numbers of messages."""
+"""The team's decision after a change: changed values, numbers of messages, and a panel if there is no solution."""
 
 from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
 
 from nicegui import ui
 
 from robochoc.app.flights.answer_check import claim_words
-from robochoc.app.pages.whatif.outcome import Comparison, Fate, Row
+from robochoc.app.pages.decide.answer import effort, headline, table_html
+from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
+from robochoc.app.pages.shell import on_leave
+from robochoc.app.pages.whatif.outcome import ComparisonRow, DecisionComparison, Fate
 from robochoc.app.pages.whatif.story import SavedChange, Story
-from robochoc.app.pages.whatif.ways_out import WaysOut
 from robochoc.app.projects import Project
-from robochoc.app.runs.run import Run, State
-from robochoc.app.sketch.words import listed
+from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.run import Run, RunState
+from robochoc.app.runs.runs import runs_of
+from robochoc.app.sketch.sentences import listed
+from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.model.cost_units import cost_shown
 
+ASIDE = "whatif-aside"
+"""The purpose of a run with withdrawals after a change."""
 
-class Answer:
+
+class WaysOut:
+    """The panel of the page "Decide" for a team without a solution, here for the changed team."""
+
+    def __init__(self, project: Project, story: Story, after: Sketch) -> None:
+        self._project, self._story, self._after = project, story, after
+        self._end_following: Callable[[], None] | None = None
+        self._deciding: asyncio.Task[None] | None = None
+        NoSolutionPanel(project, after, self._decide)
+        self._box = ui.element("div").classes("whatif-aside").props("aria-live=polite")
+        on_leave(self._end)
+        last = runs_of(project).latest_for(ASIDE)
+        if last is not None and _is_of(last, after):
+            self._follow(last)
+
+    def _decide(self, *, withdraw: bool = False) -> None:
+        if withdraw:
+            self._follow(runs_of(self._project).start(RunOptions(withdraw=True), sketch=self._after, purpose=ASIDE))
+        else:  # a rule was changed: decide again before and after the changes
+            self._deciding = asyncio.get_running_loop().create_task(self._story.decide())
+
+    def _end(self) -> None:
+        if self._end_following:
+            self._end_following()
+
+    def _follow(self, run: Run) -> None:
+        self._end()
+        self._end_following = run.on_change(lambda: self._show(run))
+        self._show(run)
+
+    def _show(self, run: Run) -> None:
+        if self._box.is_deleted:
+            self._end()
+            return
+        self._box.clear()
+        with self._box, ui.element("section").classes("panel answer"):
+            if run.state == RunState.RUNNING:
+                ui.label(say("whatif.running"))
+                return
+            with ui.element("h2").classes("headline"):
+                ui.label(headline(run))
+            if run.result is not None:
+                ui.label(effort(run)).classes("soft")
+                if run.result.assignment:
+                    ui.html(table_html(self._after, run.result), sanitize=False).classes("values")
+
+
+def _is_of(run: Run, sketch: Sketch) -> bool:
+    try:
+        return run.sketch == sketch
+    except (OSError, ValueError):  # its files are damaged
+        return False
+
+
+class WhatIfAnswer:
     """The part of the page below the map. It is rebuilt after each change of the outcome."""
 
     def __init__(self, project: Project, story: Story) -> None:
@@ -53,7 +117,7 @@ class Answer:
             ui.label(text).classes("grow")
             ui.button(say("whatif.stop"), icon="stop", on_click=self._story.stop).props("no-caps outline dense")
 
-    def _show_outcome(self, found: Comparison, kept: SavedChange, run: Run) -> None:
+    def _show_outcome(self, found: DecisionComparison, kept: SavedChange, run: Run) -> None:
         with ui.element("div").classes("panel whatif-part"):
             with ui.element("h2"):
                 ui.label(claim_words(run, _headline(found)))
@@ -90,7 +154,7 @@ class Answer:
         self._story.keep()
         ui.notify(say("whatif.kept"))
 
-    def _figures(self, found: Comparison, kept: SavedChange) -> None:
+    def _figures(self, found: DecisionComparison, kept: SavedChange) -> None:
         beside = self._story.beside.result if self._story.beside else None
         anew = None if beside is None or kept.anew else beside.messages
         again = found.after.messages
@@ -110,7 +174,7 @@ class Answer:
             ui.label(text).classes("soft")
 
 
-def _headline(found: Comparison) -> str:
+def _headline(found: DecisionComparison) -> str:
     if found.after.verdict == "no-solution":
         return say("whatif.unsolved")
     if not found.after.solved:
@@ -123,14 +187,14 @@ def _headline(found: Comparison) -> str:
     return say(key, changed=len(found.moved), count=found.stayed, names=listed(found.moved))
 
 
-def _costs(found: Comparison) -> str:
+def _costs(found: DecisionComparison) -> str:
     before, after = found.before, found.after
     if not (before.solved and after.solved) or not (before.cost or after.cost):
         return ""
     return say("whatif.costs", before=cost_shown(before.cost or 0), after=cost_shown(after.cost or 0))
 
 
-def _table(found: Comparison) -> None:
+def _table(found: DecisionComparison) -> None:
     several = len({row.decision for row in found.rows}) > 1
     heads = ["who", *(["what"] if several else []), "before", "after"]
     with ui.element("div").classes("whatif-table"), ui.element("table"):
@@ -145,7 +209,7 @@ def _table(found: Comparison) -> None:
                 _line(row, several=several)
 
 
-def _line(row: Row, *, several: bool) -> None:
+def _line(row: ComparisonRow, *, several: bool) -> None:
     with ui.element("tr").classes(f"fate-{row.fate}"):
         with ui.element("th").props("scope=row"):
             ui.label(row.robot)
@@ -173,8 +237,8 @@ def _failure(story: Story) -> str:
     if story.message:
         return say("whatif.failed", message=story.message)
     for run in (story.run, story.beside):
-        if run is not None and run.state == State.FAILED:
+        if run is not None and run.state == RunState.FAILED:
             return say("whatif.failed", message=run.message)
-        if run is not None and run.state == State.STOPPED:
+        if run is not None and run.state == RunState.STOPPED:
             return say("whatif.stopped")
     return say("whatif.unknown") if story.run else ""

@@ -9,8 +9,8 @@ from typing import Any
 
 from robochoc.app.runs.result import RunResult
 from robochoc.app.sketch.building import decided
+from robochoc.app.sketch.sentences import value_words
 from robochoc.app.sketch.sketch import Decision, Sketch, Value
-from robochoc.app.sketch.words import value_words
 from robochoc.modelling.model import Model
 
 Values = Mapping[tuple[str, str], Value]
@@ -29,7 +29,7 @@ class Fate(StrEnum):
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparisonRow:
     """A decision of a robot before and after the change, in words; empty if there is none."""
 
     robot: str
@@ -40,7 +40,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Part:
+class TeamDecision:
     """The decision before or after the change.
 
     Attributes:
@@ -62,12 +62,12 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class DecisionComparison:
     """Both decisions. `protocol` is the protocol after the change."""
 
-    before: Part
-    after: Part
-    rows: tuple[Row, ...]
+    before: TeamDecision
+    after: TeamDecision
+    rows: tuple[ComparisonRow, ...]
     protocol: str
 
     @property
@@ -81,13 +81,15 @@ class Comparison:
         return len({row.robot for row in self.rows if row.fate not in {Fate.LEFT, Fate.NEW}})
 
 
-def part_of(sketch: Sketch, model: Model | None, result: RunResult) -> Part:
+def part_of(sketch: Sketch, model: Model | None, result: RunResult) -> TeamDecision:
     """Return the decision of a run. `model`: the solved model, if it is not that of the sketch."""
     values = decided(sketch, result.assignment, model)
-    return Part(result.verdict, values, result.cost, result.messages)
+    return TeamDecision(result.verdict, values, result.cost, result.messages)
 
 
-def parts_of_epochs(before: Sketch, after: Sketch, model: Model, result: RunResult) -> tuple[Part, Part] | None:
+def parts_of_epochs(
+    before: Sketch, after: Sketch, model: Model, result: RunResult
+) -> tuple[TeamDecision, TeamDecision] | None:
     """Return the decisions in both epochs of a run; None if the run has only one."""
     sketches = before, after
     if len(result.epochs) != len(sketches):
@@ -96,20 +98,22 @@ def parts_of_epochs(before: Sketch, after: Sketch, model: Model, result: RunResu
     return one, other
 
 
-def compare(before: tuple[Sketch, Part], after: tuple[Sketch, Part], protocol: str) -> Comparison:
+def compare(
+    before: tuple[Sketch, TeamDecision], after: tuple[Sketch, TeamDecision], protocol: str
+) -> DecisionComparison:
     """Return the comparison of both decisions, with new robots in the last rows."""
     rows = tuple(_rows(before, after))
-    return Comparison(before[1], after[1], rows, protocol)
+    return DecisionComparison(before[1], after[1], rows, protocol)
 
 
-def _of_epoch(sketch: Sketch, model: Model, epoch: Mapping[str, Any]) -> Part:
+def _of_epoch(sketch: Sketch, model: Model, epoch: Mapping[str, Any]) -> TeamDecision:
     values = decided(sketch, epoch.get("assignment", {}), model)
     cost = epoch.get("cost")
     number = cost if isinstance(cost, int | float) else None
-    return Part(str(epoch.get("verdict")), values, number, int(epoch.get("messages", 0)))
+    return TeamDecision(str(epoch.get("verdict")), values, number, int(epoch.get("messages", 0)))
 
 
-def _rows(before: tuple[Sketch, Part], after: tuple[Sketch, Part]) -> Iterator[Row]:
+def _rows(before: tuple[Sketch, TeamDecision], after: tuple[Sketch, TeamDecision]) -> Iterator[ComparisonRow]:
     names = [robot.name for sketch in (before[0], after[0]) for robot in sketch.robots]
     decisions = [*dict.fromkeys(one.name for sketch in (before[0], after[0]) for one in sketch.decisions)]
     for robot in dict.fromkeys(names):
@@ -118,7 +122,7 @@ def _rows(before: tuple[Sketch, Part], after: tuple[Sketch, Part]) -> Iterator[R
             if was is None and now is None:
                 continue
             old, new = (part.values.get((robot, decision)) for _, part in (before, after))
-            yield Row(
+            yield ComparisonRow(
                 robot,
                 decision,
                 value_words(before[0], was, old) if was and old is not None else "",

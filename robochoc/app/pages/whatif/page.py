@@ -8,18 +8,25 @@ from importlib.resources import files
 
 from nicegui import run, ui
 
-from robochoc.app.pages.model.board import Act, Board, BoardEvents, Clicked
+from robochoc.app.pages.model.board import Board, BoardAction, BoardEvents, RobotClicked
 from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
-from robochoc.app.pages.numbers import bounded_integer
 from robochoc.app.pages.shell import edit_error_text, on_leave
-from robochoc.app.pages.whatif.answer import Answer
-from robochoc.app.pages.whatif.can_continue import why_not_continue
-from robochoc.app.pages.whatif.story import story_of
+from robochoc.app.pages.whatif.answer import WhatIfAnswer
+from robochoc.app.pages.whatif.story import story_of, why_not_continue
+from robochoc.app.pages.widgets import bounded_integer
 from robochoc.app.projects import Project
-from robochoc.app.sketch.changes import FULL, LEAST_BATTERY, AnyChange, Battery, Blocked, Fails, Joins
 from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.edits import EditError
-from robochoc.app.sketch.sketch import MAX_SIDE, Cell, Kind, Sketch
+from robochoc.app.sketch.sketch import MAX_SIDE, Cell, DecisionKind, Sketch
+from robochoc.app.sketch.team_changes import (
+    FULL,
+    LEAST_BATTERY,
+    AnyTeamChange,
+    CellBlocked,
+    LowBattery,
+    RobotFails,
+    RobotJoins,
+)
 from robochoc.app.texts import say
 
 _UPDATE_S = 0.25
@@ -57,7 +64,7 @@ class WhatIfPage:
                 self._build_happenings()
                 self._build_list()
         with ui.element("section").classes("whatif-answer").props("aria-live=polite"):
-            self._answer = Answer(project, self._story)
+            self._answer = WhatIfAnswer(project, self._story)
         self._linking = ui.timer(_LINK_S, self._link, active=False)
         ui.timer(_UPDATE_S, self._answer.update)
         on_leave(project.on_change(self._follow))
@@ -71,7 +78,7 @@ class WhatIfPage:
             with ui.element("div").classes("whatif-row"):
                 self._robots = ui.select([], label=say("whatif.robot"), on_change=self._robot_chosen)
                 self._robots.props("dense outlined options-dense").classes("grow")
-                _act("whatif.fail", "heart_broken", lambda: self._happen(lambda: Fails(self._chosen())))
+                _act("whatif.fail", "heart_broken", lambda: self._happen(lambda: RobotFails(self._chosen())))
             with ui.element("div").classes("whatif-row"):
                 self._slider = ui.slider(min=0, max=FULL, step=5, value=50).classes("grow")
                 self._slider.props(f'label aria-label="{say("whatif.battery")}"')
@@ -83,8 +90,8 @@ class WhatIfPage:
                     ui.number(label=say(key), value=1, min=1, precision=0).props("dense outlined").classes("short")
                     for key in ("whatif.column", "whatif.row")
                 )
-                _act("whatif.block", "block", lambda: self._happen(lambda: Blocked(self._chosen_cell())))
-                _act("whatif.join", "add_circle_outline", lambda: self._happen(lambda: Joins(self._chosen_cell())))
+                _act("whatif.block", "block", lambda: self._happen(lambda: CellBlocked(self._chosen_cell())))
+                _act("whatif.join", "add_circle_outline", lambda: self._happen(lambda: RobotJoins(self._chosen_cell())))
             self._wrong = ui.label().classes("error").props("role=alert")
 
     def _build_list(self) -> None:
@@ -102,7 +109,7 @@ class WhatIfPage:
 
     # Events
 
-    def _robot_clicked(self, clicked: Clicked) -> None:
+    def _robot_clicked(self, clicked: RobotClicked) -> None:
         if clicked.name in (self._robots.options or []):
             self._robots.set_value(clicked.name)
 
@@ -113,15 +120,15 @@ class WhatIfPage:
         self._column.set_value(cell.x + 1)
         self._row.set_value(cell.y + 1)
 
-    def _act(self, chosen: Act) -> None:
+    def _act(self, chosen: BoardAction) -> None:
         """Add the event that was chosen at a robot or a cell of the map."""
         name, cell = chosen.name, Cell(chosen.x, chosen.y)
-        changes: dict[str, AnyChange] = {
-            "fail": Fails(name),
-            "half": Battery(name, FULL // 2),
-            "quarter": Battery(name, FULL // 4),
-            "block": Blocked(cell),
-            "join": Joins(cell),
+        changes: dict[str, AnyTeamChange] = {
+            "fail": RobotFails(name),
+            "half": LowBattery(name, FULL // 2),
+            "quarter": LowBattery(name, FULL // 4),
+            "block": CellBlocked(cell),
+            "join": RobotJoins(cell),
         }
         if (change := changes.get(chosen.act)) is not None:
             self._happen(lambda: change)
@@ -139,9 +146,9 @@ class WhatIfPage:
         return bounded_integer(self._slider.value, 0, FULL, otherwise=FULL)
 
     def _battery_set(self) -> None:
-        self._happen(lambda: Battery(self._chosen(), self._percent()))
+        self._happen(lambda: LowBattery(self._chosen(), self._percent()))
 
-    def _happen(self, change: Callable[[], AnyChange]) -> None:
+    def _happen(self, change: Callable[[], AnyTeamChange]) -> None:
         self._wrong.set_text("")
         try:
             self._story.add(change())
@@ -202,7 +209,7 @@ def _links_and_errors(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, s
 def _offered(sketch: Sketch) -> tuple[dict[str, str], dict[str, str]]:
     """Return the possible events of a robot, and of a cell."""
     robot = {"fail": say("whatif.fail")}
-    if any(decision.kind == Kind.LEVEL for decision in sketch.decisions):
+    if any(decision.kind == DecisionKind.LEVEL for decision in sketch.decisions):
         shares = {"half": FULL // 2, "quarter": FULL // 4}
         robot |= {act: say("whatif.battery-set", percent=percent) for act, percent in shares.items()}
     return robot, {"block": say("whatif.block"), "join": say("whatif.join")}

@@ -14,21 +14,65 @@ import msgspec
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import log_error
 from robochoc.app.pages.background_query import ErrorText, run_query
-from robochoc.app.pages.whatif.outcome import Comparison, Part, compare, part_of, parts_of_epochs
+from robochoc.app.pages.whatif.outcome import DecisionComparison, TeamDecision, compare, part_of, parts_of_epochs
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.run import CHANGE, Run, State
+from robochoc.app.runs.rule_costs import rules_with_costs
+from robochoc.app.runs.run import CHANGE, Run, RunState
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.changes import AnyChange, changed, told
-from robochoc.app.sketch.differences import AnewError, changing_model
+from robochoc.app.sketch.changing_model import FromScratchError, changing_model
 from robochoc.app.sketch.edits import EditError
+from robochoc.app.sketch.palette import Links
+from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.sketch.team_changes import AnyTeamChange, changed, sentences_of
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
+from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 from robochoc.modelling.model import Model
+from robochoc.run.choice import decided
+from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import UnknownProtocolError, protocol_named
+from robochoc.solver.errors import UnsupportedError
+
+MOST_CHOSEN_FOR = 60
+"""For larger teams, the choice of `auto` is not computed before the run."""
+
+
+def why_not_continue(before: Sketch, after: Sketch) -> str:
+    """Return the reason why the team must decide from scratch after a change; empty if it can continue.
+
+    Args:
+        before: The team before the change.
+        after: The team after the change.
+    """
+    if rules_with_costs(before) or rules_with_costs(after):
+        return say("whatif.before-costs")
+    if any(_has_secrets(sketch) for sketch in (before, after)):
+        return say("whatif.before-secrets")
+    try:
+        _ = model_of(after).team
+        return _by_protocol(changing_model(before, after).team)
+    except FromScratchError as anew:
+        return say("whatif.all-anew", why=say(anew.key, **anew.named))
+    except (ModelError, InvalidInputError, UnsupportedError):  # the error is shown elsewhere
+        return ""
+
+
+def _by_protocol(team: Team) -> str:
+    if len(team.robots) > MOST_CHOSEN_FOR:
+        return ""
+    protocol = decided(team, Options(runtime=Runtime.SIMULATOR)).options.protocol
+    return "" if is_dynamic(protocol) else say("whatif.before-protocol", protocol=protocol)
+
+
+def _has_secrets(sketch: Sketch) -> bool:
+    """Return whether two robots have a rule that only one of them knows."""
+    private = [rule for rule in sketch.rules if rule.on and rule.private and rule.kind in PALETTE]
+    return any(PALETTE[rule.kind].links != Links.EACH for rule in private)
+
 
 PURPOSE = "whatif"
 """The purpose of the run that decides before and after the change."""
@@ -56,11 +100,11 @@ class Story:
     def __init__(self, project: Project) -> None:
         self._project = project
         self._listeners = Listeners()
-        self.changes: tuple[AnyChange, ...] = self._loaded()
+        self.changes: tuple[AnyTeamChange, ...] = self._loaded()
         self.kept: SavedChange | None = None
         self.run: Run | None = None
         self.beside: Run | None = None
-        self.outcome: Comparison | None = None
+        self.outcome: DecisionComparison | None = None
         self.message = ""
         """The error of a failed run."""
         self.preparing = False
@@ -78,11 +122,11 @@ class Story:
         """Return the changes in words. Changes that are not possible any more, after an edit, are dropped."""
         while True:
             try:
-                return told(self._project.sketch, self.changes)
+                return sentences_of(self._project.sketch, self.changes)
             except EditError:
                 self.changes = self._possible()
 
-    def add(self, change: AnyChange) -> None:
+    def add(self, change: AnyTeamChange) -> None:
         """Add a change. Raises `EditError` if it is not possible."""
         if len(self.changes) >= MOST_CHANGES:
             raise EditError("whatif.too-many", most=MOST_CHANGES)
@@ -114,7 +158,7 @@ class Story:
     @property
     def running(self) -> bool:
         """Whether a run is in progress."""
-        return self.preparing or any(run.state == State.RUNNING for run in (self.run, self.beside) if run)
+        return self.preparing or any(run.state == RunState.RUNNING for run in (self.run, self.beside) if run)
 
     async def decide(self) -> None:
         """Start a run of the team before and after the changes."""
@@ -127,7 +171,7 @@ class Story:
             self.kept = SavedChange(after, words)
             try:
                 self._model = await asyncio.to_thread(_checked, before, after)
-            except AnewError as anew:
+            except FromScratchError as anew:
                 self._model, self.kept.anew = None, say(anew.key, **anew.named)
             model = self._model
             self.run = runs_of(self._project).start(
@@ -164,8 +208,8 @@ class Story:
     def _follow(self) -> None:
         """Start the second run after the first one, and compute the outcome after both."""
         run, kept = self.run, self.kept
-        if run and kept and run.state != State.RUNNING:
-            if self.beside is None and run.state == State.ENDED and run.result and self._needs_second_run(run):
+        if run and kept and run.state != RunState.RUNNING:
+            if self.beside is None and run.state == RunState.ENDED and run.result and self._needs_second_run(run):
                 protocol = run.result.protocol
                 options = RunOptions(protocol=protocol) if not kept.anew else RunOptions()
                 self.beside = runs_of(self._project).start(options, sketch=kept.after, purpose=BESIDE)
@@ -175,7 +219,7 @@ class Story:
             elif self.outcome is None and self._task is None and not self.running:
                 self._compute_later(self._comparison)
 
-    def _compute_later(self, work: Callable[[], Comparison | None]) -> None:
+    def _compute_later(self, work: Callable[[], DecisionComparison | None]) -> None:
         """Compute the outcome in a thread, since this is slow for a large team."""
 
         async def compute() -> None:
@@ -194,7 +238,7 @@ class Story:
         """Return whether a run from scratch must be measured: the protocol is dynamic, or the first run is not."""
         return bool(self.kept and self.kept.anew) or bool(run.result and is_dynamic(run.result.protocol))
 
-    def _comparison(self) -> Comparison | None:
+    def _comparison(self) -> DecisionComparison | None:
         run, kept, beside = self.run, self.kept, self.beside
         if run is None or kept is None or run.result is None:
             return None
@@ -213,7 +257,7 @@ class Story:
         """Load the last runs, from before a restart of the server."""
         runs = runs_of(self._project)
         run = runs.latest_for(PURPOSE)
-        if run is None or run.state == State.RUNNING:
+        if run is None or run.state == RunState.RUNNING:
             return
         with suppress(OSError, msgspec.DecodeError, ValueError, RecursionError):
             self.kept = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=SavedChange)
@@ -225,9 +269,9 @@ class Story:
             with suppress(OSError):
                 (self.run.folder / CHANGE).write_bytes(msgspec.json.encode(self.kept))
 
-    def _possible(self) -> tuple[AnyChange, ...]:
+    def _possible(self) -> tuple[AnyTeamChange, ...]:
         """Return the changes that are possible for the present team."""
-        found: list[AnyChange] = []
+        found: list[AnyTeamChange] = []
         sketch = self._project.sketch
         for change in self.changes:
             with suppress(EditError):
@@ -235,9 +279,9 @@ class Story:
                 found.append(change)
         return tuple(found)
 
-    def _loaded(self) -> tuple[AnyChange, ...]:
+    def _loaded(self) -> tuple[AnyTeamChange, ...]:
         try:
-            return msgspec.json.decode((self._project.folder / _STORY).read_bytes(), type=tuple[AnyChange, ...])
+            return msgspec.json.decode((self._project.folder / _STORY).read_bytes(), type=tuple[AnyTeamChange, ...])
         except (OSError, msgspec.DecodeError, RecursionError):
             return ()
 
@@ -260,7 +304,9 @@ def is_dynamic(protocol: str) -> bool:
         return False
 
 
-def _compared(before: Sketch, after: Sketch, parts: tuple[Part, Part], protocol: str) -> Comparison:
+def _compared(
+    before: Sketch, after: Sketch, parts: tuple[TeamDecision, TeamDecision], protocol: str
+) -> DecisionComparison:
     return compare((before, parts[0]), (after, parts[1]), protocol)
 
 

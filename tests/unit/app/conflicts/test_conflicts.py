@@ -8,9 +8,9 @@ from random import Random
 
 import pytest
 
-from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder
 from robochoc.app.conflicts.process import found_in
 from robochoc.app.conflicts.rules import candidates, minimal, rule_of
+from robochoc.app.conflicts.search import Conflict, ConflictSearch, Finder
 from tests.support.cases import looped
 from tests.support.rule_teams import can_hold, random_rules
 from tests.support.slot_sketches import slots
@@ -73,10 +73,10 @@ class TestSearch:
         assert ConflictSearch(slots(3, 2), -60).result() == Conflict(None, late=True)
 
     def test_that_a_search_that_fails_says_why(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("robochoc.app.conflicts.found._PROCESS", "robochoc.no_such_module")
+        monkeypatch.setattr("robochoc.app.conflicts.search._PROCESS", "robochoc.no_such_module")
         conflict = found(ConflictSearch(slots(3, 2)))
         assert "no_such_module" in conflict.why
-        monkeypatch.setattr("robochoc.app.conflicts.found.Command", None)
+        monkeypatch.setattr("robochoc.app.conflicts.search.Command", None)
         assert found(ConflictSearch(slots(3, 2))).why == "That did not work. The team is as it was before."
 
 

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.app.conflicts.files import found_in_files, with_only
-from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder, TeamOfFiles
-from robochoc.app.conflicts.process import found_in
-from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
+from robochoc.app.conflicts.by_cpmpy import can_be_undefined, limits_of
+from robochoc.app.conflicts.process import found_in, found_in_files, team_with_only
+from robochoc.app.conflicts.search import Conflict, ConflictSearch, Finder, TeamOfFiles
 from robochoc.formats import read_team, write_team
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Type, parse
@@ -102,8 +101,8 @@ def test_that_it_is_the_team_after_what_has_happened(tmp_path: Path) -> None:
 def test_that_only_some_constraints_are_left() -> None:
     team = pkc_team()
     every = [*team.constraints()]
-    assert [*with_only(team, {0, 2}).constraints()] == [every[0], every[2]]
-    assert [*with_only(team, ()).constraints()] == []
+    assert [*team_with_only(team, {0, 2}).constraints()] == [every[0], every[2]]
+    assert [*team_with_only(team, ()).constraints()] == []
 
 
 def test_that_a_cost_without_a_value_is_told_as_such(tmp_path: Path) -> None:
@@ -122,7 +121,7 @@ def test_that_our_own_solver_looks_where_cpmpy_fails(
     def fails(*_: object) -> None:
         raise _FailsError("model invalid")
 
-    monkeypatch.setattr("robochoc.app.conflicts.files.minimal_of_team", fails)
+    monkeypatch.setattr("robochoc.app.conflicts.process.minimal_of_team", fails)
     monkeypatch.setattr("robochoc.app.conflicts.process.minimal_by_cpmpy", fails)
     write_team(triangle(2), tmp_path / "triangle")
     assert found_in_files(tmp_path / "triangle", 0, 60).finder is Finder.OWN

@@ -7,7 +7,7 @@ from random import Random
 
 from robochoc.app.flights.report import violated_rules
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRule
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRule
 from tests.support.cases import looped
 from tests.support.sketches import random_sketch
 
@@ -16,7 +16,7 @@ def _pair(*rules: SketchRule) -> Sketch:
     sketch = Sketch()
     for column in range(3):
         sketch = edits.with_robot(sketch, Cell(column, 0))
-    sketch = edits.with_decision(sketch, Decision("level", Kind.LEVEL, (1, 2, 3)))
+    sketch = edits.with_decision(sketch, Decision("level", DecisionKind.LEVEL, (1, 2, 3)))
     for rule in rules:
         sketch = edits.with_rule(sketch, rule)
     return sketch

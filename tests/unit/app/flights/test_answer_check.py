@@ -10,14 +10,14 @@ import pytest
 
 from robochoc.app.flights.answer_check import check, claim_words
 from robochoc.app.flights.flight_map import changed_to
-from robochoc.app.flights.state import packed, unpack_run
-from robochoc.app.foreign.drawing import drawn
+from robochoc.app.flights.saved_state import packed, unpack_run
+from robochoc.app.imported.picture import picture_sketch
 from robochoc.app.pages.decide.answer import headline
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.run import CHANGE, Checked, Run, run_of
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.opening import ForeignTeam, opened
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.open_from_disk import ImportedTeam, open_team
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.model.assembly import assemble
@@ -127,7 +127,7 @@ def test_that_ones_own_run_is_told_as_it_is(tmp_path: Path) -> None:
 
 def test_that_values_of_two_words_are_checked(tmp_path: Path) -> None:
     sketch = Sketch("Home", robots=(SketchRobot("Ada", Cell(0, 0)), SketchRobot("Ben", Cell(1, 0))))
-    sketch = edits.with_decision(sketch, Decision("task", Kind.TASK, ("wash up", "dry")))
+    sketch = edits.with_decision(sketch, Decision("task", DecisionKind.TASK, ("wash up", "dry")))
     sketch = edits.with_rule(sketch, SketchRule("", "different", "task"))
     run = kept_run(tmp_path, sketch, assignment={"Ada.task": "wash_up", "Ben.task": "dry"}, cost=None)
     run.record.labels, run.result = {"wash_up": "wash up"}, None
@@ -156,11 +156,11 @@ def test_that_too_large_a_team_is_not_checked(tmp_path: Path, monkeypatch: pytes
 @looped("example", ["rescue", "hangar", "patrol"])
 def test_that_teams_of_files_are_checked(tmp_path: Path, example: str, *, wrong: bool) -> None:
     files = ROOT / "docs/examples" / example
-    found = opened(files)
-    assert isinstance(found, ForeignTeam)
+    found = open_team(files)
+    assert isinstance(found, ImportedTeam)
     outcome = solve(found.team, Options())
     assert outcome.assignment
-    run = kept_run(tmp_path, drawn(found))
+    run = kept_run(tmp_path, picture_sketch(found))
     shutil.copytree(files, run.team)
     told = msgspec.json.decode(result_json(outcome))
     if wrong:
@@ -182,7 +182,7 @@ def test_that_a_worth_is_checked_in_the_users_numbers(tmp_path: Path, cost: floa
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(maximize=True, places=1, constant=5),
     )
-    run = kept_run(tmp_path, drawn(ForeignTeam(tmp_path, team)), assignment={"x": 2, "y": 2}, cost=cost)
+    run = kept_run(tmp_path, picture_sketch(ImportedTeam(tmp_path, team)), assignment={"x": 2, "y": 2}, cost=cost)
     run.record.opened = True
     write_team(team, run.team)
     check(run)

@@ -10,7 +10,7 @@ import msgspec
 from robochoc.app.flights.report import Pages, report, summary
 from robochoc.app.runs.options import RESULT, RunOptions
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
 
@@ -67,7 +67,7 @@ def test_it_tells_who_decided_what_by_which_rules_and_how_to_repeat_it(tmp_path:
 
 def test_that_names_of_two_words_are_told(tmp_path: Path) -> None:
     sketch = Sketch("Home", robots=(SketchRobot("Ada", Cell(0, 0)), SketchRobot("Ben", Cell(1, 0))))
-    sketch = edits.with_decision(sketch, Decision("task", Kind.TASK, ("wash up", "dry")))
+    sketch = edits.with_decision(sketch, Decision("task", DecisionKind.TASK, ("wash up", "dry")))
     sketch = edits.with_rule(sketch, SketchRule("", "prefers", "task", settings={"value": "dry"}, cost=3))
     run = kept_run(tmp_path, sketch, assignment={"Ada.task": "wash_up", "Ben.task": "dry"})
     run.record.labels, run.result = {"wash_up": "wash up"}, None

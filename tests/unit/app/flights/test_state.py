@@ -12,17 +12,16 @@ from random import Random
 import msgspec
 import pytest
 
-from robochoc.app.flights import state
-from robochoc.app.flights.file_names import file_name
-from robochoc.app.flights.state import MAX_BYTES, MOST_SAID, is_too_long, packed, unpack_run
-from robochoc.app.foreign.drawing import drawn
+from robochoc.app.flights import saved_state
+from robochoc.app.flights.saved_state import MAX_BYTES, MOST_SAID, file_name, is_too_long, packed, unpack_run
+from robochoc.app.imported.picture import picture_sketch
 from robochoc.app.runs.options import JOURNAL
 from robochoc.app.runs.run import CHANGE, SKETCH, Checked
 from robochoc.app.runs.runs import Runs
-from robochoc.app.sketch import opening
-from robochoc.app.sketch.opening import ForeignTeam, opened
+from robochoc.app.sketch import open_from_disk
+from robochoc.app.sketch.open_from_disk import ImportedTeam, open_team
 from robochoc.app.sketch.sketch import MAX_ROBOTS, Area, Cell, Sketch, SketchRobot
-from robochoc.app.store import Store
+from robochoc.app.store import TeamStore
 from robochoc.formats import read_team
 from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
@@ -56,7 +55,7 @@ def _changed(content: bytes, **entries: bytes) -> bytes:
 def test_what_is_packed_is_the_same_elsewhere(tmp_path: Path) -> None:
     run = kept_run(tmp_path / "here", cube())
     file = _file(tmp_path, packed(run))
-    assert opened(file) == run.sketch
+    assert open_team(file) == run.sketch
     assert unpack_run(file, tmp_path / "there")
     again = Runs(Team(Sketch(), tmp_path / "there")).latest
     assert again is not None
@@ -109,23 +108,23 @@ def test_names_in_an_archive_are_no_paths(tmp_path: Path) -> None:
 
 def test_a_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert MAX_BYTES < 1 << 30
-    monkeypatch.setattr("robochoc.app.flights.state.MAX_BYTES", 1 << 20)
+    monkeypatch.setattr("robochoc.app.flights.saved_state.MAX_BYTES", 1 << 20)
     content = _changed(packed(kept_run(tmp_path, cube())), run_journal=bytes(1 << 22))
     assert not unpack_run(_file(tmp_path, content), tmp_path / "there")
 
 
 def test_the_run_of_a_team_of_files_comes_back_with_its_files(tmp_path: Path) -> None:
     files = ROOT / "docs/examples/rescue"
-    found = opened(files)
-    assert isinstance(found, ForeignTeam)
-    run = kept_run(tmp_path / "here", drawn(found))
+    found = open_team(files)
+    assert isinstance(found, ImportedTeam)
+    run = kept_run(tmp_path / "here", picture_sketch(found))
     shutil.copytree(files, run.team)
     file = _file(tmp_path, packed(run))
-    again = opened(file)
-    assert isinstance(again, ForeignTeam)
+    again = open_team(file)
+    assert isinstance(again, ImportedTeam)
     assert again.team.robots == found.team.robots
-    store = Store(tmp_path / "there")
-    name = store.add_foreign(again)
+    store = TeamStore(tmp_path / "there")
+    name = store.add_imported(again)
     assert unpack_run(file, store.path(name))
     there = Runs(Team(store.now(name), store.path(name))).latest
     assert there is not None
@@ -151,7 +150,7 @@ def test_a_full_disk_leaves_no_part_of_a_run(tmp_path: Path, monkeypatch: pytest
 
 def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = kept_run(tmp_path, cube())
-    monkeypatch.setattr("robochoc.app.flights.state.MOST_SAID", 12)
+    monkeypatch.setattr("robochoc.app.flights.saved_state.MOST_SAID", 12)
     assert is_too_long(run)
     with zipfile.ZipFile(io.BytesIO(packed(run))) as archive:
         assert not any(name.endswith("run.journal") for name in archive.namelist())
@@ -162,7 +161,7 @@ def test_the_messages_that_are_packed_can_be_opened_again(tmp_path: Path) -> Non
     run = kept_run(tmp_path / "here", cube())
     (run.folder / JOURNAL).write_bytes(Random(0).randbytes(1 << 20))  # nothing makes this any smaller
     others = len(packed(run)) - (1 << 20)
-    assert MOST_SAID + others <= opening.MAX_BYTES
+    assert MOST_SAID + others <= open_from_disk.MAX_BYTES
     with (run.folder / JOURNAL).open("r+b") as journal:
         journal.truncate(MOST_SAID)
     assert not is_too_long(run)
@@ -198,7 +197,7 @@ def test_too_large_a_file_of_a_run_is_not_read_to_its_end(
     run = kept_run(tmp_path / "here", cube())
     (run.folder / CHANGE).write_bytes(msgspec.json.encode({"after": cube(2)}))
     content = packed(run)
-    monkeypatch.setitem(state.MOST_AT_ONCE, name, 10)
+    monkeypatch.setitem(saved_state.MOST_AT_ONCE, name, 10)
     assert not unpack_run(_file(tmp_path, content), tmp_path / "there")
 
 

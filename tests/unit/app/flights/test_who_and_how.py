@@ -12,14 +12,13 @@ import pytest
 
 from robochoc.app.flights.builder import FlightBuilder, captioned
 from robochoc.app.flights.flight_map import changed_to, ground_of, happened_in
-from robochoc.app.flights.flight_result import FLOWN, flight_result_of, flight_words, refused
-from robochoc.app.flights.flying_robots import flying_robots_words
-from robochoc.app.flights.listing import run_words
+from robochoc.app.flights.flight_result import FLOWN, flight_result_of, flight_words, flying_robots_words, refused
 from robochoc.app.flights.report import Pages, report
+from robochoc.app.pages.fly.page import run_words
 from robochoc.app.runs.options import RESULT
-from robochoc.app.runs.run import CHANGE, Checked, Run, State
+from robochoc.app.runs.run import CHANGE, Checked, Run, RunState
 from robochoc.app.sketch import edits
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch
 from robochoc.formats import write_team
 from robochoc.maps.ground_map import BlockedCell
 from robochoc.model.problem import RemoveAgent, ScenarioEvent
@@ -81,7 +80,7 @@ def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
         sketch,
         decisions=(
             msgspec.structs.replace(sketch.decisions[0], robots=("Drone1", "Drone2", "Drone3")),
-            Decision("dish", Kind.CHOICE, ("soup", "cake"), ("Cook",)),
+            Decision("dish", DecisionKind.CHOICE, ("soup", "cake"), ("Cook",)),
         ),
     )
     given = {f"Drone{number}.level": number for number in (1, 2, 3)}
@@ -92,7 +91,7 @@ def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
         "2 of 3 robots fly to where they decided to be.",
         "Left while the others were flying: Drone2. Who leaves lands at the edge.",
     ]
-    nobody = kept_run(tmp_path / "nobody", cube(kind=Kind.SLOT))
+    nobody = kept_run(tmp_path / "nobody", cube(kind=DecisionKind.SLOT))
     assert flying_robots_words(nobody) == []
 
 
@@ -158,14 +157,14 @@ def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) 
     for verdict, state, more, words in (
         (
             "solution",
-            State.ENDED,
+            RunState.ENDED,
             {"withdrawn": ("A", "B"), "cost": 0},
             "all rules that must hold are kept, 2 stepped aside",
         ),
-        ("no-solution", State.ENDED, {"assignment": {}, "cost": None}, "no answer is possible"),
-        ("unknown", State.STOPPED, {"cost": 6}, "stopped, the best so far, costs 6"),
-        ("unknown", State.ENDED, {"cost": 0}, "the best so far"),
-        ("unknown", State.STOPPED, {"assignment": {}}, "no answer"),
+        ("no-solution", RunState.ENDED, {"assignment": {}, "cost": None}, "no answer is possible"),
+        ("unknown", RunState.STOPPED, {"cost": 6}, "stopped, the best so far, costs 6"),
+        ("unknown", RunState.ENDED, {"cost": 0}, "the best so far"),
+        ("unknown", RunState.STOPPED, {"assignment": {}}, "no answer"),
     ):
         run.record.state = state
         kept = run.result

@@ -16,9 +16,9 @@ from robochoc.app.pages.background_query import ErrorText, run_query
 from robochoc.app.pages.whatif import story as stories
 from robochoc.app.pages.whatif.story import Story
 from robochoc.app.projects import Projects
-from robochoc.app.runs.run import State
-from robochoc.app.sketch.changes import Fails
-from robochoc.app.store import Store
+from robochoc.app.runs.run import RunState
+from robochoc.app.sketch.team_changes import RobotFails
+from robochoc.app.store import TeamStore
 from robochoc.modelling.errors import ModelError
 from tests.support.limits import HANG_S
 from tests.support.slot_sketches import slots
@@ -54,8 +54,8 @@ def test_a_mistake_is_told_in_its_words_and_a_fault_in_ours(caplog: pytest.LogCa
 
 def _story(folder: Path, then: Callable[[Story], Awaitable[None]]) -> Story:
     async def play() -> Story:
-        story = Story(Projects(Store(folder)).add(slots(3, 3)))
-        story.add(Fails("Drone1"))
+        story = Story(Projects(TeamStore(folder)).add(slots(3, 3)))
+        story.add(RobotFails("Drone1"))
         over = asyncio.Event()
         story.on_change(lambda: None if story.running else over.set())
         await then(story)
@@ -87,5 +87,5 @@ def test_the_second_run_that_cannot_begin_is_told(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(Story, "_needs_second_run", _fails)
     story = _story(tmp_path, lambda story: story.decide())
     assert story.run
-    assert story.run.state is State.ENDED
+    assert story.run.state is RunState.ENDED
     assert story.message == FAULT

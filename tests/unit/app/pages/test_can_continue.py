@@ -7,26 +7,25 @@ import pytest
 
 pytest.importorskip("nicegui")
 
-from robochoc.app.pages.whatif.can_continue import why_not_continue
-from robochoc.app.pages.whatif.story import is_dynamic
-from robochoc.app.sketch.changes import AnyChange, Battery, Blocked, Fails, Joins, changed
-from robochoc.app.sketch.differences import changing_model
-from robochoc.app.sketch.examples import example
+from robochoc.app.pages.whatif.story import is_dynamic, why_not_continue
+from robochoc.app.sketch.changing_model import changing_model
+from robochoc.app.sketch.example_sketches import example
 from robochoc.app.sketch.sketch import Cell, Sketch
+from robochoc.app.sketch.team_changes import AnyTeamChange, CellBlocked, LowBattery, RobotFails, RobotJoins, changed
 from tests.support.cases import looped
 
 
 @looped(
     ("key", "change", "says"),
     [
-        ("channels", Fails("Radio1"), ""),
-        ("coverage", Fails("Eye1"), ""),
-        ("hangar", Joins(Cell(0, 0)), "This team is quicker when it decides anew"),
-        ("charging", Fails("Ada"), "Some rules of this team cost something"),
-        ("secrets", Fails("Press"), "This team has private rules"),
+        ("channels", RobotFails("Radio1"), ""),
+        ("coverage", RobotFails("Eye1"), ""),
+        ("hangar", RobotJoins(Cell(0, 0)), "This team is quicker when it decides anew"),
+        ("charging", RobotFails("Ada"), "Some rules of this team cost something"),
+        ("secrets", RobotFails("Press"), "This team has private rules"),
     ],
 )
-def test_what_is_told_before_comes_true(key: str, change: AnyChange, says: str) -> None:
+def test_what_is_told_before_comes_true(key: str, change: AnyTeamChange, says: str) -> None:
     before = example(key)
     after = changed(before, (change,))
     told = why_not_continue(before, after)
@@ -43,8 +42,8 @@ def test_what_no_event_can_say_is_told_before() -> None:
     assert why_not_continue(before, after) == "The team decides anew: Radio1 counts, or ranks, differently."
 
 
-@pytest.mark.parametrize("change", [Blocked(Cell(0, 0)), Battery("Eye1", 50)])
-def test_a_team_with_a_mistake_is_left_to_its_own_words(change: AnyChange) -> None:
+@pytest.mark.parametrize("change", [CellBlocked(Cell(0, 0)), LowBattery("Eye1", 50)])
+def test_a_team_with_a_mistake_is_left_to_its_own_words(change: AnyTeamChange) -> None:
     before = msgspec.structs.replace(example("coverage"), decisions=())
     assert why_not_continue(before, changed(before, (change,))) == ""
     assert why_not_continue(Sketch("empty"), Sketch("empty")) == ""

@@ -11,18 +11,17 @@ from xml.etree import ElementTree as ET
 import msgspec
 
 from robochoc.app.pages.decide.answer import headline, table_html
-from robochoc.app.pages.decide.map_picture import UNIT, Target, shown_part, targets_of
 from robochoc.app.pages.decide.no_solution_panel import hints_about_rules
-from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
+from robochoc.app.pages.decide.picture import UNIT, TargetCell, falling_svg, shown_part, targets_of, team_svg, values_of
 from robochoc.app.runs.fitting import fitting
-from robochoc.app.runs.labels import value_of
 from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.prepared_team import value_of
 from robochoc.app.runs.result import RunResult, decoded
 from robochoc.app.runs.rule_costs import rule_costs
-from robochoc.app.runs.run import Record, Run, State
+from robochoc.app.runs.run import Record, Run, RunState
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.edits import with_importance
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, Value
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, Value
 from robochoc.model.outcome import Verdict
 from robochoc.verification.checker import assignment_cost
 from tests.support.cases import looped
@@ -35,7 +34,7 @@ HOSTILE = "<img src=x onerror=alert(1)>\"'&{x}"
 
 def _run(
     result: RunResult | None,
-    state: State = State.ENDED,
+    state: RunState = RunState.ENDED,
     message: str = "",
     robots: int = 3,
     *,
@@ -55,11 +54,11 @@ def _run(
         (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1})), "All 3 decide."),
         (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1}, cost=2), robots=1), "The robot decides. It costs 2."),
         (
-            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=9, bound=4), State.STOPPED),
+            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=9, bound=4), RunState.STOPPED),
             "All 3 decide. It was stopped; this is the best so far. It costs 9. Nothing costs less than 4.",
         ),
         (
-            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=1_234_567, bound=1_234_566), State.STOPPED),
+            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=1_234_567, bound=1_234_566), RunState.STOPPED),
             (
                 "All 3 decide. It was stopped; this is the best so far. It costs 1,234,567. "
                 "Nothing costs less than 1,234,566."
@@ -96,10 +95,13 @@ def _run(
                 "It costs 1."
             ),
         ),
-        (_run(None, State.FAILED, "no such thing"), "It could not be decided: no such thing"),
-        (_run(None, State.FAILED, "lost"), "The application ended during this run, and the run with it. Decide again."),
+        (_run(None, RunState.FAILED, "no such thing"), "It could not be decided: no such thing"),
         (
-            _run(None, State.STOPPED),
+            _run(None, RunState.FAILED, "lost"),
+            "The application ended during this run, and the run with it. Decide again.",
+        ),
+        (
+            _run(None, RunState.STOPPED),
             "It ended before anything was found. Give it more time, or choose another protocol.",
         ),
     ],
@@ -117,7 +119,9 @@ def test_that_robots_that_step_aside_are_weighed() -> None:
 
 def test_that_hostile_names_are_text() -> None:
     sketch = Sketch(
-        HOSTILE, robots=(SketchRobot(HOSTILE, Cell(0, 0)),), decisions=(Decision(HOSTILE, Kind.TASK, (HOSTILE,)),)
+        HOSTILE,
+        robots=(SketchRobot(HOSTILE, Cell(0, 0)),),
+        decisions=(Decision(HOSTILE, DecisionKind.TASK, (HOSTILE,)),),
     )
     result = RunResult(Verdict.SOLUTION, assignment={f"{HOSTILE}.{HOSTILE}": HOSTILE})
     says = values_of(sketch, result.assignment)
@@ -130,7 +134,7 @@ def test_that_hostile_names_are_text() -> None:
 
 
 def test_that_a_place_is_short_in_the_picture_and_said_in_the_table() -> None:
-    sketch = Sketch(robots=(SketchRobot("A", Cell(0, 0)),), decisions=(Decision("spot", Kind.PLACE),))
+    sketch = Sketch(robots=(SketchRobot("A", Cell(0, 0)),), decisions=(Decision("spot", DecisionKind.PLACE),))
     result = RunResult(Verdict.SOLUTION, assignment={"A.spot": 17})
     assert values_of(sketch, result.assignment) == {"A": "(2, 3)"}
     assert "column 2, row 3" in table_html(sketch, result)
@@ -150,7 +154,7 @@ def _places() -> Sketch:
     """Two robots that choose cells of a map with a wall, and a level besides."""
     area = Area(4, 3, frozenset({Cell(1, 1)}))
     robots = (SketchRobot("Ada", Cell(0, 0)), SketchRobot("Ben", Cell(3, 0)))
-    decisions = (Decision("spot", Kind.PLACE), Decision("level", Kind.LEVEL, (1, 2)))
+    decisions = (Decision("spot", DecisionKind.PLACE), Decision("level", DecisionKind.LEVEL, (1, 2)))
     return Sketch(area=area, robots=robots, decisions=decisions)
 
 
@@ -158,7 +162,7 @@ def test_that_places_are_drawn_on_the_map_with_an_arrow_from_home() -> None:
     sketch = _places()
     assignment: dict[str, Value] = {"Ada.spot": 11, "Ada.level": 2, "Ben.spot": 3, "Ben.level": 1}
     targets = targets_of(sketch, assignment)
-    assert targets == {"Ada": Target(Cell(3, 2), "2"), "Ben": Target(Cell(3, 0), "1")}
+    assert targets == {"Ada": TargetCell(Cell(3, 2), "2"), "Ben": TargetCell(Cell(3, 0), "1")}
     made = team_svg(sketch, values_of(sketch, assignment), targets=targets)
     assert made.count('class="home"') == made.count('class="way"') == 1  # Ben stays where he is
     assert f'class="wall" d="M{UNIT} {-2 * UNIT}h' in made
@@ -169,14 +173,16 @@ def test_that_places_are_drawn_on_the_map_with_an_arrow_from_home() -> None:
 
 def test_that_who_has_no_place_is_drawn_at_home() -> None:
     sketch = _places()
-    made = team_svg(sketch, {}, aside=frozenset({"Ada"}), targets={"Ada": Target(Cell(3, 2))})
+    made = team_svg(sketch, {}, aside=frozenset({"Ada"}), targets={"Ada": TargetCell(Cell(3, 2))})
     assert 'class="home"' not in made
     assert (made.count('class="aside"'), made.count('class="unsettled"')) == (1, 1)
 
 
 def test_that_of_a_large_map_the_part_is_drawn_that_matters() -> None:
     robots = (SketchRobot("Ada", Cell(30, 30)),)
-    sketch = Sketch(area=Area(60, 60), robots=robots, decisions=(Decision("spot", Kind.PLACE, (31 * 60 + 33,)),))
+    sketch = Sketch(
+        area=Area(60, 60), robots=robots, decisions=(Decision("spot", DecisionKind.PLACE, (31 * 60 + 33,)),)
+    )
     assert shown_part(sketch) == (Cell(29, 29), Cell(34, 32))
 
 

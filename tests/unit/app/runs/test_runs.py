@@ -22,9 +22,9 @@ from robochoc.app.jobs.job import Job, end_all
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.runs.result import RunResult, decoded
-from robochoc.app.runs.run import RECORD, Record, Run, State
+from robochoc.app.runs.run import RECORD, Record, Run, RunState
 from robochoc.app.runs.runs import Runs
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import read_team, write_team
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import Outcome, Verdict
@@ -64,7 +64,7 @@ def until(run: Run, holds: Callable[[], bool]) -> None:
 
 
 def ended(run: Run) -> Run:
-    until(run, lambda: run.state is not State.RUNNING)
+    until(run, lambda: run.state is not RunState.RUNNING)
     return run
 
 
@@ -72,7 +72,7 @@ class TestRun:
     def test_that_the_answer_is_that_of_the_command_line(self, tmp_path: Path) -> None:
         runs = Runs(Team(slots(3, 3), tmp_path))
         run = ended(runs.start(RunOptions(protocol="syncbb")))
-        assert run.state is State.ENDED
+        assert run.state is RunState.ENDED
         assert run.result is not None
         assert (run.result.verdict, run.result.cost, run.result.protocol) == ("optimal", 6, "syncbb")
         assert {run.result.value(f"Drone{number}", "slot") for number in (1, 2, 3)} == {1, 2, 3}
@@ -87,7 +87,7 @@ class TestRun:
 
     def test_that_who_is_above_decides_first(self, tmp_path: Path) -> None:
         robots = SketchRobot("A", Cell(0, 0)), SketchRobot("B", Cell(0, 0), rank=1)
-        slot, rule = Decision("slot", Kind.SLOT, (1, 2)), SketchRule("R1", "different", "slot")
+        slot, rule = Decision("slot", DecisionKind.SLOT, (1, 2)), SketchRule("R1", "different", "slot")
         run = ended(Runs(Team(Sketch("pair", robots=robots, decisions=(slot,), rules=(rule,)), tmp_path)).start())
         assert run.result is not None
         assert run.result.value("B", "slot") == 1
@@ -113,7 +113,7 @@ class TestRun:
         until(run, lambda: bool(run.live.costs))
         run.stop()
         ended(run)
-        assert run.state is State.STOPPED
+        assert run.state is RunState.STOPPED
         assert run.result is not None
         assert (run.result.verdict, run.result.reason) == ("unknown", "somebody has asked to stop")
         assert run.result.cost == sum(range(1, 15))
@@ -129,20 +129,20 @@ class TestRun:
     def test_that_what_cannot_be_fails_with_one_clear_message(self, tmp_path: Path) -> None:
         runs = Runs(Team(slots(3, 3), tmp_path))
         run = ended(runs.start(RunOptions(protocol="abt")))
-        assert run.state is State.FAILED
+        assert run.state is RunState.FAILED
         assert "abt" in run.message
         assert "\n" not in run.message
         wrong = msgspec.structs.replace(
             slots(2, 2), rules=(SketchRule("R1", "never", "slot", settings={"value": "x"}),)
         )
         run = ended(runs.start(sketch=wrong))
-        assert run.state is State.FAILED
+        assert run.state is RunState.FAILED
         assert run.message
 
     def test_that_values_are_told_as_the_user_says_them_and_a_hostile_name_stays_in_its_folder(
         self, tmp_path: Path
     ) -> None:
-        decision = Decision("task", Kind.TASK, ("two words", "<b>it's</b>"))
+        decision = Decision("task", DecisionKind.TASK, ("two words", "<b>it's</b>"))
         rule = SketchRule("R1", "different", "task")
         sketch = slots(2, 2, name="../../--help")
         sketch = msgspec.structs.replace(sketch, decisions=(decision,), rules=(rule,))
@@ -163,9 +163,9 @@ class TestRun:
         first = runs.start(RunOptions(protocol="syncbb"))
         other = runs.start(RunOptions(protocol="syncbb"), purpose="compare")
         second = runs.start(sketch=slots(2, 2))
-        assert ended(first).state is State.STOPPED
-        assert ended(second).state is State.ENDED
-        assert other.state is State.RUNNING
+        assert ended(first).state is RunState.STOPPED
+        assert ended(second).state is RunState.ENDED
+        assert other.state is RunState.RUNNING
 
     def test_that_a_fault_nobody_foresaw_ends_it(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
@@ -175,7 +175,7 @@ class TestRun:
 
         monkeypatch.setattr("robochoc.app.runs.live.LiveReader.advance", fails)
         run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
-        assert run.state is State.FAILED
+        assert run.state is RunState.FAILED
         assert run.message == "That did not work. The team is as it was before."
         assert "ZeroDivisionError" in caplog.text
 
@@ -183,9 +183,9 @@ class TestRun:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("robochoc.app.runs.live.LiveReader.advance", lambda _: True)
-        monkeypatch.setattr("robochoc.app.runs.run_job.READ_ON_S", 0)
+        monkeypatch.setattr("robochoc.app.runs.runs.READ_ON_S", 0)
         run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
-        assert run.state is State.ENDED
+        assert run.state is RunState.ENDED
         assert run.live.is_cut
 
 
@@ -223,7 +223,7 @@ class TestWhatIsRemoved:
                 runs.start()
         assert [*(tmp_path / "runs").iterdir()] == []
         assert runs.all() == []
-        assert ended(runs.start()).state is State.ENDED
+        assert ended(runs.start()).state is RunState.ENDED
 
     def test_that_what_is_no_run_goes_when_a_team_is_opened_again(self, tmp_path: Path) -> None:
         kept = kept_run(tmp_path, slots(2, 2)).folder
@@ -258,8 +258,8 @@ class TestAfterTheServersDeath:
             folder.mkdir(parents=True)
             (folder / RECORD).write_bytes(record)
         second, first = Runs(Team(slots(2, 2), tmp_path)).all()
-        assert (first.state, first.message) == (State.FAILED, "broken")
-        assert (second.state, second.message) == (State.FAILED, "lost")
+        assert (first.state, first.message) == (RunState.FAILED, "broken")
+        assert (second.state, second.message) == (RunState.FAILED, "lost")
 
     @pytest.mark.slow
     @pytest.mark.skipif(sys.platform != "linux", reason="the kernel tells of a parent's death there")

@@ -11,10 +11,10 @@ import pytest
 from robochoc.app.runs.fitting import fitting
 from robochoc.app.runs.prepared_team import TeamFiles
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.app.studies.families import family_of
-from robochoc.app.studies.question import Question, number_of_runs, possible, study_of
+from robochoc.app.studies.question import StudyQuestion, number_of_runs, possible, study_of
 from robochoc.app.texts import say
 from robochoc.experiments.plan import plan_of
 from robochoc.experiments.study import read_study
@@ -23,7 +23,7 @@ from tests.support.cases import looped
 from tests.support.small_teams import pkc_team
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABCD"))
-SLOT = Decision("slot", Kind.SLOT, (1, 2, 3, 4))
+SLOT = Decision("slot", DecisionKind.SLOT, (1, 2, 3, 4))
 DIFFERENT = SketchRule("R1", "different", "slot")
 APART = SketchRule("R2", "apart", "slot", ("A", "B"), {"gap": 2})
 LITTLE = SketchRule("R3", "little", "slot", (), {"step": 1})
@@ -82,7 +82,7 @@ def test_without_links_there_is_no_family(sketch: Sketch) -> None:
 def test_a_study_is_what_the_command_takes(tmp_path: Path, rules: tuple[SketchRule, ...], *, of_family: bool) -> None:
     sketch = team(*rules)
     found = possible(sketch)
-    question = Question(found.usual, family=of_family, runs=2, timeout=5)
+    question = StudyQuestion(found.usual, family=of_family, runs=2, timeout=5)
     text = study_of(sketch, question, found.family)
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     model_of(sketch).save(tmp_path / "team")
@@ -91,7 +91,7 @@ def test_a_study_is_what_the_command_takes(tmp_path: Path, rules: tuple[SketchRu
 
 
 def test_ranks_are_heeded() -> None:
-    question = Question(("abt", "afc-ng"))
+    question = StudyQuestion(("abt", "afc-ng"))
     assert "order" in tomllib.loads(study_of(team(DIFFERENT), question, None))["runs"]
     assert "order" not in tomllib.loads(study_of(team(DIFFERENT, ranks=2), question, None))["runs"]
 
@@ -111,7 +111,7 @@ def test_a_team_of_files_is_compared_without_a_family_and_keeps_its_order_where_
     assert found.ordered
     assert {name for name, _ in found.protocols} >= {"abt", "disfc"}
     runs = [
-        tomllib.loads(study_of(Sketch("pkc"), Question(("abt", "disfc"), ordered=ordered), None))["runs"]
+        tomllib.loads(study_of(Sketch("pkc"), StudyQuestion(("abt", "disfc"), ordered=ordered), None))["runs"]
         for ordered in (True, False)
     ]
     assert ["order" in one for one in runs] == [False, True]

@@ -1,0 +1,169 @@
+"""A robot of an imported team as text: its file, its neighbours, and its constraints in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from robochoc.app.texts import say
+from robochoc.formats.robot_reader import read_robot
+from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Function, Predicate, Relation, Semantics
+from robochoc.model.cost_units import CostUnits, cost_shown
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression.tree import SYMBOLIC
+
+MOST_SENTENCES = 60
+MOST_SHOWN = 40_000
+"""The maximum number of characters of a file that are shown."""
+
+
+class ShownRobotFile(msgspec.Struct, frozen=True):
+    """A robot's file.
+
+    Attributes:
+        name: The file's name.
+        text: Its content, or the beginning of it.
+        is_cut: Whether `text` is only the beginning.
+        neighbours: The robots with common constraints.
+        sentences: Its constraints in words, up to a maximum.
+        count: The number of its constraints.
+    """
+
+    name: str
+    text: str
+    is_cut: bool
+    neighbours: tuple[str, ...]
+    sentences: tuple[str, ...]
+    count: int
+
+
+def read_robot_file(folder: Path, robot: str) -> ShownRobotFile:
+    """Return the file of a robot in the team's `folder`. Raises `InvalidInputError`, `OSError`."""
+    file = _file_of(folder, robot)
+    found = read_robot(file)
+    constraints = [*found.constraints()]
+    says = (sentence(one, found.symbol_table, found.costs) for one in constraints[:MOST_SENTENCES])
+    with file.open(encoding="utf-8", errors="replace") as opened:
+        text = opened.read(MOST_SHOWN + 1)
+    return ShownRobotFile(
+        file.relative_to(folder).as_posix(),
+        text[:MOST_SHOWN],
+        len(text) > MOST_SHOWN,
+        tuple(dict.fromkeys([*(one.name for one in found.parents), *(one.name for one in found.children)])),
+        tuple(says),
+        len(constraints),
+    )
+
+
+def _file_of(folder: Path, robot: str) -> Path:
+    """Return the path of a robot's file; robots that join later are in separate folders."""
+    places = [folder, *sorted(folder.glob("late*"))]
+    return next((file for place in places if (file := place / f"{robot}.xml").is_file()), folder / f"{robot}.xml")
+
+
+_MOST_ROWS = 6
+_LONGEST = 400
+_SIGNS = {
+    "add": "+", "sub": "-", "mul": "·", "div": "/", "mod": "mod", "pow": "^",
+    "eq": "=", "ne": "≠", "lt": "<", "le": "≤", "gt": ">", "ge": "≥", "and": "and", "or": "or", "xor": "xor",
+    "iff": "⇔",
+}  # fmt: skip
+"""Infix operators."""
+
+_FORMS = {"abs": "|{0}|", "dist": "|{0} - {1}|", "neg": "-{0}", "sqr": "{0}²"}
+_WORDED = frozenset({"not", "in"})
+_CLOSED = frozenset({"abs", "not", "min", "max", "imp", "if"})
+"""Operators whose arguments need no parentheses."""
+
+
+def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUnits | None = None) -> str:
+    """Return a constraint in one line, such as `V1 ≠ V2`, with the cost of a violation.
+
+    Args:
+        constraint: The constraint.
+        symbols: The names of the team's symbols, by their codes.
+        units: The units of the costs in its robot's file. None: integers.
+    """
+    units = units or CostUnits()
+    says = _says(constraint, symbols, units)
+    says = says if len(says) <= _LONGEST else f"{says[: _LONGEST - 1]}…"
+    if isinstance(constraint.definition, Predicate) and constraint.cost != INFINITE:
+        cost = cost_shown(CostUnits(places=units.places).told(constraint.cost))
+        says = say("imported.or-costs", says=says, cost=cost)
+    return say("imported.own-part", says=says) if constraint.model == ConstraintModel.PKC else says
+
+
+def _says(constraint: Constraint, symbols: Sequence[str], units: CostUnits) -> str:
+    match constraint.definition:
+        case Relation() as relation:
+            return _table(constraint, relation, symbols, units)
+        case Predicate(parameters=formals, body=body, symbolic=symbolic):
+            return _Reading(dict(zip(formals, constraint.parameters, strict=True)), symbolic, symbols).text(body)
+        case Function(parameters=formals, body=body, symbolic=symbolic):
+            given = dict(zip(formals, constraint.parameters, strict=True))
+            return say("imported.costs", says=_Reading(given, symbolic, symbols).text(body))
+
+
+def _table(constraint: Constraint, relation: Relation, symbols: Sequence[str], units: CostUnits) -> str:
+    """Return a table in words: its decisions and its first rows."""
+    rows = []
+    for number, row in enumerate(relation.tuples[:_MOST_ROWS]):
+        told = ", ".join(_label(value, column in relation.symbolic, symbols) for column, value in enumerate(row))
+        told = told if relation.arity == 1 else f"({told})"
+        rows.append(f"{told}: {_priced(relation.costs[number], units)}" if relation.costs else told)
+    if (more := len(relation.tuples) - len(rows)) > 0:
+        rows.append(say("imported.more-rows", count=f"{more:,}"))
+    over = ", ".join(map(str, constraint.scope))
+    key = {
+        Semantics.SUPPORTS: "imported.table-supports",
+        Semantics.CONFLICTS: "imported.table-conflicts",
+        Semantics.SOFT: "imported.table-soft",
+    }[relation.semantics]
+    return say(key, over=over, rows="; ".join(rows), default=_priced(relation.default_cost, units))
+
+
+def _label(value: int, symbolic: bool, symbols: Sequence[str]) -> str:  # noqa: FBT001 - of a column
+    return symbols[value] if symbolic and 0 <= value < len(symbols) else str(value)
+
+
+def _priced(cost: float, units: CostUnits) -> str:
+    if cost == INFINITE:
+        return say("imported.forbidden")
+    return say("imported.costing", cost=cost_shown(CostUnits(places=units.places).told(cost)))
+
+
+class _Reading:
+    """Converts expressions to infix notation, with parameters replaced by the arguments."""
+
+    def __init__(self, given: Mapping[str, str | int], symbolic: Sequence[str], symbols: Sequence[str]) -> None:
+        self._given, self._symbolic, self._symbols = given, frozenset(symbolic), symbols
+
+    def text(self, expression: Expression, *, inner: bool = False) -> str:
+        """Return the text of an expression, with parentheses if it is an `inner` one and needs them."""
+        match expression:
+            case Constant(value):
+                return str(value)
+            case Name(name):
+                actual = self._given.get(name, name)
+                return self._symbol(actual) if isinstance(actual, int) and name in self._symbolic else str(actual)
+            case Apply(operator, arguments):
+                said = self._applied(operator, arguments)
+                return f"({said})" if inner and operator in _SIGNS else said
+
+    def _applied(self, operator: str, arguments: Sequence[Expression]) -> str:
+        named = operator in SYMBOLIC and any(isinstance(one, Name) and one.name in self._symbolic for one in arguments)
+        inner = operator not in _CLOSED
+        parts = [
+            self._symbol(one.value) if named and isinstance(one, Constant) else self.text(one, inner=inner)
+            for one in arguments
+        ]
+        if operator in _FORMS:
+            return _FORMS[operator].format(*parts)
+        if operator in _WORDED:
+            return say(f"imported.says.{operator}", first=parts[0], others=", ".join(parts[1:]))
+        return f" {_SIGNS[operator]} ".join(parts) if operator in _SIGNS else f"{operator}({', '.join(parts)})"
+
+    def _symbol(self, code: int) -> str:
+        return self._symbols[code] if 0 <= code < len(self._symbols) else str(code)

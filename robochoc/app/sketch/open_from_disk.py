@@ -1,0 +1,220 @@
+"""Open a team from disk: its folder, an archive of it, or a file of another tool."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from robochoc.app.sketch.files import MAX_SKETCH, sketch_in
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.formats import Diagnostic, InvalidInputError, read_team, write_team
+from robochoc.formats.diagnostics import invalid_input
+from robochoc.formats.dialects.dialect import ImportOptions
+from robochoc.formats.dialects.registry import first_bytes, read_foreign, recognise, unknown_format_error
+from robochoc.formats.team_writer import SKETCH_FILE
+from robochoc.model.problem import Team
+from robochoc.system.temporary_files import PrivateFolder
+
+MOST_LISTED = 2 << 20
+"""Bytes of the list of an archive's files: enough for ten thousand of them."""
+
+
+class BoundedFile(io.FileIO):
+    """A file of which no more is read at once than `most`.
+
+    Attributes:
+        most: As many bytes; None: as many as there are.
+    """
+
+    most: int | None = MOST_LISTED
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Read. Raises `ValueError` if it would be too much."""
+        if self.most is not None:
+            here = self.tell()
+            rest = self.seek(0, io.SEEK_END) - here
+            self.seek(here)
+            if (rest if size is None or size < 0 else min(size, rest)) > self.most:
+                raise ValueError("it lists too many files")
+        return super().read(-1 if size is None else size)
+
+
+@contextmanager
+def bounded_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open an archive to be read.
+
+    Raises:
+        ValueError: if it lists too many files; and what `zipfile.ZipFile` raises.
+        OSError: if it cannot be read.
+    """
+    with BoundedFile(path) as file, zipfile.ZipFile(file) as archive:
+        file.most = None
+        yield archive
+
+
+MAX_FILES = 2_000
+"""The maximum number of files of a team. Larger teams can be solved by commands."""
+MAX_BYTES = 64 << 20
+"""The maximum number of bytes of all files of a team, or of a file of another tool."""
+_PARTS = re.compile(r"(?:(?!late\d*/)[^/]+/)?((?:late\d*/)?[^/]+\.xml|sketch\.json)")
+"""The files that are unpacked from an archive: those of a team, which may be in a folder."""
+DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError)
+"""The exceptions of reading a damaged archive."""
+
+
+@dataclass(frozen=True)
+class ImportedTeam:
+    """An imported team, which can be solved, flown and compared, but not edited.
+
+    Attributes:
+        path: The opened file or folder.
+        team: The team.
+        changed: Of a team that was drawn here, the files that were changed later; else empty.
+        notes: Changes by the import, in sentences.
+    """
+
+    path: Path
+    team: Team
+    changed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.team.name
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of its robots."""
+        return tuple(robot.name for robot in self.team.robots)
+
+    @property
+    def variables(self) -> int:
+        """The number of variables."""
+        return len(self.team.variables)
+
+    @property
+    def constraints(self) -> int:
+        """The number of constraints."""
+        return sum(1 for _ in self.team.constraints())
+
+    def save(self, folder: Path, *, replace: bool = False) -> None:
+        """Write its XML files into `folder`. Raises `InvalidInputError` as `files.save` does."""
+        write_team(self.team, folder, replace=replace)
+
+
+def open_team(path: Path, *more: Path) -> Sketch | ImportedTeam:
+    """Return the team at `path`: the sketch if it was drawn here and is unchanged, or else an imported team.
+
+    Args:
+        path: A team's folder, a ZIP archive of one, or a file that `robochoc import` reads.
+        *more: Further files of the same problem, for formats with several.
+
+    Raises:
+        InvalidInputError: if the format is unknown, the files are too large, or they have errors.
+        OSError: if a file cannot be read.
+    """
+    if path.is_dir() and not more:
+        return _folder(path)
+    for file in (path, *more):
+        if first_bytes(file) is None:
+            raise invalid_input(file, "this is not a readable file", "choose a team's folder, or a file")
+        if file.stat().st_size > MAX_BYTES:
+            raise _too_large(file)
+    if not more and zipfile.is_zipfile(path):
+        return _archive(path)
+    if recognise(path) is None:
+        if path.suffix.lower() == ".xml":
+            raise invalid_input(path, "the XML format is unknown", "to open a robot's file, open the team's folder")
+        raise unknown_format_error(path)
+    imported = read_foreign([path, *more], ImportOptions())
+    return ImportedTeam(path, imported.team, notes=tuple(note.text for note in imported.notes))
+
+
+def _folder(folder: Path) -> Sketch | ImportedTeam:
+    xml = _xml_in(folder)
+    found = sketch_in(folder, xml)
+    return found if isinstance(found, Sketch) else ImportedTeam(folder, read_team(folder), changed=found)
+
+
+def _xml_in(folder: Path) -> dict[str, bytes]:
+    """Return the XML files of a team's folder, also those of robots that join later, by their relative paths."""
+    found: dict[str, bytes] = {}
+    total = 0
+    for place in [folder, *folder.glob("late*")]:
+        for file in place.glob("*.xml") if place.is_dir() else ():
+            status = file.stat()
+            total += status.st_size
+            if len(found) >= MAX_FILES or total > MAX_BYTES:
+                raise _too_large(folder)
+            if stat.S_ISREG(status.st_mode):  # reading the team reports other kinds of files
+                found[file.relative_to(folder).as_posix()] = file.read_bytes()
+    return found
+
+
+def _archive(path: Path) -> Sketch | ImportedTeam:
+    with PrivateFolder() as place:
+        folder = Path(place) / (path.stem or "team")
+        folder.mkdir()
+        try:
+            _unpack(path, folder)
+        except InvalidInputError:
+            raise
+        except DAMAGED as damaged:
+            raise invalid_input(path, f"the archive is damaged: {damaged}", "create the archive again") from None
+        try:
+            found = _folder(folder)
+        except InvalidInputError as invalid:
+            raise InvalidInputError(_without(str(place), invalid)) from None
+    return found if isinstance(found, Sketch) else ImportedTeam(path, found.team, found.changed)
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    """Unpack the team's files of an archive into a folder, within bounds. No path leads out of the folder."""
+    taken: set[str] = set()
+    left = MAX_BYTES
+    with bounded_archive(path) as archive:
+        for member in archive.infolist():
+            match = _PARTS.fullmatch(member.filename)
+            if match is None or member.is_dir() or ".." in PurePosixPath(member.filename).parts:
+                continue
+            if match[1] in taken or len(taken) > MAX_FILES:
+                raise _too_large(path) if len(taken) > MAX_FILES else _two_teams(path, match[1])
+            taken.add(match[1])
+            most = min(left, MAX_SKETCH) if match[1] == SKETCH_FILE else left
+            with archive.open(member) as source:
+                content = source.read(most + 1)
+            if len(content) > most:
+                raise _too_large(path)
+            left -= len(content)
+            target = folder / match[1]
+            target.parent.mkdir(exist_ok=True)
+            target.write_bytes(content)
+    if not taken:
+        raise invalid_input(path, "the archive has no team: no XML file", "choose an archive of one team's folder")
+
+
+def _too_large(path: Path) -> InvalidInputError:
+    hint = "use 'robochoc solve'"
+    return invalid_input(path, f"the team has more than {MAX_FILES:,} files or {MAX_BYTES >> 20} MiB", hint)
+
+
+def _two_teams(path: Path, name: str) -> InvalidInputError:
+    return invalid_input(path, f"the archive has {name} twice", "choose an archive of one team's folder")
+
+
+def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
+    """Return the errors with paths in the archive, instead of paths in the temporary folder."""
+    inside = f"{place}{os.sep}"
+    return [
+        replace(one, file=one.file.removeprefix(inside), message=one.message.replace(inside, ""))
+        for one in invalid.diagnostics
+    ]
