@@ -52,7 +52,7 @@ class Choice:
     rejected: tuple[tuple[str, str], ...] = ()
 
 
-def decided(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> Choice:
+def choose(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> Choice:
     """Return how to run: `options`, with a protocol and an order where they leave these open.
 
     Args:
@@ -73,7 +73,7 @@ def decided(team: Team, options: Options, *, environment: bool = False, ordered:
     return choice
 
 
-def decided_at_once(team: Team, options: Options) -> Choice:
+def choose_without_analysis(team: Team, options: Options) -> Choice:
     """Return the choice when there is no time to analyse a team: the default protocol and the given order."""
     order = None if options.order == Order.GIVEN else options.order
     if options.protocol != AUTO:
@@ -106,7 +106,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
     return _choice(facts, options, (usual, NOBODY), {})
 
 
-def decided_unseen(team: Team, options: Options) -> Choice:
+def choose_for_private_team(team: Team, options: Options) -> Choice:
     """Return how to run a team whose constraints are known to its robots alone, who refuse what does not suit them."""
     if options.protocol != AUTO:
         return Choice(options)

@@ -21,10 +21,14 @@ if TYPE_CHECKING:
 
 
 class RunContext:
-    """The context of one run. Its time starts when it is made.
+    """The context of one run. Its time starts now.
 
-    `observer` gets all events, `progress` the number of messages, and what else goes on. `solver` is a constraint
-    solver that is running already (None: one is started when it is needed).
+    Args:
+        options: How to run, with the name of a protocol.
+        observer: Receives all events.
+        progress: Receives the number of messages and the stage of the run, now and then.
+        solver: A constraint solver that is already running. None: one is started when it is needed.
+        spent_s: The seconds that the run has taken before.
     """
 
     def __init__(
@@ -33,6 +37,7 @@ class RunContext:
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         solver: AceProcess | None = None,
+        spent_s: float = 0.0,
     ) -> None:
         self.options = options
         self.observer = observer
@@ -40,11 +45,11 @@ class RunContext:
         self.solver = solver
         self.cache = SolutionCache() if options.cache else None
         self.kills = KillSchedule(options.kill)
-        self.restart()
+        self.restart(spent_s)
 
-    def restart(self) -> None:
-        """Let the time begin again."""
-        self.began = time.monotonic()
+    def restart(self, spent_s: float = 0.0) -> None:
+        """Restart the clock at `spent_s`."""
+        self.began = time.monotonic() - spent_s
         limit_s = self.options.limit_s
         self.deadline = None if limit_s is None else self.began + limit_s
 
@@ -53,13 +58,14 @@ class RunContext:
         return None if self.deadline is None else max(0.0, self.deadline - time.monotonic())
 
     def show_stage(self, stage: str) -> None:
-        """Report what is done besides searching."""
+        """Report a stage of the run other than the search, such as the compilation of a robot."""
         if self.progress:
             self.progress(Progress(0, time.monotonic() - self.began, stage))
 
     def team_compiler(self) -> TeamCompiler:
         """Return a compiler of the robots' domains."""
-        return TeamCompiler(self.options.local, self.cache, self.deadline, self.solver, self.show_stage)
+        show = self.show_stage if self.progress else None
+        return TeamCompiler(self.options.local, self.cache, self.deadline, self.solver, show)
 
     def deciding_solver(self, warm: AceProcess) -> TeamSolver:
         """Return the solver that decides the merged problem; ACE is `warm` unless the run has one."""

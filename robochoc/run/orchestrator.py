@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robochoc.communication.run_result import Progress
@@ -14,7 +16,7 @@ from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
-from robochoc.run.choice import decided, decided_at_once
+from robochoc.run.choice import Choice, choose, choose_without_analysis
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, UnfitProtocolError, refuse_unfit
 from robochoc.run.context import RunContext
@@ -56,7 +58,7 @@ def solve(
         solver: a constraint solver that is running already: a program that solves many teams saves time with it.
         environment: gets each epoch's answer, and returns the next change of the problem.
         audience: with `Options.improve`, gets each answer while the search goes on.
-        ordered: whether the priority order of `team` is meant. Otherwise one is chosen for any protocol.
+        ordered: whether the user chose the priority order of `team`. Otherwise one is chosen for any protocol.
 
     Returns:
         The outcome. When a limit was reached, its verdict is `unknown`.
@@ -64,34 +66,79 @@ def solve(
     Raises:
         InvalidInputError: when the team is not valid, or an event of the environment.
         UnknownProtocolError: when the protocol is not installed.
-        UnsupportedError: when the options do not go together, or with the team.
-        RobotsLostError: when a robot was lost, and the run is not to go on without it.
+        UnsupportedError: when the options cannot be combined with each other or with the team.
+        RobotsLostError: when a robot was lost, and the run is not to continue without it.
         CompileError: when the domains cannot be compiled.
         SolverLostError: when the constraint solver has failed.
         SolverMissingError: when it is needed and not installed.
         RefutedError: when the checker, or the central solver, refutes an answer.
     """
+    changing = environment is not None
+    refuse_options(options, environment=changing)
+    run = prepare(team, options, environment=changing, ordered=ordered)
+    return run.solve(observer=observer, progress=progress, solver=solver, environment=environment, audience=audience)
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A run before its start: a valid team, and options that name a protocol.
+
+    Attributes:
+        team: The team with its scenario.
+        choice: The options with protocol and order, and the reasons for them.
+        spent_s: The seconds spent on the choice. They count as time of the run.
+    """
+
+    team: Team
+    choice: Choice
+    spent_s: float
+
+    def solve(
+        self,
+        *,
+        observer: Observer | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        solver: AceProcess | None = None,
+        environment: Environment | None = None,
+        audience: Audience | None = None,
+    ) -> Outcome:
+        """Run the search and return its outcome. For the arguments and errors see the function `solve`."""
+        team, options = self.team, self.choice.options
+        context = RunContext(options, observer, progress, solver, self.spent_s)
+        environment = environment and with_checked_events(environment)
+        try:
+            counted = normalized(team)
+            if options.protocol == CENTRAL:
+                outcome = _solve_centrally(counted, context)
+            else:
+                outcome = _solve_distributed(counted, context, environment, audience)
+        except (OrderError, UnboundedCostError) as refused:
+            raise UnsupportedError(str(refused)) from None
+        if counted is not team and environment is None:
+            _check_told_costs(team, outcome)
+        return outcome
+
+
+def prepare(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> PreparedRun:
+    """Check the team, and choose the protocol and the order that `options` leave open.
+
+    Args:
+        team: The team with its scenario.
+        options: How to run. `refuse_options` has accepted them.
+        environment: Whether an environment changes the problem.
+        ordered: Whether the user chose the priority order of `team`. Otherwise one is chosen for any protocol.
+
+    Raises:
+        InvalidInputError: if the team is not valid.
+    """
     check_team(team)
-    environment = environment and with_checked_events(environment)
-    refuse_options(options, environment=environment is not None)
-    context = RunContext(options, observer, progress, solver)
+    began = time.monotonic()
+    deadline = None if options.limit_s is None else began + options.limit_s
     try:
-        changing = environment is not None
-        choice = computed_by(context.deadline, decided, team, options, environment=changing, ordered=ordered)
+        choice = computed_by(deadline, choose, team, options, environment=environment, ordered=ordered)
     except TimeLimitError:
-        choice = decided_at_once(team, options)
-    context.options = options = choice.options
-    try:
-        counted = normalized(team)
-        if options.protocol == CENTRAL:
-            outcome = _solve_centrally(counted, context)
-        else:
-            outcome = _solve_distributed(counted, context, environment, audience)
-    except (OrderError, UnboundedCostError) as refused:
-        raise UnsupportedError(str(refused)) from None
-    if counted is not team and environment is None:
-        _check_told_costs(team, outcome)
-    return outcome
+        choice = choose_without_analysis(team, options)
+    return PreparedRun(team, choice, time.monotonic() - began)
 
 
 def _check_told_costs(team: Team, outcome: Outcome) -> None:

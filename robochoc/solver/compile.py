@@ -193,8 +193,8 @@ class Compiler:
 class TeamCompiler:
     """Compiles the teams of one run. `seconds` is the time of teams for which a solver was needed.
 
-    `deadline` is on the monotonic clock, and may be changed. `stage` is called with a description of the progress. See
-    `Compiler` for the other arguments.
+    `deadline` is on the monotonic clock, and may be changed. `stage` receives descriptions of the progress (None: there
+    are none). See `Compiler` for the other arguments.
     """
 
     seconds: float = 0.0
@@ -205,7 +205,7 @@ class TeamCompiler:
         cache: SolutionCache | None,
         deadline: float | None,
         solver: AceProcess | None,
-        stage: Callable[[str], None],
+        stage: Callable[[str], None] | None,
     ) -> None:
         self._limits, self._cache, self._solver = limits, cache, solver
         self.deadline = deadline
@@ -225,7 +225,8 @@ class TeamCompiler:
         def compile_robot(robot: Robot) -> CompiledDomain:
             nonlocal solved, name
             name = robot.name
-            self._stage(f"compiling {name} ({next(number)} of {len(team.robots)})")
+            if self._stage:
+                self._stage(f"compiling {name} ({next(number)} of {len(team.robots)})")
             compilation = compiler.compile(robot)
             solved = solved or compilation.source != CompiledFrom.DIRECT
             if not (compilation.domain.values or every):

@@ -12,7 +12,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.choice import accepts, decided
+from robochoc.run.choice import accepts, choose
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.asymmetric_bytes import costs_changed, watched_costs, watched_entries, what_is_not_needed_changed
 from tests.support.asymmetric_problems import check_asymmetric, random_asymmetric_team, random_pkc_options
@@ -100,7 +100,7 @@ def test_auto_takes_local_search_only_where_a_proof_takes_too_long_and_nobody_wi
     """4^13 combinations are fewer than a hundred millions, and 4^14 are more."""
 
     def taken(team: Team, withdraw: Withdrawal | None = None) -> str:
-        return decided(team, Options(protocol="auto", withdraw=withdraw)).options.protocol
+        return choose(team, Options(protocol="auto", withdraw=withdraw)).options.protocol
 
     chance = Random("auto")
     assert {taken(random_asymmetric_team(chance)) for _ in range(5)} <= {*COMPLETE}

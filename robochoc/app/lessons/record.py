@@ -12,7 +12,7 @@ from robochoc.journal.entries import Header
 from robochoc.journal.events import AnyEvent
 from robochoc.modelling.model import Model
 from robochoc.replay import states_of
-from robochoc.run.choice import decided
+from robochoc.run.choice import choose
 from robochoc.run.options import Options
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
@@ -48,7 +48,7 @@ def model_of(spec: TeamSpec) -> Model:
 def _recorded(spec: TeamSpec, run: RunSpec) -> RecordedRun:
     model = model_of(spec)
     if run.protocol == AUTO:
-        choice = decided(model.team, Options(protocol=AUTO))
+        choice = choose(model.team, Options(protocol=AUTO))
         return RecordedRun(choice.options.protocol, choice.options.chosen["protocol"])
     events: list[AnyEvent] = []
     found = model.solve(

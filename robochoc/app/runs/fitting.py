@@ -11,7 +11,7 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import read_team
 from robochoc.model.problem import Team
-from robochoc.run.choice import accepts, decided
+from robochoc.run.choice import accepts, choose
 from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import installed_protocols
 
@@ -65,7 +65,7 @@ def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runti
     """
     team = team_of(sketch, files)
     options = Options(runtime=Runtime(runtime))
-    choice = decided(team, options)
+    choice = choose(team, options)
     return Fitting(
         protocols=fitting_protocols(team, options),
         chosen=choice.options.protocol,

@@ -13,7 +13,7 @@ from robochoc.app.texts import say
 from robochoc.experiments.study import toml_of
 from robochoc.formats.names import is_name
 from robochoc.model.problem import ProblemKind
-from robochoc.run.choice import decided
+from robochoc.run.choice import choose
 from robochoc.run.facts import Facts
 from robochoc.run.options import Options, Runtime
 
@@ -69,7 +69,7 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> PossibleQuestion
     team = team_of(sketch, files)
     options = Options(runtime=Runtime.SIMULATOR)
     fit = fitting_protocols(team, options)
-    chosen = decided(team, options).options.protocol
+    chosen = choose(team, options).options.protocol
     names = [name for name, _ in fit]
     beside = next((name for name in (*_COMMON, *names) if name in names and name != chosen), None)
     usual = tuple(name for name in (chosen, beside) if name in names)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from robochoc.run.choice import Choice
     from robochoc.run.improvement import Audience
     from robochoc.run.options import Options
+    from robochoc.run.orchestrator import PreparedRun
 
 
 def solve_team(folder: Path, options: Options, outputs: Outputs, request: TeamRequest) -> int:
@@ -100,11 +101,11 @@ def _solve(
     order = order_for(team, request.order, problem.names)
     options = replace(options, order=order, kill=_with_team_names(options.kill, problem))
     from robochoc.cli.reports.improvements import ImprovementReporter
-    from robochoc.run.choice import decided
+    from robochoc.run.orchestrator import prepare
     from robochoc.run.recording import journal_header, objective_to_record
 
-    choice = decided(team, options, environment=bool(request.ros.situation), ordered=not problem.foreign)
-    options = choice.options
+    run = prepare(team, options, environment=bool(request.ros.situation), ordered=not problem.foreign)
+    options = run.choice.options
     header = partial(journal_header, team, options)
 
     objective = None if request.ros.situation else objective_to_record(team, options)
@@ -113,9 +114,9 @@ def _solve(
         recording(outputs.journal, header, objective, sniffer.start()) as recorder,
     ):
         audience = ImprovementReporter(loop, quiet=request.as_json) if options.improve else None
-        outcome = _run(team, options, recorder, loop, audience)
+        outcome = _observed(run, recorder, loop, audience)
         team = loop.team if loop else team
-        _print_outcome(problem._replace(team=team), outcome, request, choice, readable_map(folder))
+        _print_outcome(problem._replace(team=team), outcome, request, run.choice, readable_map(folder))
         if loop and loop.mission is None:  # the run did not use the loop
             loop.publish(outcome)
         flight = FlownMission()
@@ -126,19 +127,15 @@ def _solve(
     return _FinishedRun(team, outcome, loop, flight)
 
 
-def _run(
-    team: Team,
-    options: Options,
-    recorder: JournalRecorder | None,
-    loop: ClosedLoop | None,
-    audience: Audience | None,
+def _observed(
+    run: PreparedRun, recorder: JournalRecorder | None, loop: ClosedLoop | None, audience: Audience | None
 ) -> Outcome:
     """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
     from robochoc.cli.reports.choice import OrderNote
     from robochoc.cli.reports.progress import progress_line, waiting_for_reports
     from robochoc.run.options import CENTRAL
-    from robochoc.run.orchestrator import solve as run
 
+    team, options = run.team, run.choice.options
     is_dynamic = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))
     note = OrderNote(team, options)
     with progress_line(team.name) as progress:
@@ -146,7 +143,7 @@ def _run(
         if loop and loop.feedback and show:
             loop.feedback.idle = waiting_for_reports(show)
         environment = loop if is_dynamic else None
-        outcome = run(team, options, observer=recorder, progress=show, environment=environment, audience=audience)
+        outcome = run.solve(observer=recorder, progress=show, environment=environment, audience=audience)
     note.print_if_slow(outcome.metrics.wall_s)
     if recorder:
         recorder.outcome = outcome

@@ -25,7 +25,7 @@ from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
-from robochoc.run.choice import decided_unseen
+from robochoc.run.choice import choose_for_private_team
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.team_rules import refuse_unfit
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
@@ -211,7 +211,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
         names = first_names(master.members.waited_for) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
     team = registered_team(master, plan.name)
-    options = decided_unseen(team, plan.options(plan.protocol or AUTO)).options
+    options = choose_for_private_team(team, plan.options(plan.protocol or AUTO)).options
     name, protocol = options.protocol, protocol_or_stage(options.protocol)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)

@@ -32,7 +32,7 @@ from robochoc.model.problem import AddAgent, Constraint, Parent, Robot, Scenario
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.message import Envelope
 from robochoc.run import Options, Runtime, solve
-from robochoc.run.choice import decided
+from robochoc.run.choice import choose
 from robochoc.solver.errors import UnsupportedError
 from tests.support.problems import PREDICATES, team_of
 
@@ -231,8 +231,8 @@ def test_the_largest_loss_of_a_link_is_what_a_protocol_is_chosen_by() -> None:
     assert channel(path_loss=PathLoss(power_dbm=0, sensitivity_dbm=-90)).most_loss == 1
     assert channel(links=(NamedLink(between=("A", "B"), loss=0.3),)).most_loss == 0.3
     near = channel(distance_loss=((1, 0.05),))
-    assert decided(queens3d(3), lossy(near, "auto")).options.protocol == "gdba"
-    assert decided(queens3d(3), lossy(channel(distance_loss=STEP), "auto")).options.protocol == "dsa"
+    assert choose(queens3d(3), lossy(near, "auto")).options.protocol == "gdba"
+    assert choose(queens3d(3), lossy(channel(distance_loss=STEP), "auto")).options.protocol == "dsa"
 
 
 # Whole runs

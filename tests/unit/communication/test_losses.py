@@ -33,7 +33,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.replay import CannotReplayError, replay
 from robochoc.run import Options, Runtime, solve
-from robochoc.run.choice import decided
+from robochoc.run.choice import choose
 from robochoc.run.options import ScheduleName
 from robochoc.run.recording import journal_header
 from robochoc.solver.errors import UnsupportedError
@@ -152,7 +152,7 @@ def test_a_channel_model_can_lose_whole_messages_and_the_option_counts_before_it
     assert outcome.metrics.lost_messages == solve(queens3d(3), replace(options, message_loss=0.2)).metrics.lost_messages
     assert solve(queens3d(3), replace(options, message_loss=0.5)).metrics.lost_messages > outcome.metrics.lost_messages
     assert journal_header(queens3d(3), options).message_loss == 0.2
-    assert decided(queens3d(3), replace(options, protocol="auto")).options.protocol == "dsa"
+    assert choose(queens3d(3), replace(options, protocol="auto")).options.protocol == "dsa"
     with pytest.raises(UnsupportedError, match="--message-loss"):
         solve(queens3d(3), replace(options, settings={"anytime": "yes"}))
 

@@ -26,7 +26,7 @@ from robochoc.protocols.message import Envelope, Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Runtime, solve
-from robochoc.run.choice import decided_unseen
+from robochoc.run.choice import choose_for_private_team
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import ensure_compiled
@@ -243,4 +243,4 @@ def test_who_comes_back_is_caught_up_with_although_messages_are_lost(tmp_path: P
 )
 def test_of_robots_that_keep_their_constraints_the_kind_and_the_loss_decide(team: Team, loss: float, name: str) -> None:
     options = Options(runtime=Runtime.NETWORK, message_loss=loss)
-    assert decided_unseen(team, options).options.protocol == name
+    assert choose_for_private_team(team, options).options.protocol == name

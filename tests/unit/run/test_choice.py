@@ -19,7 +19,7 @@ from robochoc.model.orders import Order
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, AddAgent, Change, ProblemKind, Team
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
-from robochoc.run.choice import SOMEBODY, decided, decided_unseen
+from robochoc.run.choice import SOMEBODY, choose, choose_for_private_team
 from robochoc.run.facts import Facts, TreeTables
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.errors import UnsupportedError
@@ -109,7 +109,7 @@ def taken(team: Team, options: Options) -> set[str]:
 def test_whatever_some_protocol_accepts_is_not_refused(kind: str, many: int) -> None:
     for number in range(many):
         team, options = drawn(kind, number)
-        name = decided(team, options).options.protocol
+        name = choose(team, options).options.protocol
         able = taken(team, options)
         assert name in able or not able, (kind, number)
         if any(protocol_named(one).traits.complete for one in able):
@@ -148,7 +148,7 @@ def test_where_messages_are_lost_a_protocol_that_bears_it_is_taken_if_one_accept
         options = replace(options, runtime=Runtime.SIMULATOR, spares=0, message_loss=(0.05, 0.3)[number % 2])
         if options.withdraw is Withdrawal.MINIMUM and team.kind is ProblemKind.DISWCSP:
             continue  # that has to be proven
-        found = decided(team, options)
+        found = choose(team, options)
         able = taken(team, options)
         if any(protocol_named(one).traits.bears_loss for one in able):
             assert protocol_named(found.options.protocol).traits.bears_loss, (kind, number)
@@ -203,30 +203,30 @@ def test_what_is_chosen() -> None:
             with each((protocol, options)):
                 runtime = Runtime.SIMULATOR if "message_loss" in options else Runtime.PROCESSES
                 asked = replace(Options(runtime=runtime), **options)
-                found = decided(team, asked)
+                found = choose(team, asked)
                 assert (found.options.protocol, found.options.order) == (protocol, order)
                 assert ("order" in found.options.chosen) is (order is not None and asked.order is None)
                 assert found.facts
                 assert protocol not in dict(found.rejected)
-                assert decided(team, found.options).options == found.options
+                assert choose(team, found.options).options == found.options
 
 
 def test_what_was_asked_for_is_not_changed() -> None:
     team = random_csp(10, 4, 0.5, 0.3)
     for name in (*protocol_names(), CENTRAL):
         asked = Options(protocol=name)
-        assert decided(team, asked).options == decided_unseen(team, asked).options == asked
+        assert choose(team, asked).options == choose_for_private_team(team, asked).options == asked
 
 
 def test_an_order_that_nobody_has_given_is_chosen_for_any_protocol() -> None:
     team = random_csp(10, 4, 0.5, 0.3)
-    options = decided(team, Options(protocol="abt"), ordered=False).options
+    options = choose(team, Options(protocol="abt"), ordered=False).options
     assert options.order is Order.MAX_DEGREE
     assert list(options.chosen) == ["order"]
     asked = Options(protocol="abt", order=Order.DFS)
-    assert decided(team, asked, ordered=False).options == asked
+    assert choose(team, asked, ordered=False).options == asked
     pkc = pkc_pair(PART, PART)
-    assert decided(pkc, Options(protocol="abt"), ordered=False).options.order is None
+    assert choose(pkc, Options(protocol="abt"), ordered=False).options.order is None
 
 
 def test_where_nobody_accepts_the_team_the_refusal_names_who_may() -> None:
@@ -238,7 +238,7 @@ def test_where_nobody_accepts_the_team_the_refusal_names_who_may() -> None:
 
 def test_of_robots_that_keep_their_constraints_the_kind_is_known() -> None:
     for team, name in ((random_csp(4, 3, 1, 0.3), "abt"), (random_csp(4, 3, 1, 0, max_cost=5), "sfb")):
-        options = decided_unseen(team, Options(runtime=Runtime.NETWORK)).options
+        options = choose_for_private_team(team, Options(runtime=Runtime.NETWORK)).options
         assert (options.protocol, options.order) == (name, None)
         assert options.chosen["protocol"]
 
@@ -255,7 +255,7 @@ def test_how_much_is_forbidden_is_what_counting_says() -> None:
 
 def test_what_something_outside_changes_is_left_to_who_keeps_what_holds() -> None:
     team = random_csp(12, 5, 0.5, 0.5)
-    assert decided(team, Options(), environment=True).options.protocol == "dynabt"
+    assert choose(team, Options(), environment=True).options.protocol == "dynabt"
 
 
 @count("many", 10, 200)

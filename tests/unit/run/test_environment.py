@@ -87,7 +87,7 @@ def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named:
 
 def test_when_the_time_is_over_nothing_that_comes_is_heeded(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = MovedClock()
-    for module in ("run.context", "solver.compile", "communication.session", "system.time_limit"):
+    for module in ("run.context", "run.orchestrator", "solver.compile", "communication.session", "system.time_limit"):
         monkeypatch.setattr(f"robochoc.{module}.time", clock)
 
     class Slow(Says):

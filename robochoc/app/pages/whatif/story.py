@@ -32,7 +32,7 @@ from robochoc.formats import InvalidInputError
 from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 from robochoc.modelling.model import Model
-from robochoc.run.choice import decided
+from robochoc.run.choice import choose
 from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import UnknownProtocolError, protocol_named
 from robochoc.solver.errors import UnsupportedError
@@ -64,7 +64,7 @@ def why_not_continue(before: Sketch, after: Sketch) -> str:
 def _by_protocol(team: Team) -> str:
     if len(team.robots) > MOST_CHOSEN_FOR:
         return ""
-    protocol = decided(team, Options(runtime=Runtime.SIMULATOR)).options.protocol
+    protocol = choose(team, Options(runtime=Runtime.SIMULATOR)).options.protocol
     return "" if is_dynamic(protocol) else say("whatif.before-protocol", protocol=protocol)
 
 
