@@ -116,7 +116,7 @@ $(DOCS): $(READY) requirements/docs.txt
 	@touch $@
 
 # --strict: a broken link, anchor or reference ends the build.
-# The theme says when its maintenance ends: docs/explanation/design.md, "Dependencies".
+# The theme says when its maintenance ends: docs/explanation/design/dependencies.md.
 docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without a network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 

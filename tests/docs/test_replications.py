@@ -26,7 +26,8 @@ from robochoc.experiments.store import Store
 from robochoc.experiments.study import read_study, report_settings
 from tests.support.program import ROOT
 
-PAGES = [ROOT / "docs" / "explanation" / name for name in ("replications.md", "sfb.md")]
+EXPLANATION = ROOT / "docs" / "explanation"
+PAGES = [*sorted((EXPLANATION / "replications").glob("*.md")), EXPLANATION / "sfb.md"]
 STUDIES = ROOT / "benchmarks" / "studies"
 BENCHMARKS = ROOT / "benchmarks" / "results"
 """Pages of studies that are ours: tests/docs/test_benchmarks.py holds them against what the studies come to."""

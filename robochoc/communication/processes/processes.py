@@ -5,7 +5,7 @@ queue for a robot's first message to another one, detects quiescence by four cou
 messages go from robot to robot and never through the parent.
 
 Crash detection: the parent watches every process's sentinel; a robot's control pipe ends with the parent. Why fork, why
-queues are opened on demand, and what was measured: docs/explanation/design.md, "Processes".
+queues are opened on demand, and what was measured: docs/explanation/design/runtimes.md, "Processes".
 """
 
 from __future__ import annotations

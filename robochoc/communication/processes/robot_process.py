@@ -133,6 +133,6 @@ def _set_niceness(place: int, robots: int) -> None:
     """Let the scheduler favour robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
 
     Decisions from an outdated view waste the work of all robots below. On two cores this reduces the messages of 121
-    robots to a tenth (docs/explanation/design.md, "Processes").
+    robots to a tenth (docs/explanation/design/runtimes.md, "Processes").
     """
     os.nice(LOWEST_NICE * place // robots)

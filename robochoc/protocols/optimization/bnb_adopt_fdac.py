@@ -36,7 +36,7 @@ Choices that the papers leave open, and differences:
 - The tree takes the place of the papers' total order: costs are moved up branches.
 - In the papers a copy of the costs is kept consistent, and the search uses the given ones: consistency serves to delete
   values during the search. Here the search uses the moved costs, and nothing is deleted: measured, deletions would cost
-  as many messages as they save (docs/explanation/replications.md).
+  as many messages as they save (docs/explanation/replications/complete-search.md).
 - All binary constraints between two robots are one arc, also if robots have several variables. Costs of constraints
   over more robots are not moved, nor those of tables with more than 65,536 entries. The parent receives the cost of the
   cheapest value even if there is no constraint.

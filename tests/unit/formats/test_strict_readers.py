@@ -1,7 +1,7 @@
 """The inventory of readers: an unknown part at any place of any input is refused, whatever reads it.
 
 Each reader of files that people write has a line here, with an input that has all kinds of its parts. A reader that is
-added belongs into the table; what makes readers strict is named in docs/explanation/design.md.
+added belongs into the table; what makes readers strict is named in docs/explanation/design/files.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The document of an XCSP3 instance: its root element, and attributes that do not concern the problem.
 
-docs/explanation/design.md explains why pycsp3's parser is not used here.
+docs/explanation/design/files.md explains why pycsp3's parser is not used here.
 """
 
 from __future__ import annotations
