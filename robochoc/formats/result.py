@@ -1,175 +1,49 @@
-"""The JSON result: one object for one team and run (docs/reference/result.md)."""
+"""The JSON result: one object for one team and run (docs/reference/result.md).
+
+It is written from, and read into, the types of `model/outcome.py`; no field is declared here. The object differs from
+an `Outcome` in these points only:
+
+* Fields of an answer with their default value are left out, except `_FIRST`.
+* Values of symbolic variables are their symbols.
+* `metrics` has the number of `messages`, and `messages_by_type`. Those of an epoch are in the epoch's object itself.
+* `at_s` is called `seconds`. Measured seconds have six decimal places.
+* `names`, `places` and `values` are added by the caller.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, Field, fields, is_dataclass
 from decimal import Decimal
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 import msgspec
 
-from robochoc.model.absence import DroppedConstraint
-from robochoc.model.cost_units import Cost
-from robochoc.model.outcome import (
-    Answer,
-    CheckCounts,
-    EpochOutcome,
-    Improvement,
-    Metrics,
-    Optima,
-    Outcome,
-    Preprocessing,
-    PseudoTreeNode,
-    Verdict,
-)
+from robochoc.model.outcome import Answer, CheckCounts, Improvement, Metrics, Optima, Outcome
 from robochoc.system.decode_errors import describe_decode_error
 
 Value = int | float | Decimal | str
 """A value in a JSON result: a number, or a text for any other value."""
+Json = dict[str, Any]
 
 
 class ResultError(ValueError):
-    """The text is no JSON result."""
+    """The text is not a valid JSON result."""
 
 
-_ZERO = 0.0
-"""msgspec leaves out a float that is the same object as its default."""
-
-
-class MetricsForm(msgspec.Struct, frozen=True):
-    """`Metrics` in JSON."""
-
-    messages: int
-    bytes: int
-    ncccs: int
-    checks: int
-    wall_s: float
-    messages_by_type: dict[str, int] = {}
-    compile_s: float = 0.0
-    memory: int = 0
-    simulated_s: float = 0.0
-    largest: int = 0
-    cycles: int = 0
-    lost_messages: int = 0
-
-
-class ImprovementForm(msgspec.Struct, omit_defaults=True, frozen=True):
-    """`Improvement` in JSON."""
-
-    at_s: float = msgspec.field(name="seconds")
-    verdict: Verdict
-    cost: int | Decimal | None
-    withdrawn: tuple[str, ...] = ()
-
-
-class EpochForm(msgspec.Struct, omit_defaults=True, frozen=True):
-    """`EpochOutcome` in JSON, with its metrics."""
-
-    verdict: Verdict
-    opened_by: str
-    robots: tuple[str, ...]
-    assignment: dict[str, int | str]
-    cost: int | Decimal | None
-    messages: int
-    bytes: int
-    ncccs: int
-    checks: int
-    wall_s: float
-    verified: bool
-    lost: tuple[str, ...] = ()
-    confirmed: bool = False
-    simulated_s: float = _ZERO
-    cycles: int = 0
-    lost_messages: int = 0
-    improvements: tuple[ImprovementForm, ...] = ()
-    messages_by_type: dict[str, int] = {}
-    compile_s: float = _ZERO
-    memory: int = 0
-    largest: int = 0
-    witness: str | None = None
-    bound: int | Decimal | None = None
-    tree: dict[str, PseudoTreeNode] = {}
-    dropped_constraints: tuple[DroppedConstraint, ...] = ()
-    withdrawn: tuple[str, ...] = ()
-    reason: str | None = None
-    count: Decimal | None = None
-    confirmed_by: tuple[str, ...] = ()
-    checked: CheckedForm | None = None
-    preprocessing: PreprocessingForm | None = None
-    optima: OptimaForm | None = None
-    deadline: float | None = None
-
-
-class CheckedForm(msgspec.Struct, frozen=True):
-    """`CheckCounts` in JSON."""
-
-    by_both: int
-    by_owner: int
-
-
-class OptimaForm(msgspec.Struct, frozen=True):
-    """`Optima` in JSON."""
-
-    number: Decimal
-    assignments: tuple[dict[str, int | str], ...]
-
-
-class PreprocessingForm(msgspec.Struct, frozen=True):
-    """`Preprocessing` in JSON."""
-
-    name: str
-    metrics: MetricsForm
-    removed: int
-    values: int
-
-
-class ResultForm(msgspec.Struct, omit_defaults=True, frozen=True):
-    """`Outcome` in JSON, with original names, places and values."""
-
-    team: str
-    protocol: str
-    runtime: str
-    seed: int
-    verdict: Verdict
-    assignment: dict[str, int | str]
-    cost: int | Decimal | None
-    withdrawn: tuple[str, ...]
-    epochs: tuple[EpochForm, ...]
-    metrics: MetricsForm
-    verified: bool
-    count: Decimal | None = None
-    reason: str | None = None
-    lost: tuple[str, ...] = ()
-    order: str | None = None
-    bound: int | Decimal | None = None
-    placed_by: str | None = None
-    tree: dict[str, PseudoTreeNode] = {}
-    confirmed: bool = False
-    channel: str | None = None
-    claimed_by: str | None = None
-    checked: CheckedForm | None = None
-    names: dict[str, str] = {}
-    chosen: dict[str, str] = {}
-    preprocessing: PreprocessingForm | None = None
-    optima: OptimaForm | None = None
-    deadline: float | None = None
-    improvements: tuple[ImprovementForm, ...] = ()
-    places: dict[str, tuple[float, ...]] = {}
-    values: dict[str, Any] = {}
-    witness: str | None = None
-    confirmed_by: tuple[str, ...] = ()
-    symbols: tuple[str, ...] = ()
-    symbolic: tuple[str, ...] = ()
-    dropped_constraints: tuple[DroppedConstraint, ...] = ()
-
-
-_ENCODER = msgspec.json.Encoder(decimal_format="number")
-_MOST_DIGITS = 10_000
-"""The maximum number of digits of a number of solutions: 1e999999999 would take all memory."""
+_FIRST = (
+    *("team", "protocol", "runtime", "seed", "verdict", "opened_by", "robots"),
+    *("assignment", "cost", "withdrawn", "epochs", "metrics", "verified"),
+)
+"""The first keys of an answer, in this order; they are never left out."""
+_MEASURED = frozenset({"at_s", "wall_s", "compile_s"})
 _DIGITS_S = 6
 """The number of decimal places of seconds that were measured."""
+_MOST_DIGITS = 10_000
+"""The maximum number of digits of a number: 1e999999999 as an integer would take all memory."""
+_ENCODER = msgspec.json.Encoder(decimal_format="number")
 
 
 def result_json(
@@ -182,78 +56,103 @@ def result_json(
 
     Args:
         outcome: The outcome.
-        names: What robots and variables are called elsewhere, by the names in `outcome`.
-        places: Where on a map the values of variables are, in metres.
+        names: The original names of robots and variables, by the names in `outcome`.
+        places: The positions on a map of the values of variables, in metres.
         values: The user's values of variables, where they differ from the integers in the assignment.
     """
-    form = ResultForm(
-        **_fields(outcome, Outcome)
-        | _answer(outcome, outcome)
-        | {
-            "epochs": tuple([_epoch(epoch, outcome) for epoch in outcome.epochs]),
-            "metrics": MetricsForm(**_metrics(outcome.metrics)),
-        },
-        names=dict(names),
-        places=dict(places),
-        values=dict(values),
-    )
-    return _ENCODER.encode(form)
+    added = {"names": names, "places": places, "values": values}
+    result = _answer(outcome, outcome) | {key: dict(one) for key, one in added.items() if one}
+    return _ENCODER.encode(result)
 
 
-# Fields are copied by the names in the types of `model/outcome.py`: one that the form of the JSON result lacks is a
-# `TypeError` when a result is written, and an `AttributeError` when one is read.
+def _answer(answer: Answer, outcome: Outcome) -> Json:
+    """Return an answer as an object: `outcome`, or one of its epochs."""
+    known = {one.name: one for one in fields(answer) if one.compare}  # others are derived, as in `Solution`
+    result: Json = {}
+    for name in (*_FIRST, *known):
+        if name in known and name not in result:
+            value = getattr(answer, name)
+            if name in _FIRST or value != _default(known[name]):
+                result[name] = _in_json(name, value, outcome)
+    if answer is not outcome:
+        result |= result.pop("metrics")
+    return result
 
 
-def _fields(source: object, kind: type) -> dict[str, Any]:
-    """Return the values of the fields of the dataclass `kind` in `source`, by name."""
-    return {one.name: getattr(source, one.name) for one in fields(kind)}
+def _default(one: Field[Any]) -> object:
+    return one.default if one.default_factory is MISSING else one.default_factory()
 
 
-def _answer(answer: Answer, outcome: Outcome) -> dict[str, Any]:
-    """Return the fields of an answer of `outcome` whose form in JSON differs."""
-    optima = answer.optima
-    return {
-        "assignment": outcome.labelled(answer.assignment),
-        "cost": _number(answer.cost),
-        "bound": _number(answer.bound),
-        "count": None if answer.count is None else Decimal(answer.count),
-        "checked": answer.checked and CheckedForm(**answer.checked._asdict()),
-        "preprocessing": _preprocessing(answer.preprocessing),
-        "optima": optima and OptimaForm(Decimal(optima.number), tuple(map(outcome.labelled, optima.assignments))),
-        "improvements": _improvements(answer.improvements),
-    }
+def _in_json(name: str, value: Any, outcome: Outcome) -> Any:  # noqa: ANN401, C901, PLR0911 - any field
+    """Return the value of the field `name` of `outcome`, or of a part of it, as JSON."""
+    match value:
+        case Answer():
+            return _answer(value, outcome)
+        case Metrics():
+            counts = {one.name: _in_json(one.name, getattr(value, one.name), outcome) for one in fields(value)}
+            by_type = dict(sorted(value.messages.items()))
+            return counts | {"messages": sum(by_type.values()), "messages_by_type": by_type}
+        case Improvement():
+            found = {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
+            return {"seconds": found.pop("at_s"), **found}
+        case CheckCounts() | Optima():
+            return {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
+        case Mapping():
+            if name == "assignment":
+                return outcome.labelled(value)
+            return {key: _in_json("", one, outcome) for key, one in value.items()}
+        case tuple() if name == "assignments":
+            return [outcome.labelled(one) for one in value]
+        case tuple():
+            return [_in_json("", one, outcome) for one in value]
+        case int() if value.bit_length() > 63:  # noqa: PLR2004 - bits: of longer integers msgspec limits the digits
+            return Decimal(value)
+        case float() if name in _MEASURED:
+            return round(value, _DIGITS_S)
+        case _ if is_dataclass(value):
+            return {one.name: _in_json(one.name, getattr(value, one.name), outcome) for one in fields(value)}
+        case _:
+            return value
 
 
-def _number(number: Cost | None) -> Cost | None:
-    """Return a number that msgspec can write: it writes integers of at most 64 bits."""
-    return Decimal(number) if isinstance(number, int) and number.bit_length() > 63 else number  # noqa: PLR2004 - bits
+def read_result(content: bytes) -> Outcome:
+    """Return the outcome in a JSON result.
+
+    Raises:
+        ResultError: if it is invalid, with the key and the expected value.
+    """
+    try:
+        result = _LOADS.decode(content.decode())
+    except UnicodeDecodeError as error:
+        raise ResultError("it is not UTF-8") from error
+    except RecursionError as error:
+        raise ResultError("it is nested too deep") from error
+    except json.JSONDecodeError as error:
+        raise ResultError(f"it is not valid JSON: {error}") from error
+    try:
+        return msgspec.convert(_outcome_fields(result), Outcome, builtin_types=(Decimal,))
+    except msgspec.ValidationError as error:
+        raise ResultError(describe_decode_error(error, Outcome)) from error
 
 
-def _improvements(found: Sequence[Improvement]) -> tuple[ImprovementForm, ...]:
-    given = [one._replace(at_s=round(one.at_s, _DIGITS_S), cost=_number(one.cost)) for one in found]
-    return tuple([ImprovementForm(**one._asdict()) for one in given])
+def _integer(digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise ResultError(f"the number {digits[:20]}... has more than {_MOST_DIGITS:,} digits")
+    return int(Decimal(digits))  # `int` limits the number of digits
 
 
-def _metrics(spent: Metrics) -> dict[str, Any]:
-    return _fields(spent, Metrics) | {
-        "messages": sum(spent.messages.values()),
-        "messages_by_type": dict(sorted(spent.messages.items())),
-        "wall_s": round(spent.wall_s, _DIGITS_S),
-        "compile_s": round(spent.compile_s, _DIGITS_S),
-    }
+def _decimal(digits: str) -> Decimal:
+    number = Decimal(digits)
+    if abs(number.adjusted()) > _MOST_DIGITS or len(digits) > _MOST_DIGITS:
+        raise ResultError(f"the number {digits[:20]} has more than {_MOST_DIGITS:,} digits")
+    return number
 
 
-def _preprocessing(done: Preprocessing | None) -> PreprocessingForm | None:
-    if done is None:
-        return None
-    return PreprocessingForm(**_fields(done, Preprocessing) | {"metrics": MetricsForm(**_metrics(done.metrics))})
+def _refuse(constant: str) -> NoReturn:
+    raise ResultError(f"it is not valid JSON: {constant} is not a number")
 
 
-def _epoch(epoch: EpochOutcome, outcome: Outcome) -> EpochForm:
-    given = _fields(epoch, EpochOutcome)
-    spent = _metrics(given.pop("metrics"))
-    spent |= {name: spent[name] or _ZERO for name in ("compile_s", "simulated_s")}
-    return EpochForm(**given | _answer(epoch, outcome), **spent)
+_LOADS = json.JSONDecoder(parse_float=_decimal, parse_int=_integer, parse_constant=_refuse)
 
 
 class _Symbols:
@@ -262,74 +161,74 @@ class _Symbols:
     Results of earlier versions do not list the symbols: these get codes in the order of their first use.
     """
 
-    def __init__(self, symbols: Sequence[str], variables: Sequence[str]) -> None:
-        self.codes = {symbol: code for code, symbol in enumerate(symbols)}
-        self.variables = dict.fromkeys(variables)
+    def __init__(self, result: Json) -> None:
+        self.codes = {symbol: code for code, symbol in enumerate(_texts(result, "symbols"))}
+        self.variables = dict.fromkeys(_texts(result, "symbolic"))
 
-    def values(self, assignment: dict[str, int | str]) -> dict[str, int]:
+    def codes_of(self, assignment: Any) -> Any:  # noqa: ANN401 - JSON; anything invalid is refused later
         """Return an assignment in codes."""
-        return {name: self._value(name, value) for name, value in assignment.items()}
+        if not isinstance(assignment, dict):
+            return assignment
+        return {name: self._code(name, value) for name, value in assignment.items()}
 
-    def _value(self, name: str, value: int | str) -> int:
-        if isinstance(value, int):
+    def _code(self, name: str, value: object) -> object:
+        if not isinstance(value, str):
             return value
         self.variables[name] = None
         return self.codes.setdefault(value, len(self.codes))
 
 
-def read_result(content: bytes) -> Outcome:
-    """Return the outcome in a JSON result. Raises `ResultError`, which says what is wrong."""
-    try:
-        form = msgspec.json.decode(content, type=ResultForm)
-    except UnicodeDecodeError as error:
-        raise ResultError("it is not UTF-8") from error
-    except RecursionError as error:
-        raise ResultError("it is nested too deep") from error
-    except msgspec.MsgspecError as error:
-        raise ResultError(describe_decode_error(error, ResultForm)) from error
-    symbols = _Symbols(form.symbols, form.symbolic)
-    different = _answer_of(form, symbols) | {
-        "epochs": tuple([_epoch_of(epoch, symbols) for epoch in form.epochs]),
-        "metrics": _metrics_of(form.metrics),
-    }
-    different |= {"symbols": tuple(symbols.codes), "symbolic": tuple(symbols.variables)}  # when all values were read
-    return Outcome(**_fields(form, Outcome) | different)
+# The functions below return the fields of a type of `model/outcome.py`. Anything invalid stays as it is: `convert`
+# refuses it, and names its place.
 
 
-def _answer_of(form: ResultForm | EpochForm, symbols: _Symbols) -> dict[str, Any]:
-    """Return the fields of an `Answer` whose form in JSON differs."""
-    optima = form.optima
-    return {
-        "assignment": symbols.values(form.assignment),
-        "count": None if form.count is None else _whole("count", form.count),
-        "checked": form.checked and CheckCounts(**msgspec.structs.asdict(form.checked)),
-        "preprocessing": _preprocessing_of(form.preprocessing),
-        "optima": optima and Optima(_whole("optima", optima.number), tuple(map(symbols.values, optima.assignments))),
-        "improvements": _improvements_of(form.improvements),
-    }
+def _outcome_fields(result: Any) -> Any:  # noqa: ANN401 - JSON
+    if not isinstance(result, dict):
+        return result
+    symbols = _Symbols(result)
+    found = _answer_fields(result, symbols)
+    if isinstance(epochs := result.get("epochs"), list):
+        found["epochs"] = [
+            _answer_fields(one, symbols) | {"metrics": _metrics_fields(one)} if isinstance(one, dict) else one
+            for one in epochs
+        ]
+    if "metrics" in result:
+        found["metrics"] = _metrics_fields(result["metrics"])
+    return found | {"symbols": [*symbols.codes], "symbolic": [*symbols.variables]}  # when all values were read
 
 
-def _whole(key: str, number: Decimal) -> int:
-    if not number.is_finite() or number.adjusted() > _MOST_DIGITS or number != int(number):
-        raise ResultError(f"{key} is {number}; expected an integer of at most {_MOST_DIGITS:,} digits")
-    return int(number)
+def _answer_fields(answer: Json, symbols: _Symbols) -> Json:
+    found = dict(answer)
+    if "assignment" in found:
+        found["assignment"] = symbols.codes_of(found["assignment"])
+    if isinstance(counts := found.get("checked"), dict):
+        found["checked"] = [counts.get(name) for name in CheckCounts._fields]
+    if isinstance(optima := found.get("optima"), dict):
+        found["optima"] = [optima.get("number"), [symbols.codes_of(one) for one in _items(optima.get("assignments"))]]
+    if isinstance(found.get("improvements"), list):
+        found["improvements"] = [*map(_improvement_fields, found["improvements"])]
+    if isinstance(spent := found.get("preprocessing"), dict):
+        found["preprocessing"] = spent | {"metrics": _metrics_fields(spent.get("metrics"))}
+    return found
 
 
-def _improvements_of(forms: Sequence[ImprovementForm]) -> tuple[Improvement, ...]:
-    return tuple([Improvement(**msgspec.structs.asdict(one)) for one in forms])
+def _improvement_fields(one: Any) -> Any:  # noqa: ANN401 - JSON
+    if not isinstance(one, dict):
+        return one
+    return [one.get("seconds"), one.get("verdict"), one.get("cost"), one.get("withdrawn", [])]
 
 
-def _epoch_of(form: EpochForm, symbols: _Symbols) -> EpochOutcome:
-    same = {one.name: getattr(form, one.name) for one in fields(EpochOutcome) if one.name != "metrics"}
-    return EpochOutcome(**same | _answer_of(form, symbols), metrics=_metrics_of(form))
+def _metrics_fields(metrics: Any) -> Any:  # noqa: ANN401 - JSON
+    if not isinstance(metrics, dict):
+        return metrics
+    total = metrics.get("messages", 0)
+    by_type = metrics.get("messages_by_type") or ({"messages": total} if total else {})  # earlier versions: no types
+    return metrics | {"messages": by_type}
 
 
-def _preprocessing_of(form: PreprocessingForm | None) -> Preprocessing | None:
-    if form is None:
-        return None
-    return Preprocessing(**_fields(form, Preprocessing) | {"metrics": _metrics_of(form.metrics)})
+def _texts(result: Json, key: str) -> Sequence[str]:
+    return [one for one in _items(result.get(key)) if isinstance(one, str)]
 
 
-def _metrics_of(form: MetricsForm | EpochForm) -> Metrics:
-    messages = form.messages_by_type or ({"messages": form.messages} if form.messages else {})
-    return Metrics(**_fields(form, Metrics) | {"messages": messages})
+def _items(given: object) -> Sequence[Any]:
+    return given if isinstance(given, list) else ()

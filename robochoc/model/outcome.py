@@ -206,9 +206,9 @@ class Answer:
         names = ("assignment", "cost", "withdrawn", "verified", "checked", "dropped_constraints")
         return {name: getattr(self, name) for name in names}
 
-    def parts(self) -> dict[str, Any]:
-        """Return the fields of an answer by name, without those of a subclass."""
-        return {one.name: getattr(self, one.name) for one in fields(Answer)}
+    def parts(self, kind: type[Answer] | None = None) -> dict[str, Any]:
+        """Return the fields of `kind`, a base class, by name; by default those of `Answer`."""
+        return {one.name: getattr(self, one.name) for one in fields(kind or Answer)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, ValuesView
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -66,10 +66,10 @@ class Solution(Outcome, Mapping[str, object]):
     @classmethod
     def of(cls, outcome: Outcome, team: Team, variables: Mapping[str, ModelVariable] | None = None) -> Solution:
         """Return an outcome of `team` as a solution."""
-        same = _fields(outcome, Outcome)
+        same = outcome.parts(Outcome)
         values = UserValues(variables or {}, team)
         epochs = [
-            SolutionEpoch(**_fields(epoch, EpochOutcome), values=values(epoch.assignment)) for epoch in outcome.epochs
+            SolutionEpoch(**epoch.parts(EpochOutcome), values=values(epoch.assignment)) for epoch in outcome.epochs
         ]
         return cls(**same | {"epochs": tuple(epochs)}, variables=variables or {}, problem=team)
 
@@ -194,8 +194,3 @@ class UserValues:
 
 def _in_json(number: Real | Decimal) -> float | Decimal | str:
     return number if isinstance(number, Decimal) else str(number) if isinstance(number, Fraction) else float(number)
-
-
-def _fields(source: object, kind: type) -> dict[str, Any]:
-    """Return the values of the fields of the dataclass `kind` in `source`, by name."""
-    return {one.name: getattr(source, one.name) for one in fields(kind)}

@@ -8,12 +8,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from decimal import Decimal
-
-import msgspec
 
 from robochoc.app.flights.flight_map import changed_to
-from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.prepared_team import value_of
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Checked, Run
@@ -29,15 +25,7 @@ from robochoc.verification.checker import RefutedError, check_told_cost, constra
 
 CHECK_S = 5.0
 """The time limit for checking all constraints; after it, the answer counts as not checked."""
-_MOST_DIGITS = 400
-"""The maximum number of digits of a cost, before and after the point: longer numbers could exhaust the memory."""
 _UNREADABLE = (ModelError, InvalidInputError, OSError, ValueError, TypeError, LookupError, ArithmeticError)
-
-
-class _ExactCost(msgspec.Struct):
-    """The cost of a result with all its digits."""
-
-    cost: int | Decimal | None = None
 
 
 def claim_words(run: Run, claims: str) -> str:
@@ -72,7 +60,7 @@ def check(run: Run) -> None:
         team, code = _drawn(run, result) if drawn else _of_files(run, result)
         record.maximised = not drawn and any(robot.costs.maximize for robot in team.robots)
         if result is not None and result.assignment:
-            record.checked = _checked(team, code, result, (run.folder / RESULT).read_bytes())
+            record.checked = _checked(team, code, result)
 
 
 _Code = Callable[[str, Value], int | None]
@@ -111,11 +99,11 @@ def _of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
     return team, code
 
 
-def _checked(team: Team, code: _Code, result: RunResult, content: bytes) -> Checked | None:
+def _checked(team: Team, code: _Code, result: RunResult) -> Checked | None:
     """Check an answer for a team. None: the time limit was reached."""
     aside = frozenset(result.withdrawn)
     flying = {name: one.domain for name, one in team.variables.items() if team.owner[name] not in aside}
-    values = {name: known for name, value in result.assignment.items() if (known := code(name, value)) is not None}
+    values = {name: known for name, value in result.values.items() if (known := code(name, value)) is not None}
     if values.keys() != flying.keys() or len(values) != len(result.assignment):
         return Checked.BROKEN
     if not all(values[name] in domain for name, domain in flying.items()):
@@ -127,22 +115,12 @@ def _checked(team: Team, code: _Code, result: RunResult, content: bytes) -> Chec
         known = all(name in values for name in constraint.variables)
         if known and constraint_cost(constraint, values) == INFINITE:
             return Checked.BROKEN
-    return Checked.KEPT if _is_cost_correct(team, values, content, aside) else Checked.COST
+    return Checked.KEPT if _is_cost_correct(team, values, result, aside) else Checked.COST
 
 
-def _is_cost_correct(team: Team, values: Mapping[str, int], content: bytes, aside: frozenset[str]) -> bool:
-    """Return whether the cost in a result is that of the values; it is decoded again, with all its digits."""
-    cost = msgspec.json.decode(content.partition(b"\n")[0], type=_ExactCost).cost
-    if isinstance(cost, Decimal) and not (cost.is_finite() and max(map(abs, _reach(cost))) <= _MOST_DIGITS):
-        return False
+def _is_cost_correct(team: Team, values: Mapping[str, int], result: RunResult, aside: frozenset[str]) -> bool:
     try:
-        check_told_cost(team, values, cost, without=aside)
+        check_told_cost(team, values, result.cost, without=aside)
     except RefutedError:
         return False
     return True
-
-
-def _reach(cost: Decimal) -> tuple[int, int]:
-    """Return the positions of the first and the last digit of a number, relative to the point."""
-    exponent = cost.as_tuple().exponent
-    return cost.adjusted(), exponent if isinstance(exponent, int) else _MOST_DIGITS

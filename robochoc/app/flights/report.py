@@ -23,7 +23,6 @@ from robochoc.app.flights.builder import flies
 from robochoc.app.flights.flight_map import changed_to, happened_in
 from robochoc.app.flights.flight_result import flight_result_of, flight_words, flying_robots_words
 from robochoc.app.runs.options import RESULT
-from robochoc.app.runs.result import robots_in
 from robochoc.app.runs.rule_costs import Decided, rule_cost, rules_with_costs, values_by_robot, violated_links
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.rules import PALETTE
@@ -97,7 +96,7 @@ def summary(sketch: Sketch, run: Run) -> str:
     if result is None:
         return say("report.no-answer")
     if result.epochs and not sketch.decisions:  # an imported team, whose robots may change
-        there = len(robots_in(result.epochs[-1]))
+        there = len(result.epochs[-1].robots)
     else:
         there = len((changed_to(run) or sketch).robots)
     robots = there - len(result.withdrawn)
@@ -129,12 +128,12 @@ _VERDICTS = frozenset({"solution", "optimal", "most", "fewest", "no-solution", "
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
     """Return the values of an answer by robot and decision."""
-    return values_by_robot(sketch, run.result.assignment) if run.result else {}
+    return values_by_robot(sketch, run.result.values) if run.result else {}
 
 
 def _answer(sketch: Sketch, run: Run) -> str:
     if run.result and not sketch.decisions:
-        pairs = [[name, value] for name, value in run.result.assignment.items()]
+        pairs = [[name, value] for name, value in run.result.values.items()]
         return _section("report.answer", _table([say("report.decision"), say("report.values")], pairs)) if pairs else ""
     values = values_of(sketch, run)
     if not values:

@@ -1,43 +1,31 @@
-"""What a run came to: the JSON result of `robochoc solve` (docs/reference/result.md), decoded."""
+"""The JSON result of a run (docs/reference/result.md), with the user's values."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
-from typing import Any
-
-import msgspec
 
 from robochoc.app.sketch.sketch import Value
-from robochoc.formats.result import MetricsForm, ResultForm
+from robochoc.formats.result import ResultError, read_result
+from robochoc.model.outcome import Answer, Outcome, Verdict
 
 
-class RunResult(ResultForm, frozen=True, kw_only=True):
-    """The JSON result of a team; fields that may be missing have defaults.
+@dataclass(frozen=True, kw_only=True)
+class RunResult(Outcome):
+    """The result of a run.
 
     Attributes:
-        assignment: The values, by `ROBOT.DECISION`.
-        cost: The cost, as a float where it is a decimal.
-        bound: The lower bound of the cost, as a float where it is a decimal. None: not known.
-        epochs: The epochs, if the problem has changed, as objects of the JSON result.
+        labels: The user's words for values, by their names in files.
     """
 
-    team: str = ""
-    protocol: str = ""
-    runtime: str = ""
-    seed: int = 0
-    assignment: dict[str, Value] = msgspec.field(default_factory=dict)
-    cost: float | int | None = None  # type: ignore[assignment] # a decimal in a file may have millions of digits
-    bound: float | int | None = None  # type: ignore[assignment] # likewise
-    withdrawn: tuple[str, ...] = ()
-    metrics: MetricsForm = MetricsForm(messages=0, bytes=0, ncccs=0, checks=0, wall_s=0)
-    verified: bool = False
-    epochs: tuple[dict[str, Any], ...] = ()  # type: ignore[assignment] # files of earlier versions may lack anything
+    labels: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def messages(self) -> int:
-        """How many messages were sent."""
-        return self.metrics.messages
+        """The number of messages sent."""
+        return sum(self.metrics.messages.values())
 
     @property
     def has_decided(self) -> bool:
@@ -47,37 +35,35 @@ class RunResult(ResultForm, frozen=True, kw_only=True):
     @property
     def ends_unsolved(self) -> bool:
         """Whether there was an answer before something happened, but is none any more."""
-        return not self.assignment and any(map(_has_answer, self.epochs))
+        return not self.assignment and any(
+            epoch.assignment and epoch.verdict != Verdict.NO_SOLUTION for epoch in self.epochs
+        )
+
+    @cached_property
+    def values(self) -> dict[str, Value]:
+        """The user's values, by `ROBOT.DECISION`."""
+        return self.values_of(self)
+
+    def values_of(self, answer: Answer) -> dict[str, Value]:
+        """Return the user's values in this result, or in one of its epochs, by `ROBOT.DECISION`."""
+        named = self.labelled(answer.assignment)
+        return {name: self.labels.get(str(value), value) for name, value in named.items()}
 
     def value(self, robot: str, decision: str) -> Value | None:
-        """Return what a robot has decided."""
-        return self.assignment.get(f"{robot}.{decision}")
-
-
-def _has_answer(epoch: Mapping[str, Any]) -> bool:
-    assignment = epoch.get("assignment")
-    return isinstance(assignment, dict) and bool(assignment) and epoch.get("verdict") != "no-solution"
-
-
-def robots_in(epoch: Mapping[str, Any]) -> list[str]:
-    """Return who was there in an epoch of a result; nobody, if it does not say so."""
-    robots = epoch.get("robots")
-    return [*map(str, robots)] if isinstance(robots, list) else []
+        """Return the value of a decision of a robot."""
+        return self.values.get(f"{robot}.{decision}")
 
 
 def decoded(content: bytes, labels: Mapping[str, str] = MappingProxyType({})) -> RunResult | None:
-    """Return the result in what a run has written so far; None: there is none, or not all of it yet.
+    """Return the result in the output of a run. None: there is no result, or it is not complete yet.
 
     Args:
-        content: What it has written.
-        labels: The user's own words for values, by what files say.
+        content: The output.
+        labels: The user's words for values, by their names in files.
     """
     line, end, _ = content.partition(b"\n")
     try:
-        result = msgspec.json.decode(line, type=RunResult) if end else None
-    except (msgspec.MsgspecError, RecursionError):
+        outcome = read_result(line) if end else None
+    except ResultError:
         return None
-    if result is None or not labels:
-        return result
-    own = {name: labels.get(str(value), value) for name, value in result.assignment.items()}
-    return msgspec.structs.replace(result, assignment=own)
+    return None if outcome is None else RunResult(**outcome.parts(Outcome), labels=labels)

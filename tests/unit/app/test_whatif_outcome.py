@@ -10,6 +10,7 @@ from robochoc.app.sketch.changing_model import changing_model
 from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.team_changes import AnyTeamChange, CellBlocked, LowBattery, RobotFails, RobotJoins, changed
 from robochoc.model.outcome import Verdict
+from tests.support.run_results import run_epoch, run_result
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABC"))
 TASK = Decision("task", DecisionKind.TASK, ("two words", "wash", "dry"))
@@ -17,11 +18,8 @@ TEAM = Sketch("team", Area(3, 1), ROBOTS, (TASK,), (SketchRule("R1", "different"
 
 
 def result(*epochs: tuple[str, dict[str, int | str], int], protocol: str = "dynabt") -> RunResult:
-    told = tuple(
-        {"verdict": verdict, "assignment": assignment, "cost": 0, "messages": messages}
-        for verdict, assignment, messages in epochs
-    )
-    return RunResult(Verdict(epochs[-1][0]), protocol=protocol, assignment=epochs[-1][1], epochs=told)
+    given = [run_epoch(verdict, assignment, messages=messages) for verdict, assignment, messages in epochs]
+    return run_result(epochs[-1][0], epochs[-1][1], protocol=protocol, epochs=given)
 
 
 def test_robots_stay_move_leave_and_come() -> None:
@@ -57,7 +55,7 @@ def test_a_run_that_did_not_come_to_the_change_has_no_outcome() -> None:
 
 
 def test_a_team_alone_is_told_by_its_result() -> None:
-    part = part_of(TEAM, None, RunResult(Verdict.SOLUTION, assignment={"B.task": "two_words"}, cost=3))
+    part = part_of(TEAM, None, run_result(Verdict.SOLUTION, {"B.task": "two_words"}, cost=3))
     assert (part.values, part.cost, part.solved) == ({("B", "task"): "two words"}, 3, True)
 
 

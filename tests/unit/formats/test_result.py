@@ -35,8 +35,9 @@ def test_plain_results_stay_short() -> None:
         "verified",
     ]
     assert list(told["epochs"][0]) == [
-        *("verdict", "opened_by", "robots", "assignment", "cost", "messages", "bytes", "ncccs", "checks", "wall_s"),
-        "verified",
+        *("verdict", "opened_by", "robots", "assignment", "cost", "withdrawn", "verified"),
+        *(one.name for one in fields(Metrics)),
+        "messages_by_type",
     ]
 
 
@@ -62,11 +63,33 @@ def test_results_of_earlier_versions_are_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "wrong"), [("count", "1.5"), ("count", '"NaN"'), ("count", '"Infinity"'), ("count", "1e999999999")]
+    ("key", "wrong", "text"),
+    [
+        ("count", "1.5", "count: expected an integer or null"),
+        ("count", "NaN", "NaN is not a number"),
+        ("count", "1e999999999", "more than 10,000 digits"),
+        ("cost", "-1e-999999999", "more than 10,000 digits"),
+        ("cost", "1" * 10_001, "more than 10,000 digits"),
+        ("bound", '"3"', "bound: expected "),
+        ("checked", '{"by_both":1}', "checked.*: expected an integer"),
+        ("checked", "[]", "checked: "),
+        ("optima", '{"number":1,"assignments":[{"a":[]}]}', "optima.*: expected an integer"),
+        ("improvements", '[{"seconds":1,"verdict":"none","cost":1}]', "improvements.*: 'none' is not allowed"),
+        ("improvements", "{}", "improvements: expected a list"),
+        ("epochs", "[3]", "epochs.*: expected an object"),
+        ("epochs", '[{"verdict":"solution","robots":[],"wall_s":"1"}]', "wall_s: expected a number"),
+        ("metrics", "[]", "metrics: expected an object"),
+        ("metrics", '{"messages":"many"}', "messages.*: expected "),
+        ("preprocessing", '{"name":"ac"}', "preprocessing.metrics: expected an object"),
+        ("seed", "null", "seed: expected an integer"),
+        ("verdict", '"none"', "'none' is not allowed"),
+    ],
 )
-def test_numbers_that_are_not_integers(key: str, wrong: str) -> None:
-    content = result_json(PLAIN).replace(b'"verified"', f'"{key}":{wrong},"verified"'.encode())
-    with pytest.raises(ResultError, match=f"{key} is .*; expected an integer of at most 10,000 digits"):
+def test_invalid_values_are_refused_with_their_place(key: str, wrong: str, text: str) -> None:
+    plain = msgspec.json.decode(result_json(PLAIN))
+    plain.pop(key, None)
+    content = f'{{"{key}":{wrong},'.encode() + msgspec.json.encode(plain)[1:]
+    with pytest.raises(ResultError, match=text):
         read_result(content)
 
 

@@ -24,7 +24,7 @@ MOST_BARS = 40
 
 async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> None:
     """Fill `where` with the costs of rules, if there are any. They are computed in a thread."""
-    costs = await run.io_bound(rule_costs, sketch, result.assignment)
+    costs = await run.io_bound(rule_costs, sketch, result.values)
     if not costs or where.is_deleted:
         return
     with where, ui.element("section").classes("panel costs"):

@@ -209,7 +209,7 @@ class _Page:
         for some in [*live.values.values()]:
             values |= some
         if result is not None:
-            values = result.assignment
+            values = result.values
         unsettled = frozenset(robot.name for robot in sketch.robots if result is None and not live.settled(robot.name))
         aside = frozenset(result.withdrawn if result else ())
         spoken = dict(live.recent) if running else {}

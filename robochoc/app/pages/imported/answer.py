@@ -13,7 +13,7 @@ from robochoc.app.imported.facts import ImportedFacts
 from robochoc.app.pages.imported.model import style
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
-from robochoc.app.runs.result import RunResult, robots_in
+from robochoc.app.runs.result import RunResult
 from robochoc.app.sketch.sketch import Value
 from robochoc.app.texts import say
 
@@ -121,7 +121,6 @@ MOST_EPOCHS = 40
 _MOST_AT_ONE = 3
 """The maximum number of values at a robot in the picture."""
 _LONGEST = 160
-_VERDICTS = frozenset({"solution", "optimal", "no-solution", "unknown"})
 
 
 def says_of(facts: ImportedFacts, values: Mapping[str, Value]) -> dict[str, str]:
@@ -136,26 +135,25 @@ def says_of(facts: ImportedFacts, values: Mapping[str, Value]) -> dict[str, str]
 
 def robots_of(facts: ImportedFacts, result: RunResult) -> int:
     """Return the number of robots in the last epoch."""
-    return len(robots_in(result.epochs[-1])) if result.epochs else len(facts.there)
+    return len(result.epochs[-1].robots) if result.epochs else len(facts.there)
 
 
 def table_html(facts: ImportedFacts, result: RunResult) -> str:
     """Return each robot's decisions as a table. Names from files are escaped."""
-    return _table(facts, result.assignment, frozenset(result.withdrawn))
+    return _table(facts, result.values, frozenset(result.withdrawn))
 
 
 def epochs_html(facts: ImportedFacts, result: RunResult) -> str:
     """Return the list of epochs with their events and verdicts. Names are escaped."""
     parts = []
     for number, epoch in enumerate(result.epochs[:MOST_EPOCHS]):
-        verdict = str(epoch.get("verdict"))
-        known = say(f"imported.verdict.{verdict}") if verdict in _VERDICTS else verdict
+        known = say(f"imported.verdict.{epoch.verdict}")
         happened = facts.events[number - 1] if 0 < number <= len(facts.events) else ""
-        title = happened or say("imported.epoch", opened=_cut(str(epoch.get("opened_by", ""))))
-        told = say("imported.epoch-took", robots=len(robots_in(epoch)), messages=epoch.get("messages", 0))
-        assignment = epoch.get("assignment")
-        table = _table(facts, assignment, frozenset()) if isinstance(assignment, dict) and assignment else ""
-        head = f"<b>{escape(title)}</b> {escape(known)} <span class='soft'>{escape(told)}</span>"
+        title = happened or say("imported.epoch", opened=_cut(epoch.opened_by))
+        messages = sum(epoch.metrics.messages.values())
+        took = say("imported.epoch-took", robots=len(epoch.robots), messages=messages)
+        table = _table(facts, result.values_of(epoch), frozenset()) if epoch.assignment else ""
+        head = f"<b>{escape(title)}</b> {escape(known)} <span class='soft'>{escape(took)}</span>"
         parts.append(f"<li><details><summary>{head}</summary>{table}</details></li>" if table else f"<li>{head}</li>")
     if (more := len(result.epochs) - MOST_EPOCHS) > 0:
         parts.append(f"<li>{escape(say('imported.more', count=more))}</li>")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from html import escape
-from typing import Any
 
 from nicegui import ui
 
@@ -16,16 +15,19 @@ from robochoc.app.pages.imported.model import style
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.result import robots_in
+from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, RunState
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.sentences import listed
+from robochoc.app.sketch.sketch import Value
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
+from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import RemoveAgent
 
 PURPOSE = "whatif"
 _TWICE = 2
-_SOLVED = frozenset({"solution", "optimal"})
+_SOLVED = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
 def build_imported_whatif(project: Project) -> None:
@@ -97,9 +99,8 @@ class _Page:
         if run is None or running:
             return
         with self._box, ui.element("div").classes("panel imported-part"):
-            epochs = run.result.epochs if run.result else ()
-            if len(epochs) >= _TWICE:
-                self._show_change(run, epochs[-2], epochs[-1])
+            if run.result and len(run.result.epochs) >= _TWICE:
+                self._show_change(run, run.result)
             elif run.state == RunState.STOPPED:
                 ui.label(say("whatif.stopped"))
             else:
@@ -108,25 +109,25 @@ class _Page:
                     "error"
                 )
 
-    def _show_change(self, run: Run, before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
+    def _show_change(self, run: Run, result: RunResult) -> None:
+        before, after = result.epochs[-_TWICE:]
+        was, now = result.values_of(before), result.values_of(after)
         with ui.element("h2"):
-            ui.label(claim_words(run, _headline(self._facts, before, after)))
-        gone = [name for name in robots_in(before) if name not in robots_in(after)]
+            ui.label(claim_words(run, _headline(self._facts, result)))
+        gone = [name for name in before.robots if name not in after.robots]
         ui.label(say("imported.failed", names=listed(gone)))
-        protocol = run.result.protocol if run.result else ""
         counts = {"before": f"{_messages(before):,}", "after": f"{_messages(after):,}"}
-        ui.label(say("imported.messages", protocol=protocol, **counts)).classes("soft")
-        if before.get("cost") is not None and after.get("cost") is not None and self._facts.costs:
+        ui.label(say("imported.messages", protocol=result.protocol, **counts)).classes("soft")
+        if before.cost is not None and after.cost is not None and self._facts.costs:
             key = "imported.worths" if self._facts.maximised else "whatif.costs"
-            ui.label(say(key, before=before["cost"], after=after["cost"]))
-        ui.html(changes_html(self._facts, before, after), sanitize=False).classes("imported-table")
+            ui.label(say(key, before=cost_shown(before.cost), after=cost_shown(after.cost)))
+        ui.html(changes_html(self._facts, was, now), sanitize=False).classes("imported-table")
         if self._facts.flies:
             ui.link(say("whatif.fly"), f"/team/{self._project.id}/fly?run={run.id}")
 
 
-def moved(facts: ImportedFacts, before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+def moved(facts: ImportedFacts, was: Mapping[str, Value], now: Mapping[str, Value]) -> list[str]:
     """Return the robots whose decisions differ before and after an event."""
-    was, now = _values(before), _values(after)
     return [
         robot.name
         for robot in facts.robots
@@ -135,9 +136,9 @@ def moved(facts: ImportedFacts, before: Mapping[str, Any], after: Mapping[str, A
     ]
 
 
-def changes_html(facts: ImportedFacts, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+def changes_html(facts: ImportedFacts, was: Mapping[str, Value], now: Mapping[str, Value]) -> str:
     """Return each robot's decisions before and after an event as a table. Names are escaped."""
-    was, now, others = _values(before), _values(after), frozenset(moved(facts, before, after))
+    others = frozenset(moved(facts, was, now))
     heads = say("imported.decision"), say("whatif.before"), say("whatif.after")
     names = [say("decide.robot"), *heads]
     rows = []
@@ -154,23 +155,18 @@ def changes_html(facts: ImportedFacts, before: Mapping[str, Any], after: Mapping
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows[:MOST_ROWS])}</tbody></table>{rest}"
 
 
-def _headline(facts: ImportedFacts, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    if after.get("verdict") not in _SOLVED:
-        return say("whatif.unsolved" if after.get("verdict") == "no-solution" else "whatif.unknown", reason="")
-    if before.get("verdict") not in _SOLVED:
+def _headline(facts: ImportedFacts, result: RunResult) -> str:
+    before, after = result.epochs[-_TWICE:]
+    if after.verdict not in _SOLVED:
+        return say("whatif.unsolved" if after.verdict == Verdict.NO_SOLUTION else "whatif.unknown", reason="")
+    if before.verdict not in _SOLVED:
         return say("whatif.unsolved-before")
-    others = moved(facts, before, after)
+    others = moved(facts, result.values_of(before), result.values_of(after))
     if not others:
         return say("whatif.changes-none")
     key = "whatif.changes-one" if len(others) == 1 else "whatif.changes"
-    return say(key, changed=len(others), count=len(robots_in(after)), names=listed(others))
+    return say(key, changed=len(others), count=len(after.robots), names=listed(others))
 
 
-def _messages(epoch: Mapping[str, Any]) -> int:
-    count = epoch.get("messages")
-    return count if isinstance(count, int) else 0
-
-
-def _values(epoch: Mapping[str, Any]) -> Mapping[str, Any]:
-    assignment = epoch.get("assignment")
-    return assignment if isinstance(assignment, dict) else {}
+def _messages(epoch: EpochOutcome) -> int:
+    return sum(epoch.metrics.messages.values())

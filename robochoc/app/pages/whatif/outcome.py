@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 from robochoc.app.runs.result import RunResult
 from robochoc.app.sketch.building import decided
 from robochoc.app.sketch.sentences import value_words
 from robochoc.app.sketch.sketch import Decision, Sketch, Value
+from robochoc.model.cost_units import Cost
 from robochoc.modelling.model import Model
 
 Values = Mapping[tuple[str, str], Value]
@@ -52,7 +52,7 @@ class TeamDecision:
 
     verdict: str
     values: Values
-    cost: float | int | None
+    cost: Cost | None
     messages: int
 
     @property
@@ -83,7 +83,7 @@ class DecisionComparison:
 
 def part_of(sketch: Sketch, model: Model | None, result: RunResult) -> TeamDecision:
     """Return the decision of a run. `model`: the solved model, if it is not that of the sketch."""
-    values = decided(sketch, result.assignment, model)
+    values = decided(sketch, result.values, model)
     return TeamDecision(result.verdict, values, result.cost, result.messages)
 
 
@@ -94,7 +94,15 @@ def parts_of_epochs(
     sketches = before, after
     if len(result.epochs) != len(sketches):
         return None
-    one, other = (_of_epoch(sketch, model, epoch) for sketch, epoch in zip(sketches, result.epochs, strict=True))
+    one, other = (
+        TeamDecision(
+            epoch.verdict,
+            decided(sketch, result.values_of(epoch), model),
+            epoch.cost,
+            sum(epoch.metrics.messages.values()),
+        )
+        for sketch, epoch in zip(sketches, result.epochs, strict=True)
+    )
     return one, other
 
 
@@ -104,13 +112,6 @@ def compare(
     """Return the comparison of both decisions, with new robots in the last rows."""
     rows = tuple(_rows(before, after))
     return DecisionComparison(before[1], after[1], rows, protocol)
-
-
-def _of_epoch(sketch: Sketch, model: Model, epoch: Mapping[str, Any]) -> TeamDecision:
-    values = decided(sketch, epoch.get("assignment", {}), model)
-    cost = epoch.get("cost")
-    number = cost if isinstance(cost, int | float) else None
-    return TeamDecision(str(epoch.get("verdict")), values, number, int(epoch.get("messages", 0)))
 
 
 def _rows(before: tuple[Sketch, TeamDecision], after: tuple[Sketch, TeamDecision]) -> Iterator[ComparisonRow]:

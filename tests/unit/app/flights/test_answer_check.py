@@ -28,6 +28,7 @@ from robochoc.run.orchestrator import solve
 from tests.support.cases import looped
 from tests.support.kept_runs import cube, kept_run
 from tests.support.program import ROOT
+from tests.support.run_results import run_epoch
 
 
 def _opened(folder: Path, **differing: object) -> Run:
@@ -139,7 +140,7 @@ def test_that_values_of_two_words_are_checked(tmp_path: Path) -> None:
 def test_that_the_team_after_what_has_happened_is_the_one_that_counts(tmp_path: Path) -> None:
     after = edits.without_robot(cube(), "Drone2")
     left = {"Drone1.level": 1, "Drone3.level": 3}
-    run = kept_run(tmp_path, cube(), assignment=left, cost=3, epochs=[{}, {}])
+    run = kept_run(tmp_path, cube(), assignment=left, cost=3, epochs=[run_epoch("solution"), run_epoch("solution")])
     (run.folder / CHANGE).write_bytes(msgspec.json.encode({"after": after, "happened": ["Drone2 fails."]}))
     assert changed_to(run) == after
     assert _found(run) is Checked.KEPT

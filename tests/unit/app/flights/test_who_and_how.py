@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import time
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -21,9 +23,11 @@ from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Sketch
 from robochoc.formats import write_team
 from robochoc.maps.ground_map import BlockedCell
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import RemoveAgent, ScenarioEvent
 from tests.support.cases import looped
 from tests.support.kept_runs import STARTED, cube, kept_run
+from tests.support.run_results import run_epoch
 from tests.support.small_teams import pair
 
 
@@ -154,7 +158,7 @@ def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) 
     run.record.checked, run.record.maximised = None, True
     assert run_words(run, same_day).endswith(": the best answer, proven, is worth 6")
     run.record.maximised = False
-    for verdict, state, more, words in (
+    cases: tuple[tuple[str, RunState, dict[str, Any], str], ...] = (
         (
             "solution",
             RunState.ENDED,
@@ -165,10 +169,12 @@ def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) 
         ("unknown", RunState.STOPPED, {"cost": 6}, "stopped, the best so far, costs 6"),
         ("unknown", RunState.ENDED, {"cost": 0}, "the best so far"),
         ("unknown", RunState.STOPPED, {"assignment": {}}, "no answer"),
-    ):
+    )
+    for verdict, state, more, words in cases:
         run.record.state = state
         kept = run.result
-        run.result = msgspec.structs.replace(kept, verdict=verdict, **more)
+        assert kept is not None
+        run.result = replace(kept, verdict=Verdict(verdict), **more)
         assert run_words(run, same_day).endswith(f": {words}")
         run.result = kept
     run.result = None
@@ -207,8 +213,7 @@ def test_what_happens_to_a_team_of_files_is_said_in_words_too(tmp_path: Path) ->
 
 @pytest.mark.parametrize(("verdict", "flown"), [("solution", True), ("no-solution", False)])
 def test_the_last_answer_is_flown_if_there_is_none_in_the_end(tmp_path: Path, verdict: str, *, flown: bool) -> None:
-    first = {"verdict": verdict, "assignment": {"Drone1.level": 1}}
-    last = {"verdict": "no-solution", "assignment": {}}
+    first, last = run_epoch(verdict, {"Drone1.level": 1}), run_epoch("no-solution")
     run = kept_run(tmp_path, cube(), verdict="no-solution", assignment={}, cost=None, epochs=[first, last])
     making = FlightBuilder(run)
     assert making.has_answer is making.has_flight is flown
@@ -217,7 +222,7 @@ def test_the_last_answer_is_flown_if_there_is_none_in_the_end(tmp_path: Path, ve
 
 
 @looped("epoch", [{}, {"assignment": 5}, {"assignment": None}, {"assignment": []}])
-def test_an_epoch_of_a_stranger_may_say_anything(tmp_path: Path, epoch: dict[str, object]) -> None:
-    run = kept_run(tmp_path, cube(), assignment={}, epochs=[epoch])
-    assert run.result is not None
-    assert not run.result.has_decided
+def test_a_result_with_an_invalid_epoch_is_not_read(tmp_path: Path, epoch: dict[str, object]) -> None:
+    run = kept_run(tmp_path, cube(), assignment={}, epochs=[{**epoch}])
+    assert run.result is None
+    assert b"no answer" in report(run.sketch, run, Pages(), "1").lower()

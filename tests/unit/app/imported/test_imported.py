@@ -15,7 +15,6 @@ from robochoc.app.pages.decide.answer import headline
 from robochoc.app.pages.imported.answer import epochs_html, says_of, table_html
 from robochoc.app.pages.imported.whatif import changes_html, moved
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Record, Run, RunState
 from robochoc.app.sketch.open_from_disk import ImportedTeam, open_team
 from robochoc.app.sketch.sketch import Cell
@@ -27,6 +26,7 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
 from tests.support.cases import looped
 from tests.support.program import ROOT
+from tests.support.run_results import run_epoch, run_result
 from tests.support.small_teams import pair, pkc_team, triangle
 
 RESCUE = ROOT / "docs/examples/rescue"
@@ -116,12 +116,13 @@ def test_a_part_of_a_partially_known_constraint_says_so() -> None:
 def test_the_answer_tells_every_decision_and_names_are_only_text() -> None:
     team = pair()
     found = facts_of(team)
-    result = RunResult(Verdict.SOLUTION, assignment={"A": "<b>", "B": 2})
-    assert says_of(found, result.assignment) == {"RA": "<b>", "RB": "2"}
+    result = run_result(Verdict.SOLUTION, {"A": "<b>", "B": 2})
+    assert says_of(found, result.values) == {"RA": "<b>", "RB": "2"}
     assert "<td>&lt;b&gt;</td>" in table_html(found, result)
-    epochs = ({"verdict": "<i>", "opened_by": "<script>", "robots": ["RA"], "assignment": {"A": "<u>"}}, {"robots": 3})
-    told = epochs_html(found, msgspec.structs.replace(result, epochs=epochs))
-    assert not any(tag in told for tag in ("<i>", "<script>", "<u>"))
+    epoch = run_epoch("unknown", {"A": "<u>"}, opened_by="<script>", robots=["RA"])
+    told = epochs_html(found, run_result("unknown", epochs=[epoch]))
+    assert "&lt;script&gt;" in told
+    assert not any(tag in told for tag in ("<script>", "<u>"))
 
 
 def test_a_table_of_very_many_decisions_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,13 +134,13 @@ def test_a_table_of_very_many_decisions_is_cut(monkeypatch: pytest.MonkeyPatch) 
 
 def test_the_headline_counts_who_is_there_at_the_end(tmp_path: Path) -> None:
     found = facts_of(read_team(RESCUE))
-    epochs = ({"robots": ["a", "b", "c"]}, {"robots": ["a", "b"]})
+    epochs = [run_epoch("solution", robots=["a", "b", "c"]), run_epoch("solution", robots=["a", "b"])]
     run = Run(
         tmp_path, Record(RunOptions(), state=RunState.ENDED), picture_sketch(ImportedTeam(RESCUE, read_team(RESCUE)))
     )
-    run.result = RunResult(Verdict.SOLUTION, assignment={"lead": 1}, cost=0, epochs=epochs)
+    run.result = run_result(Verdict.SOLUTION, {"lead": 1}, cost=0, epochs=epochs)
     assert headline(run, found) == "All 2 decide."
-    run.result = RunResult(Verdict.OPTIMAL, assignment={"lead": 1}, cost=7)
+    run.result = run_result(Verdict.OPTIMAL, {"lead": 1}, cost=7)
     worth = msgspec.structs.replace(found, costs=True, maximised=True)
     assert headline(run, worth) == "All 7 decide. It is worth 7: proven the best."
 
@@ -147,15 +148,15 @@ def test_the_headline_counts_who_is_there_at_the_end(tmp_path: Path) -> None:
 # Robots fail
 
 
-BEFORE = {"assignment": {"A": 1, "B": 2, "C": 3, "D": 1}, "robots": ["RA", "RB", "RC", "RD"]}
-AFTER = {"assignment": {"A": 1, "B": "<b>", "D": 1}, "robots": ["RA", "RB", "RD"]}
+BEFORE: dict[str, int | str] = {"A": 1, "B": 2, "C": 3, "D": 1}
+AFTER: dict[str, int | str] = {"A": 1, "B": "<b>", "D": 1}
 
 
 def test_who_decides_something_else_has_moved_and_who_has_gone_has_not() -> None:
     facts = facts_of(triangle(3))
     assert moved(facts, BEFORE, AFTER) == ["RB"]
     assert moved(facts, BEFORE, BEFORE) == []
-    assert moved(facts, {"assignment": 3}, {}) == []  # damaged
+    assert moved(facts, {}, {}) == []
 
 
 def test_both_sides_are_told_and_names_are_only_text() -> None:

@@ -26,6 +26,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.verification.checker import assignment_cost
 from tests.support.cases import looped
 from tests.support.rule_teams import random_rules
+from tests.support.run_results import run_result
 from tests.support.sketches import random_sketch
 from tests.support.slot_sketches import slots
 
@@ -50,26 +51,24 @@ def _run(
 @looped(
     ("run", "words"),
     [
-        (_run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, cost=5)), "All 3 decide. It costs 5: proven the best."),
-        (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1})), "All 3 decide."),
-        (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1}, cost=2), robots=1), "The robot decides. It costs 2."),
+        (_run(run_result(Verdict.OPTIMAL, {"a": 1}, cost=5)), "All 3 decide. It costs 5: proven the best."),
+        (_run(run_result(Verdict.SOLUTION, {"a": 1})), "All 3 decide."),
+        (_run(run_result(Verdict.SOLUTION, {"a": 1}, cost=2), robots=1), "The robot decides. It costs 2."),
         (
-            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=9, bound=4), RunState.STOPPED),
+            _run(run_result(Verdict.UNKNOWN, {"a": 1}, cost=9, bound=4), RunState.STOPPED),
             "All 3 decide. It was stopped; this is the best so far. It costs 9. Nothing costs less than 4.",
         ),
         (
-            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=1_234_567, bound=1_234_566), RunState.STOPPED),
+            _run(run_result(Verdict.UNKNOWN, {"a": 1}, cost=1_234_567, bound=1_234_566), RunState.STOPPED),
             (
                 "All 3 decide. It was stopped; this is the best so far. It costs 1,234,567. "
                 "Nothing costs less than 1,234,566."
             ),
         ),
-        (_run(RunResult(Verdict.SOLUTION, assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
-        (_run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
+        (_run(run_result(Verdict.SOLUTION, {"a": 1}, cost=0), costs=False), "All 3 decide."),
+        (_run(run_result(Verdict.OPTIMAL, {"a": 1}, cost=0), costs=False), "All 3 decide."),
         (
-            _run(
-                RunResult(Verdict.UNKNOWN, assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=1), withdraw=True
-            ),
+            _run(run_result(Verdict.UNKNOWN, {"a": 1}, withdrawn=("Drone1",), cost=5, bound=1), withdraw=True),
             (
                 "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far. It costs 5. "
                 "At least 1 must step aside."
@@ -77,19 +76,19 @@ def _run(
         ),
         (
             _run(
-                RunResult(Verdict.UNKNOWN, assignment={"a": 1}, withdrawn=("Drone1",), cost=0, bound=0),
+                run_result(Verdict.UNKNOWN, {"a": 1}, withdrawn=("Drone1",), cost=0, bound=0),
                 withdraw=True,
                 costs=False,
             ),
             "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far.",
         ),
         (
-            _run(RunResult(Verdict.UNKNOWN, assignment={"a": 1}, cost=9)),
+            _run(run_result(Verdict.UNKNOWN, {"a": 1}, cost=9)),
             "All 3 decide. A limit was reached; this is the best so far. It costs 9.",
         ),
-        (_run(RunResult(Verdict.NO_SOLUTION)), "There is no solution: the rules cannot all hold."),
+        (_run(run_result(Verdict.NO_SOLUTION)), "There is no solution: the rules cannot all hold."),
         (
-            _run(RunResult(Verdict.OPTIMAL, assignment={"a": 1}, withdrawn=("Drone1",), cost=1)),
+            _run(run_result(Verdict.OPTIMAL, {"a": 1}, withdrawn=("Drone1",), cost=1)),
             (
                 "2 of 3 decide. These step aside, and it is proven that it cannot be fewer, by their weights: Drone1. "
                 "It costs 1."
@@ -111,7 +110,7 @@ def test_that_the_answer_is_told_in_words(run: Run, words: str) -> None:
 
 
 def test_that_robots_that_step_aside_are_weighed() -> None:
-    result = RunResult(Verdict.UNKNOWN, assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=3)
+    result = run_result(Verdict.UNKNOWN, {"a": 1}, withdrawn=("Drone1",), cost=5, bound=3)
     run = Run(Path("00001"), Record(RunOptions(withdraw=True)), with_importance(slots(3, 3), "Drone1", weight=3))
     run.result = result
     assert headline(run).endswith("The weights of those who step aside are at least 3 together.")
@@ -123,8 +122,8 @@ def test_that_hostile_names_are_text() -> None:
         robots=(SketchRobot(HOSTILE, Cell(0, 0)),),
         decisions=(Decision(HOSTILE, DecisionKind.TASK, (HOSTILE,)),),
     )
-    result = RunResult(Verdict.SOLUTION, assignment={f"{HOSTILE}.{HOSTILE}": HOSTILE})
-    says = values_of(sketch, result.assignment)
+    result = run_result(Verdict.SOLUTION, {f"{HOSTILE}.{HOSTILE}": HOSTILE})
+    says = values_of(sketch, result.values)
     assert says == {HOSTILE: HOSTILE}
     for made in (table_html(sketch, result), team_svg(sketch, says), team_svg(sketch, {}, aside=frozenset({HOSTILE}))):
         assert "<img" not in made
@@ -135,7 +134,7 @@ def test_that_hostile_names_are_text() -> None:
 
 def test_that_a_place_is_short_in_the_picture_and_said_in_the_table() -> None:
     sketch = Sketch(robots=(SketchRobot("A", Cell(0, 0)),), decisions=(Decision("spot", DecisionKind.PLACE),))
-    result = RunResult(Verdict.SOLUTION, assignment={"A.spot": 17})
+    result = run_result(Verdict.SOLUTION, {"A.spot": 17})
     assert values_of(sketch, result.assignment) == {"A": "(2, 3)"}
     assert "column 2, row 3" in table_html(sketch, result)
 
