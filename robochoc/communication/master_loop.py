@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from robochoc.communication.control import GoOn, TakeSnapshot, Wave
 from robochoc.communication.kill_schedule import KillSchedule
-from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.communication.session import is_past
@@ -120,7 +120,7 @@ class MasterLoop(ABC):
         """Request the snapshot `number` from all robots."""
         self._send_all(TakeSnapshot(number))
 
-    def _snapshot(self) -> RunResult | None:
+    def _snapshot(self) -> SearchResult | None:
         """Return the requested snapshot once, when it is complete; otherwise None."""
         return self.state.completed_snapshot()
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from robochoc.communication.control import Conclusion, Counters, EpochMessage, Ready, Report, Snapshot, WentOn
 from robochoc.communication.quiescence import Counts, FourCounters
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_watch import SnapshotRound
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
@@ -108,7 +108,7 @@ class SearchState:
         """Return the number of a snapshot to request from all robots; None while another one is pending."""
         return self._snapshots.open()
 
-    def completed_snapshot(self) -> RunResult | None:
+    def completed_snapshot(self) -> SearchResult | None:
         """Return the requested snapshot once, when all robots have answered; otherwise None."""
         return self._snapshots.close(self._present)
 
@@ -176,10 +176,10 @@ class SearchState:
         """The robots that have not sent their final report, sorted."""
         return tuple(sorted(self._present - self._reports.keys()))
 
-    def result(self, wall_s: float) -> RunResult:
+    def result(self, wall_s: float) -> SearchResult:
         """Return the result of the search, which lasted `wall_s` seconds."""
         settled = self.verdict is not None and not self.lost
-        result = RunResult.of(
+        result = SearchResult.of(
             self.verdict if self.verdict is not None and settled else Verdict.UNKNOWN,
             self.witness if settled else None,
             {name: report.assignment for name, report in self._reports.items()},

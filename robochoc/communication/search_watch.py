@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 
 from robochoc.communication.control import Snapshot
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import Findings
 from robochoc.system.compiling import mypyc_attr
@@ -30,7 +30,7 @@ class SearchWatch(ABC):
         """Do the work that is due, and return whether a snapshot is needed now."""
 
     @abstractmethod
-    def receive(self, snapshot: RunResult) -> None:
+    def receive(self, snapshot: SearchResult) -> None:
         """Receive a snapshot. Its verdict is `unknown`, as the search continues."""
 
 
@@ -57,7 +57,7 @@ class SnapshotRound:
         self._answers[name] = answer
         return ""
 
-    def close(self, present: Iterable[str]) -> RunResult | None:
+    def close(self, present: Iterable[str]) -> SearchResult | None:
         """Close the round and return its snapshot if all robots in `present` have answered; otherwise None."""
         if not self._open or not self._answers.keys() >= set(present):
             return None
@@ -72,7 +72,7 @@ class SnapshotRound:
 
 def snapshot_of(
     assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings], lost_messages: int = 0
-) -> RunResult:
+) -> SearchResult:
     """Return robots' values and findings at one moment, by name, as the result of a search without a verdict."""
     metrics = Metrics(lost_messages=lost_messages)
-    return RunResult(Verdict.UNKNOWN, None, dict(assignments), metrics, findings=dict(findings))
+    return SearchResult(Verdict.UNKNOWN, None, dict(assignments), metrics, findings=dict(findings))

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
@@ -68,7 +68,7 @@ class Session(ABC):
         """Whether no message of the previous search was lost: it became quiescent, or there was none."""
 
     @abstractmethod
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         """Search until there is a verdict, for at most `timeout` seconds or (about) `messages` messages.
 
         If a limit is reached first, the verdict is `unknown`. The metrics are those of this search. Robots start only
@@ -83,7 +83,7 @@ class Session(ABC):
     def close(self) -> None:
         """Release all resources of the session."""
 
-    def run(self, timeout: float | None = None) -> RunResult:
+    def run(self, timeout: float | None = None) -> SearchResult:
         """Search once, then close the session."""
         with self:
             return self.search(timeout)

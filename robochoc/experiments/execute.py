@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from robochoc import __version__
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.experiments.digests import digest_of_files, digest_of_team
 from robochoc.experiments.observers import CostOverTime, RobotLoads, combined, journal_bytes, journal_of
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of

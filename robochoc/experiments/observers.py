@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from operator import itemgetter
 
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.experiments.task import CostPoint, RobotLoad, Task, options_of
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Observer, Sent
 from robochoc.journal.recorder import JournalRecorder, improvements

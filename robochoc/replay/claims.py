@@ -14,7 +14,7 @@ from itertools import chain
 
 import msgspec
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
@@ -194,7 +194,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseA
     if given is None or given.why or len(robots.hosts) < len(robots.compiled.team.robots):
         return None
     protocols = {name: host.protocol for name, host in robots.hosts.items()}
-    result = RunResult.of(
+    result = SearchResult.of(
         _verdict(run.events, {str(one.verdict) for one in protocols.values() if one.verdict is not None}),
         None,
         {name: one.assignment for name, one in protocols.items()},

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict

@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard
 from robochoc.journal.given import TeamReader
 from robochoc.journal.recorder import interfaces_given

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from robochoc.communication.kill_schedule import KillSchedule
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.journal.events import Observer
 from robochoc.run.options import CentralSolverName, Options
 from robochoc.solver.cache import SolutionCache

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
@@ -152,7 +152,7 @@ class Deployment(ABC):
         spent = Metrics()
         while True:
             search = self.search(phase)
-            result: RunResult = search.result
+            result: SearchResult = search.result
             spent += result.metrics
             if not result.lost:
                 return search._replace(result=replace(result, metrics=spent))

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
 from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcome, Verdict
@@ -36,7 +36,7 @@ Check = Callable[[], Answer | None]
 class Search(NamedTuple):
     """A search that is over: its result, and how its assignment is checked."""
 
-    result: RunResult
+    result: SearchResult
     check: Check
 
 
@@ -122,7 +122,7 @@ def evaluate_search(
     )
 
 
-def is_spoiled(phase: Phase, result: RunResult) -> bool:
+def is_spoiled(phase: Phase, result: SearchResult) -> bool:
     """Return whether messages were lost, and the protocol does not bear that: then nothing that it claims holds."""
     return result.metrics.lost_messages > 0 and not phase.traits.bears_loss
 
@@ -154,7 +154,7 @@ def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> PhaseA
     )
 
 
-def is_proven(phase: Phase, result: RunResult) -> bool:
+def is_proven(phase: Phase, result: SearchResult) -> bool:
     """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost.
 
     Where messages were lost, an incomplete protocol ends without knowing that it has found a solution.
@@ -165,7 +165,7 @@ def is_proven(phase: Phase, result: RunResult) -> bool:
 
 
 @collection_paused()
-def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam) -> Answer | None:
+def check_with_files(phase: Phase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Answer | None:
     """Return the assignment that a search has found, checked against every constraint of every file.
 
     Args:
@@ -206,7 +206,7 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
 
 
 def _checked_optima(
-    phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam, cost: Cost | None
+    phase: Phase, result: SearchResult, team: Team, compiled: CompiledTeam, cost: Cost | None
 ) -> Optima | None:
     """Return the optima that the robots have listed, if they have, each checked as the assignment was.
 
@@ -248,7 +248,7 @@ def check_assignment(
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
-def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Answer) -> Verdict:
+def _verdict_of(phase: Phase, result: SearchResult, kind: ProblemKind, found: Answer) -> Verdict:
     """Return the verdict on what was found."""
     if is_proven(phase, result):
         minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind == ProblemKind.DISWCSP)
@@ -260,13 +260,13 @@ def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Answe
     return result.verdict
 
 
-def _meets_bound(result: RunResult, found: Answer, told: Callable[[float], Cost]) -> bool:
+def _meets_bound(result: SearchResult, found: Answer, told: Callable[[float], Cost]) -> bool:
     """Return whether what was found, with all robots, costs as little as their bound says that anything does."""
     least = lower_bound(result.findings)
     return least is not None and not found.withdrawn and found.verified and found.cost == told(least)
 
 
-def _bound_of(phase: Phase, result: RunResult, told: Callable[[float], Cost]) -> Cost | None:
+def _bound_of(phase: Phase, result: SearchResult, told: Callable[[float], Cost]) -> Cost | None:
     """Return the bound of the cost; where robots may withdraw, the lower bound of the weight of those that do."""
     bound = lower_bound(result.findings)
     withdrawal_cost = phase.parameters.withdrawal_cost

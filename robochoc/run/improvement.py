@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Verdict
@@ -90,7 +90,7 @@ class Improvements(SearchWatch):
         *,
         began: float,
         deadline: float,
-        evaluate: Callable[[RunResult], PhaseAnswer],
+        evaluate: Callable[[SearchResult], PhaseAnswer],
         rank: Rank,
         has_costs: bool,
         bounded: bool,
@@ -140,7 +140,7 @@ class Improvements(SearchWatch):
         self._asked, self._due = now, float("inf")
         return True
 
-    def receive(self, snapshot: RunResult) -> None:
+    def receive(self, snapshot: SearchResult) -> None:
         """See `SearchWatch`: check it, and publish it if it is better."""
         came = time.monotonic()
         self._note(self._evaluate(snapshot))
@@ -231,7 +231,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
     *,
     began: float,
     told: Callable[[float], Cost],
-    check: Callable[[RunResult], Answer | None],
+    check: Callable[[SearchResult], Answer | None],
     publish: Callable[[PhaseAnswer, tuple[Improvement, ...]], None],
     audience: Audience | None,
     before: Improvements | None,
@@ -252,7 +252,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
         keep: Gets each best answer when it is found.
     """
 
-    def evaluate(snapshot: RunResult) -> PhaseAnswer:
+    def evaluate(snapshot: SearchResult) -> PhaseAnswer:
         snapshot = _as_told_one_after_the_other(snapshot, phase, options)
         return evaluate_search(phase, Search(snapshot, partial(check, snapshot)), team.kind, told, options.deadline)
 
@@ -270,7 +270,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
     )
 
 
-def _as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Options) -> RunResult:
+def _as_told_one_after_the_other(snapshot: SearchResult, phase: Phase, options: Options) -> SearchResult:
     """Return `snapshot`, of which nothing is known but what can be checked where messages get lost.
 
     Robots report one after the other, so a message may be lost that no robot has missed yet.

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.model.outcome import PseudoTreeNode
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import Findings, Trail
@@ -27,7 +27,7 @@ class BestKnown(NamedTuple):
     cost: float
 
 
-def best_known(compiled: CompiledTeam, result: RunResult, withdrawal_cost: float | None = None) -> BestKnown | None:
+def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: float | None = None) -> BestKnown | None:
     """Return the cheapest assignment in a result.
 
     Args:
@@ -95,7 +95,7 @@ def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Finding
         yield {name: compiled[name].behind(value) for name, value in best.values.items()}
 
 
-def _best_cycle(compiled: CompiledTeam, result: RunResult, withdrawal_cost: float | None) -> Iterator[_Own]:
+def _best_cycle(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: float | None) -> Iterator[_Own]:
     """Yield the values that the robots had in the cheapest cycle, the first of several."""
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):

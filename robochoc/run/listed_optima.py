@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.protocols.findings import Findings
 from robochoc.run.incumbent import optima
 from robochoc.solver.compiled_team import CompiledTeam
@@ -24,7 +24,7 @@ class _Tree(NamedTuple):
     listed: int
 
 
-def put_together(compiled: CompiledTeam, result: RunResult) -> tuple[int, list[dict[str, int]]] | None:
+def put_together(compiled: CompiledTeam, result: SearchResult) -> tuple[int, list[dict[str, int]]] | None:
     """Return how many optima the robots have counted, and the assignments that they have listed; None if they have not.
 
     Raises:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.formats import check_team, with_checked_events
 from robochoc.journal.events import Observer
 from robochoc.model.change import team_after_events

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, TypedDict, assert_never
 
 from robochoc.communication.kill_schedule import KillSchedule
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
 from robochoc.model.problem import ProblemKind

@@ -15,7 +15,7 @@ from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.formats import InvalidInputError, read_robot_again
 from robochoc.model.change import (
@@ -39,7 +39,7 @@ from robochoc.solver.explanation import Invalidated, invalidated_by
 
 Compile = Callable[[Team], CompiledTeam]
 
-Prepare = Callable[[], tuple[CompiledTeam, RunResult | None]]
+Prepare = Callable[[], tuple[CompiledTeam, SearchResult | None]]
 """What the robots do before each epoch's search: returns the team that they search with, as it is compiled.
 
 With a result, that is the epoch's, and there is no search.
@@ -59,7 +59,7 @@ Returns:
 """
 
 
-NOT_SEARCHED = RunResult.of(Verdict.UNKNOWN, None, {}, (), 0)
+NOT_SEARCHED = SearchResult.of(Verdict.UNKNOWN, None, {}, (), 0)
 """The result where there was no time left."""
 
 
@@ -81,7 +81,7 @@ class FinishedEpoch(NamedTuple):
     team: Team
     epoch: Epoch
     opened_by: str
-    result: RunResult
+    result: SearchResult
 
 
 class ScenarioRun:
@@ -135,7 +135,7 @@ class ScenarioRun:
         self._prepare = prepare
         self._with_files = with_files
         self._held_in = order if with_files else None
-        self.found: RunResult | None = None
+        self.found: SearchResult | None = None
         self._joining: set[str] = set()
         self._after_losses = False
         self._has_added_events = False
@@ -186,9 +186,9 @@ class ScenarioRun:
                 yield FinishedEpoch(self.team, epoch, opened, NOT_SEARCHED)
                 return
 
-    def _search(self, session: Session) -> RunResult:
+    def _search(self, session: Session) -> SearchResult:
         if not self.team.robots:  # all have left, and others may come: no constraint is broken
-            return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
+            return SearchResult.of(Verdict.SOLUTION, None, {}, (), 0)
         if self.found is not None:
             return self.found
         if self.is_over:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, told_cost
@@ -233,7 +233,7 @@ class ThisMachine(Deployment):
         improvements = self._improvements
         return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
 
-    def _preprocessed(self) -> tuple[CompiledTeam, RunResult | None]:
+    def _preprocessed(self) -> tuple[CompiledTeam, SearchResult | None]:
         """Let the robots make their domains consistent, and return the team that is left. See `scenario.Prepare`.
 
         They begin with the domains of the files: what rests on a constraint that is gone comes back.
@@ -250,9 +250,9 @@ class ThisMachine(Deployment):
             return self._compile(restricted(whole, result.findings)), None
         if result.verdict == Verdict.UNKNOWN:
             self._cut_short = self.why_unknown(phase, PhaseAnswer(result.verdict, metrics=result.metrics)) or ""
-        return whole, RunResult.of(result.verdict, result.witness, {}, (), 0)
+        return whole, SearchResult.of(result.verdict, result.witness, {}, (), 0)
 
-    def _settled(self, phase: Phase, found: RunResult) -> PhaseAnswer:
+    def _settled(self, phase: Phase, found: SearchResult) -> PhaseAnswer:
         """Return the answer of a run that has ended before the protocol began."""
         before = total_preprocessing(self._done)
         answer = PhaseAnswer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)

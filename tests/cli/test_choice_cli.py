@@ -9,7 +9,7 @@ import pytest
 
 import robochoc
 from robochoc.cli.reports.choice import LONG_S, OrderNote
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.orders import Order
 from robochoc.run import Options, Withdrawal

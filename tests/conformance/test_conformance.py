@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
@@ -241,5 +241,5 @@ def test_costs_that_do_not_fit_into_messages_are_refused() -> None:
 
 def test_a_result_joins_clocks_by_the_largest() -> None:
     parts = [Metrics({"Ok": 2}, 10, 5, 7), Metrics({"Ok": 1, "Nogood": 1}, 20, 3, 4)]
-    joined = RunResult.of(Verdict.SOLUTION, None, {}, parts, 1.5).metrics
+    joined = SearchResult.of(Verdict.SOLUTION, None, {}, parts, 1.5).metrics
     assert joined == Metrics({"Nogood": 1, "Ok": 3}, 30, 5, 11, 1.5)

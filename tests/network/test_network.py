@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import is_past
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
@@ -42,7 +42,7 @@ def run_over_network(
     protocol: str,
     settings: NetworkSettings = NetworkSettings(),
     events: list[AnyEvent] | None = None,
-) -> tuple[RunResult, tuple[bool, float] | None]:
+) -> tuple[SearchResult, tuple[bool, float] | None]:
     """The result, and what the robots themselves say of the values that were decided."""
     observer = None if events is None else events.append
     with LocalNetwork(team, protocol_named(protocol), settings=settings, observer=observer) as network:
@@ -67,7 +67,7 @@ def agrees(
     return result.verdict
 
 
-def assignment_of(result: RunResult) -> dict[str, int]:
+def assignment_of(result: SearchResult) -> dict[str, int]:
     return {name: value for values in result.assignments.values() for name, value in values.items()}
 
 

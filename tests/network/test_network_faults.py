@@ -22,7 +22,7 @@ from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.solver.compiled_team import CompiledRobot

@@ -21,7 +21,7 @@ from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.model.outcome import Verdict
 from tests.support.limits import HANG_S, wait_until
 from tests.support.network_runs import NetworkRun, frame

@@ -12,7 +12,7 @@ import pytest
 from robochoc.communication.kill_schedule import Kill
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp

@@ -22,7 +22,7 @@ from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.profile import Profile, profile_of
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.message import encode

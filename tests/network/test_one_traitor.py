@@ -15,7 +15,7 @@ from robochoc.communication.control import Conclusion
 from robochoc.communication.network.control_messages import Charge, CheckResult
 from robochoc.communication.network.master import Master
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Metrics, Outcome, Verdict
 from robochoc.protocols.optimization.sfb import SFB
@@ -144,8 +144,8 @@ def machines(checks: dict[str, CheckResult]) -> Machines:
     return Machines(master, Options(protocol="abt", deadline=1), "t", None)
 
 
-def had(**values: dict[str, int]) -> RunResult:
-    return RunResult(Verdict.UNKNOWN, None, values, Metrics())
+def had(**values: dict[str, int]) -> SearchResult:
+    return SearchResult(Verdict.UNKNOWN, None, values, Metrics())
 
 
 def test_what_one_robot_finds_broken_is_no_answer() -> None:

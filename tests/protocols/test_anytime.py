@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 from robochoc.communication.arrays.session import ArraysRun
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Team
@@ -54,13 +54,13 @@ def path(size: int) -> Team:
     return team_of(dict.fromkeys(names, (1, 2, 3)), constraints)
 
 
-def run(team: Team, name: str, chance: Random, seed: int, price: float | None = None, **settings: str) -> RunResult:
+def run(team: Team, name: str, chance: Random, seed: int, price: float | None = None, **settings: str) -> SearchResult:
     given = {"cycles": "12", **settings}
     parameters = RunParameters(seed, given, withdrawal_cost=price)
     return Simulation(team, protocol_named(name), any_schedule(chance), parameters=parameters).search()
 
 
-def costs_of(team: Team, result: RunResult, price: float | None) -> tuple[float, float]:
+def costs_of(team: Team, result: SearchResult, price: float | None) -> tuple[float, float]:
     """Return the cost of the robots' last values, and that of the best cycle."""
     compiled = CompiledTeam(team)
     objective = Objective(team, price)

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from random import Random
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
@@ -93,7 +93,7 @@ def problem(seed: int) -> Team:
     return random_csp(6, 3, 0.5, Random(seed).choice((0.3, 0.4, 0.5)), seed)
 
 
-def run(protocol: type[CompAPO], seed: int, messages: int) -> RunResult:
+def run(protocol: type[CompAPO], seed: int, messages: int) -> SearchResult:
     return Simulation(problem(seed), protocol, RandomChannels(seed)).search(messages=messages)
 
 

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Verdict
@@ -37,12 +37,12 @@ def middle(**settings: float) -> AsyncMaxSum:
     return robot
 
 
-def run(team: Team, chance: Random, seed: int, **settings: object) -> RunResult:
+def run(team: Team, chance: Random, seed: int, **settings: object) -> SearchResult:
     parameters = RunParameters(seed, {name: str(given) for name, given in settings.items()})
     return Simulation(team, AsyncMaxSum, any_schedule(chance), parameters=parameters).search()
 
 
-def final(result: RunResult) -> dict[str, int]:
+def final(result: SearchResult) -> dict[str, int]:
     return {name: one for values in result.assignments.values() for name, one in values.items()}
 
 

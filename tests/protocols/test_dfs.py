@@ -12,7 +12,7 @@ from typing import ClassVar
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.graphs import grid
@@ -131,7 +131,7 @@ def above(places: Mapping[str, PseudoTreeNode], name: str) -> Iterator[str]:
         parent = places[parent].parent
 
 
-def played(team: Team, chance: Random) -> tuple[RunResult, dict[str, Greeter]]:
+def played(team: Team, chance: Random) -> tuple[SearchResult, dict[str, Greeter]]:
     Greeter.made.clear()
     return Simulation(team, Greeter, any_schedule(chance)).search(), dict(Greeter.made)
 

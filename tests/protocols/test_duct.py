@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import pytest
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
@@ -263,7 +263,7 @@ def teams(number: int, name: str) -> list[Team]:
     return [team for team in made if all(domains_of(team).values())]
 
 
-def paid(team: Team, result: RunResult) -> LexicographicCost:
+def paid(team: Team, result: SearchResult) -> LexicographicCost:
     """Return the cost of the values at the end."""
     return cost_of_assignment(team, {name: own for part in result.assignments.values() for name, own in part.items()})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from random import Random
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.session import Epoch
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
@@ -43,7 +43,7 @@ def played(team: Team, schedule: Schedule) -> Counter[Verdict]:
     return seen
 
 
-def check(team: Team, result: RunResult) -> None:
+def check(team: Team, result: SearchResult) -> None:
     assert result.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
     if result.verdict is Verdict.SOLUTION:
         assignment = {name: value for own in result.assignments.values() for name, value in own.items()}

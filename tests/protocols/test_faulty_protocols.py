@@ -12,7 +12,7 @@ import pytest
 from robochoc.communication.processes import processes
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_link import RobotLink
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol

@@ -18,7 +18,7 @@ import pytest
 
 from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.message import Envelope, Message, Value
 from robochoc.protocols.protocol import Protocol

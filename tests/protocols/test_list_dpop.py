@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.network.plausibility import fault_of_findings
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import Metrics, Optima, Verdict
 from robochoc.model.problem import Team
@@ -237,7 +237,7 @@ def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]],
         name: Findings(place=told.tree[name], listing=Listing(own, 100), count="2" if name == "RA" else None)
         for name, own in places.items()
     }
-    result = RunResult(Verdict.SOLUTION, None, {}, Metrics(), findings=findings)
+    result = SearchResult(Verdict.SOLUTION, None, {}, Metrics(), findings=findings)
     with pytest.raises(RefutedError, match=why):
         put_together(CompiledTeam(pair), result)
 

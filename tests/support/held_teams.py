@@ -11,7 +11,7 @@ from pathlib import Path
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.members import Member
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.journal.events import AnyEvent, Received
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.limits import HANG_S, wait_until
@@ -25,7 +25,7 @@ class HeldTeam:
     def __init__(self, network: LocalNetwork, events: list[AnyEvent], go: Path) -> None:
         self.network = network
         self.events = events
-        self.result: RunResult | None = None
+        self.result: SearchResult | None = None
         self.error: Exception | None = None
         self._go = go
         self._thread = threading.Thread(target=self._search)
@@ -54,7 +54,7 @@ class HeldTeam:
         wait_until(lambda: member.away_since is not None, f"nobody notices that {name} is away")
         return member
 
-    def end(self) -> RunResult:
+    def end(self) -> SearchResult:
         """What came of the search, as soon as it is over."""
         self._thread.join(HANG_S)
         assert not self._thread.is_alive(), "the search does not end"
@@ -63,7 +63,7 @@ class HeldTeam:
         assert self.result
         return self.result
 
-    def let_go(self) -> RunResult:
+    def let_go(self) -> SearchResult:
         """Let the team search to the end, and return what came of it."""
         self._go.touch()
         return self.end()

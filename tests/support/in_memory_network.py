@@ -27,7 +27,7 @@ from robochoc.communication.network.inbox import FrameArrived, Item
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
 from robochoc.protocols.protocol import Protocol
@@ -111,7 +111,7 @@ class InMemoryNetwork:
             self.tell(name, DomainRequest(variables))
         self._settle()
 
-    def search(self) -> RunResult:
+    def search(self) -> SearchResult:
         """One search, until all is quiet."""
         state = self.state = AuditedSearchState(
             self.state.epoch + 1, self.members.order, None, self.members.declared(self._protocol.traits)

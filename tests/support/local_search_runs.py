@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from random import Random
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
@@ -22,7 +22,7 @@ def any_schedule(chance: Random) -> Schedule:
     )
 
 
-def played(team: Team, protocol: type[Protocol], schedule: Schedule, seed: int = 0, **settings: object) -> RunResult:
+def played(team: Team, protocol: type[Protocol], schedule: Schedule, seed: int = 0, **settings: object) -> SearchResult:
     """A run of simple robots to its own end."""
     parameters = RunParameters(seed, {name: str(value) for name, value in settings.items()})
     result = Simulation(team, protocol, schedule, parameters=parameters).search()
@@ -40,7 +40,7 @@ def domains_of(team: Team) -> dict[str, list[int]]:
     return domains
 
 
-def assignments_by_cycle(team: Team, result: RunResult) -> list[Assignment]:
+def assignments_by_cycle(team: Team, result: SearchResult) -> list[Assignment]:
     """The values that all robots had in each cycle."""
     domains = domains_of(team)
     trails = {team[name].variables[0].name: found.trail for name, found in result.findings.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Team
@@ -23,12 +23,12 @@ class Losing(Session):
     def lossless(self) -> bool:
         return True
 
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         assert timeout is None
         self.limits.append(messages)
         lost = dict.fromkeys(self._losses.pop(0).split(), "was lost") if self._losses else {}
         verdict = Verdict.UNKNOWN if lost else Verdict.SOLUTION
-        return RunResult(verdict, None, {}, Metrics({"Ok": 7}), lost)
+        return SearchResult(verdict, None, {}, Metrics({"Ok": 7}), lost)
 
     def change(self, epoch: Epoch) -> None:
         self.compiled = epoch.compiled

@@ -12,7 +12,7 @@ from robochoc.authority.authority import Authority
 from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.paused_abt import CHAIN, PausedABT
 

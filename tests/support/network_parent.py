@@ -7,7 +7,7 @@ import signal
 import sys
 
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.paused_abt import CHAIN, PausedABT
 

@@ -24,7 +24,7 @@ from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.journal.events import AnyEvent, Lost, Received, Refused
 from robochoc.model.problem import Team
 from robochoc.solver.agent_problem import RunParameters
@@ -71,7 +71,7 @@ class NetworkRun:
         self.team = team
         self.household = InMemoryAuthority(team.order)
         self.events: list[AnyEvent] = []
-        self.result: RunResult | None = None
+        self.result: SearchResult | None = None
         self.error: Exception | None = None
         self.held: tuple[bool, float] | None = None
         self.endings: dict[str, Ending] = {}
@@ -124,7 +124,7 @@ class NetworkRun:
         place, identity = endpoint or self.endpoint, self.household.identity(name)
         return Transport(place, identity, watch=(), patience_s=patience_s, lease_ms=self.settings.lease_ms)
 
-    def let_go(self) -> RunResult:
+    def let_go(self) -> SearchResult:
         """Let the team search to the end, and return what came of it."""
         self._gate.touch()
         return self.wait_for_result()
@@ -139,7 +139,7 @@ class NetworkRun:
         self.wait_until(lambda: registration._unanswered_since is not None, f"{name} is answered")  # noqa: SLF001
         registration._unanswered_since = time.monotonic() - 2 * self.settings.patience_s  # noqa: SLF001
 
-    def wait_for_result(self) -> RunResult:
+    def wait_for_result(self) -> SearchResult:
         """What came of the search, as soon as it is over."""
         self._search.join(HANG_S)
         assert not self._search.is_alive(), "the search does not end"

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import msgspec
 import pytest
 
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided
@@ -35,7 +35,7 @@ Free = Callable[[Mapping[str, int]], bool]
 class Run:
     """Return the outcome, every envelope in the order of sending, and the values that each variable took."""
 
-    result: RunResult
+    result: SearchResult
     envelopes: tuple[Envelope, ...]
     taken: Mapping[str, set[int]]
 

@@ -69,7 +69,7 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     """Compile all robots of the team in `folder`, even if some reach a limit, and return the exit status."""
     from robochoc.cli.reports.compile import print_sizes, sizes_json
     from robochoc.cli.reports.progress import progress_line
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
     from robochoc.formats import read_team
     from robochoc.model.costs import normalized
     from robochoc.solver.compile import Compilation, Compiler, CompileTimeoutError

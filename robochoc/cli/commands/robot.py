@@ -79,7 +79,7 @@ def _stages(name: str) -> Iterator[Callable[[str], None]]:
     """Yield a function that shows the stage of the run on a terminal."""
     import time
 
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
 
     with progress_line(name) as progress:
         began = time.monotonic()

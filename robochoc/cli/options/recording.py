@@ -13,7 +13,7 @@ from robochoc.cli.options.paths import OutputFile
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
     from robochoc.journal.journal import BlockSink, Header, JournalRecorder
     from robochoc.verification.objective import Objective
 

@@ -11,7 +11,7 @@ from robochoc.run.choice import ORDERS_TEXT, Choice, faster_order
 from robochoc.run.choice_rules import RULES, Rule
 
 if TYPE_CHECKING:
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
     from robochoc.model.problem import Team
     from robochoc.run.options import Options
 

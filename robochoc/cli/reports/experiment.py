@@ -28,7 +28,7 @@ _MINUTE_S, _HOUR_S = 60, 3600
 @contextmanager
 def progress_of(name: str) -> Iterator[Callable[[StudyProgress], None] | None]:
     """Give a function that shows the progress of a study on the last line of a terminal; None elsewhere."""
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
 
     with progress_line(name) as show:
         if show is None:

@@ -70,7 +70,7 @@ def errors_as_failures(place: object) -> Iterator[None]:
 
 def _status(error: Exception) -> int | None:
     """Return the exit status of `error`; None for an unforeseen error."""
-    from robochoc.communication.run_result import RobotsLostError
+    from robochoc.communication.search_result import RobotsLostError
     from robochoc.formats import InvalidInputError
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
 
 REFRESH_S = 0.1
 TICK_S = 0.5
@@ -24,7 +24,7 @@ _ERASE = "\r\x1b[K"
 
 def waiting_for_reports(show: Callable[[Progress], None]) -> Callable[[], None]:
     """Return a function that shows the elapsed time while no robot reports."""
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
 
     began = time.monotonic()
     return lambda: show(Progress(0, time.monotonic() - began, "waiting for reports of robots"))
@@ -61,7 +61,7 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
 @contextmanager
 def elapsed_time(what: str, stage: str) -> Iterator[None]:
     """Show the elapsed time of the block on a terminal, for work that reports no progress and forks no process."""
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
 
     with progress_line(what) as show:
         if show is None:
@@ -94,7 +94,7 @@ def _is_terminal() -> bool:
 @contextmanager
 def stages(team: str) -> Iterator[Callable[[str], None] | None]:
     """Give a function like that of `progress_line`, for work with named stages instead of messages."""
-    from robochoc.communication.run_result import Progress
+    from robochoc.communication.search_result import Progress
 
     began = time.monotonic()
     with progress_line(team) as show:

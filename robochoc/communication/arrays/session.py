@@ -11,7 +11,7 @@ from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.cycle_run import cycles_of
 from robochoc.communication.arrays.description import describe_team
 from robochoc.communication.arrays.layout import Layout
-from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.search_watch import snapshot_of
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Concluded, Decided, Observer
@@ -66,7 +66,7 @@ class ArraysRun(Session):
         """See `Session.lossless`."""
         return True
 
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         """See `Session.search`; limits are checked after each cycle."""
         began = time.monotonic()
         run = self._run
@@ -86,7 +86,7 @@ class ArraysRun(Session):
         witness = None if run.witness is None else self._names[run.witness]
         if self._observer and witness is not None:
             self._observer(Concluded(t=run.cycle, robot=witness, verdict=str(verdict)))
-        return RunResult(
+        return SearchResult(
             verdict, witness, self._assignments(), run.metrics(time.monotonic() - began), findings=self._findings()
         )
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import CheckRequest, CheckResult, Recall, ToRobot
 from robochoc.communication.network.members import Members
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.protocols.findings import Incumbent
 from robochoc.protocols.message import Value
 
@@ -41,17 +41,17 @@ class CheckedSnapshots:
         self._members = members
         self._send = send
         self._asked = 0
-        self._first: RunResult | None = None
+        self._first: SearchResult | None = None
         """The robots' first values, while better ones are requested."""
-        self._unchecked: RunResult | None = None
-        self._checked: RunResult | None = None
+        self._unchecked: SearchResult | None = None
+        self._checked: SearchResult | None = None
         self._tried: set[tuple[float, frozenset[tuple[str, Value]]]] = set()
 
     def ask(self, number: int) -> None:
         """Request the snapshot `number` from all robots."""
         self._ask(number, dict.fromkeys(self._state.order, _Part()))
 
-    def advance(self) -> RunResult | None:
+    def advance(self) -> SearchResult | None:
         """Do the next step of the round. Return its snapshot once all robots have checked it; None before."""
         told = self._state.completed_snapshot() if self._unchecked is None else None
         if told is not None:
@@ -63,7 +63,7 @@ class CheckedSnapshots:
         self.number, self.checks = self._asked, checks
         return self._checked
 
-    def _continue_round(self, told: RunResult) -> None:
+    def _continue_round(self, told: SearchResult) -> None:
         """Request better values than `told`, or have `told` checked."""
         if self._first is not None:
             first, self._first = self._first, None
@@ -93,14 +93,14 @@ class CheckedSnapshots:
                 return {name: _Part(value=best.values[name]) for name in order}
         return {}
 
-    def _parts_of_cycle(self, told: RunResult) -> dict[str, _Part]:
+    def _parts_of_cycle(self, told: SearchResult) -> dict[str, _Part]:
         """Return the requests for the last cycle that all robots have completed; empty if there is none."""
         order = self._state.order
         cycles = [found.trail.cycle for found in told.findings.values() if found.trail is not None]
         known = len(cycles) == len(order) and min(cycles, default=-1) >= 0
         return dict.fromkeys(order, _Part(cycle=min(cycles))) if known else {}
 
-    def _have_checked(self, told: RunResult) -> None:
+    def _have_checked(self, told: SearchResult) -> None:
         """Have all robots check the values in `told`, unless they were checked before."""
         self._unchecked = told
         if self._checked is not None and told.assignments == self._checked.assignments:

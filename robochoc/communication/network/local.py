@@ -32,7 +32,7 @@ from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.process_status import describe_end
 from robochoc.communication.resources import require_descriptors
-from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Observer
 from robochoc.model.problem import Team
@@ -138,7 +138,7 @@ class LocalNetwork(Session):
         """See `Session.lossless`: every search is independent of the previous one."""
         return True
 
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         """See `Session.search`. Raises `RobotsLostError` and `UnsupportedError`."""
         deadline = None if timeout is None else time.monotonic() + timeout
         self._launch()

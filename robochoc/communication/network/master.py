@@ -50,7 +50,7 @@ from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.members import Member, Members
 from robochoc.communication.network.registrar import Registrar
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
+from robochoc.communication.search_result import Progress, RobotsLostError, SearchResult
 from robochoc.communication.session import is_past
 from robochoc.journal.events import Observer
 from robochoc.protocols.traits import Traits
@@ -163,7 +163,7 @@ class Master(MasterLoop):
         messages: int | None = None,
         *,
         checked: bool = False,
-    ) -> RunResult:
+    ) -> SearchResult:
         """Have all registered robots start a search by `protocol`, for at most `timeout` seconds.
 
         If there is a `watch`, it receives snapshots; if `checked`, only those that all robots have checked
@@ -198,7 +198,7 @@ class Master(MasterLoop):
         else:
             super()._ask_for_snapshot(number)
 
-    def _snapshot(self) -> RunResult | None:
+    def _snapshot(self) -> SearchResult | None:
         return self.snapshots.advance() if self.snapshots else super()._snapshot()
 
     def adopt(self, number: int, why: str = "") -> None:

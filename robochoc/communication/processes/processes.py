@@ -34,7 +34,7 @@ from robochoc.communication.processes.pool import STARTED_AT_ONCE, ProcessPool, 
 from robochoc.communication.processes.process_status import LONGEST_STEP_S, ProcessStatus, StoppedRobots
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, rehearse
-from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
+from robochoc.communication.search_result import Progress, RobotsLostError, SearchResult
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import Epoch, Session, is_past
 from robochoc.journal.events import AnyEvent, Lost, Observer, Registered
@@ -107,7 +107,7 @@ class ProcessesRun(Session, MasterLoop):
         """See `Session.lossless`."""
         return self._lossless
 
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         """See `Session.search`. The limit on messages is checked after each wave.
 
         Raises:
@@ -289,7 +289,7 @@ class ProcessesRun(Session, MasterLoop):
 
     # The end of an epoch
 
-    def _finish(self, began: float, *, late: bool) -> RunResult:
+    def _finish(self, began: float, *, late: bool) -> SearchResult:
         """End the search, collect the reports, and return the result."""
         wall_s = time.monotonic() - began
         self._send_all(Pause())

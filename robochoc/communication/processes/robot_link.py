@@ -13,7 +13,7 @@ from robochoc.communication.control import FromParent, FromRobot
 from robochoc.communication.processes.forked_process import ChildProcess, ended_of
 from robochoc.communication.processes.process_status import ProcessStatus, describe_end, is_computing, process_status
 from robochoc.communication.processes.queues import QueueReader
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 
 _DECODER = msgspec.msgpack.Decoder(FromRobot)
 _ENCODER = msgspec.msgpack.Encoder()

@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from robochoc.communication.host import Host, MessageCache, may_be_shared, order_of
-from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.search_watch import SearchWatch, snapshot_of
 from robochoc.communication.session import Epoch, Session, is_past
 from robochoc.communication.simulator.losses import Losses
@@ -120,7 +120,7 @@ class Simulation(Session):
         """See `Session.lossless`."""
         return self._lossless
 
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         """See `Session.search`; a limit on messages is checked after each packet."""
         began = time.monotonic()
         if self._verdict is None:
@@ -130,7 +130,7 @@ class Simulation(Session):
                 computed_by(end, self._play, began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
-        result = RunResult.of(
+        result = SearchResult.of(
             self._verdict or Verdict.UNKNOWN,
             self._witness,
             {name: host.protocol.assignment for name, host in self._hosts.items()},

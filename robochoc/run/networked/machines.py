@@ -16,7 +16,7 @@ from msgspec import UNSET
 
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.plausibility import doubts_about_checks, doubts_about_values, thoroughness
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import ALL_ROBOTS, Answer, Improvement, Outcome, Verdict
@@ -161,7 +161,7 @@ class Machines(Deployment):
             keep=keep,
         )
 
-    def _check_snapshot(self, phase: Phase, snapshot: RunResult) -> Answer | None:
+    def _check_snapshot(self, phase: Phase, snapshot: SearchResult) -> Answer | None:
         """Return the robots' assignment at a snapshot, which all of them have checked; None if a check fails.
 
         Raises:
@@ -215,7 +215,7 @@ class Machines(Deployment):
             robots.append(replace(robot, variables=(*robot.variables, *shown)))
         return Team(self._name, (*robots, *self._gone))
 
-    def _check(self, phase: Phase, result: RunResult) -> Answer | None:
+    def _check(self, phase: Phase, result: SearchResult) -> Answer | None:
         """Return the values that robots have reported, once every robot has checked its own constraints.
 
         Raises:

@@ -20,7 +20,7 @@ from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
-from robochoc.communication.run_result import Progress, RobotsLostError
+from robochoc.communication.search_result import Progress, RobotsLostError
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team

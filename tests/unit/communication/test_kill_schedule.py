@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from robochoc.communication.kill_schedule import Kill, KillSchedule
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats import read_team, write_team
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team

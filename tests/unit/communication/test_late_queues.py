@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import AnyEvent, Sent
@@ -56,7 +56,7 @@ class EndsThen(SearchWatch):
         del now
         return False
 
-    def receive(self, snapshot: RunResult) -> None:
+    def receive(self, snapshot: SearchResult) -> None:
         raise AssertionError(snapshot)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.host import BadMessageError
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.channel import ChannelModel
 from robochoc.communication.simulator.losses import Losses
 from robochoc.communication.simulator.schedule import Concurrent
@@ -52,7 +52,7 @@ def lossy(
     return Options(protocol=protocol, runtime=Runtime.SIMULATOR, message_loss=loss, seed=seed, schedule=schedule)
 
 
-def searched(team: Team, protocol: type[Protocol], seed: int = 0) -> tuple[RunResult, list[AnyEvent]]:
+def searched(team: Team, protocol: type[Protocol], seed: int = 0) -> tuple[SearchResult, list[AnyEvent]]:
     events: list[AnyEvent] = []
     run = Simulation(team, protocol, Concurrent(seed), losses=Losses(0.1, seed), observer=events.append)
     return run.search(), events

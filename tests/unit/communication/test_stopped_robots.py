@@ -14,7 +14,7 @@ import pytest
 
 from robochoc.communication.processes.process_status import REPORT_AFTER_S, ProcessStatus, StoppedRobots
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Lost

@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
@@ -160,7 +160,7 @@ def test_whatever_robots_have_at_that_moment_only_what_breaks_nothing_is_an_answ
             if compiled[robot].values and chance.random() < 0.97
         }
         missing: dict[str, dict[str, int]] = {robot: {} for robot in team.order if robot not in values}
-        result = RunResult.of(Verdict.UNKNOWN, None, {**values, **missing}, (), 0)
+        result = SearchResult.of(Verdict.UNKNOWN, None, {**values, **missing}, (), 0)
         result = replace(result, findings={robot: Findings() for robot in team.order})
         phase = first_phase(Options(protocol=name), protocol_named(name), lambda: 1)
         search = Search(result, partial(check_with_files, phase, result, team, compiled))

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Answer, Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
@@ -23,9 +23,9 @@ from tests.support.random_outcomes import drawn
 
 HEADER = Outcome(Verdict.UNKNOWN, team="team", protocol="abt", runtime="simulator", seed=0)
 SPENT = Metrics(messages={"Ok": 2}, checks=5)
-NOTHING = RunResult(Verdict.NO_SOLUTION, "A", {}, SPENT)
-SOLVED = RunResult(Verdict.SOLUTION, None, {}, SPENT)
-BROKEN_OFF = RunResult(Verdict.UNKNOWN, None, {}, SPENT)
+NOTHING = SearchResult(Verdict.NO_SOLUTION, "A", {}, SPENT)
+SOLVED = SearchResult(Verdict.SOLUTION, None, {}, SPENT)
+BROKEN_OFF = SearchResult(Verdict.UNKNOWN, None, {}, SPENT)
 
 
 class MadeUp(Deployment):
@@ -34,7 +34,7 @@ class MadeUp(Deployment):
     def __init__(
         self,
         options: Options,
-        results: Sequence[RunResult],
+        results: Sequence[SearchResult],
         found: Answer | None = None,
         robots: str = "ABC",
     ) -> None:
@@ -75,7 +75,7 @@ class MadeUp(Deployment):
         self._robots -= lost.keys()
 
 
-def losing(*names: str) -> RunResult:
+def losing(*names: str) -> SearchResult:
     return replace(BROKEN_OFF, lost=dict.fromkeys(names, "it was hit by a meteor"))
 
 

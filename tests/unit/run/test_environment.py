@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from robochoc.api import Problem
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import Team

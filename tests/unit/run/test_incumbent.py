@@ -11,7 +11,7 @@ import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.cli.reports.pseudo_tree import tree_text
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.journal.events import AnyEvent, Decided, Heard, Improved
 from robochoc.journal.journal import improvements
 from robochoc.model.cost_units import CostUnits
@@ -35,8 +35,8 @@ def own(team: Team, assignment: Mapping[str, int]) -> dict[str, dict[str, int]]:
     return {robot.name: {v.name: assignment[v.name] for v in robot.variables} for robot in team.robots}
 
 
-def result(assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings] | None = None) -> RunResult:
-    return RunResult(Verdict.UNKNOWN, None, dict(assignments), Metrics(), findings=dict(findings or {}))
+def result(assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings] | None = None) -> SearchResult:
+    return SearchResult(Verdict.UNKNOWN, None, dict(assignments), Metrics(), findings=dict(findings or {}))
 
 
 # The objective

@@ -18,7 +18,7 @@ from lxml import etree
 
 import robochoc
 from robochoc.app.sketch.troubles import About, Trouble
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
 from robochoc.modelling.errors import ModelError, SourceLine, UnknownNameError
 from robochoc.run.registry import UnknownProtocolError

@@ -91,7 +91,7 @@ def test_the_directorys_table_is_plain(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_progress_is_plain(monkeypatch: pytest.MonkeyPatch) -> None:
     from robochoc.cli.reports import progress  # noqa: PLC0415 - of this test alone
-    from robochoc.communication.run_result import Progress  # noqa: PLC0415 - the same
+    from robochoc.communication.search_result import Progress  # noqa: PLC0415 - the same
 
     class Terminal(StringIO):
         def isatty(self) -> bool:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.arrays.session import ArraysRun
-from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
@@ -46,13 +46,13 @@ def random_settings(protocol: str, chance: Random) -> dict[str, str]:
     return settings
 
 
-def both(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> tuple[RunResult, RunResult]:
+def both(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> tuple[SearchResult, SearchResult]:
     """Return the results in the simulator, and in arrays."""
     objects = Simulation(team, protocol_named(protocol), Concurrent(parameters.seed), parameters=parameters)
     return objects.search(), ArraysRun(team, protocol_named(protocol), parameters=parameters).search()
 
 
-def assert_same(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> RunResult:
+def assert_same(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> SearchResult:
     """Both runs are the same. Where Max-Sum proves that there is no solution, the simulator stops in mid-cycle."""
     objects, arrays = both(team, protocol, parameters)
     assert arrays.verdict is objects.verdict

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from robochoc.cli.group import cli
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.session import ArraysRun
-from robochoc.communication.run_result import Progress
+from robochoc.communication.search_result import Progress
 from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.task import ProblemSpec, Recording, Setup, Task
 from robochoc.generators.families import FAMILIES

@@ -1,4 +1,4 @@
-"""The reports of a runtime: its progress, and its result."""
+"""The reports of a runtime: its progress, and the result of its search."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class Progress(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RunResult:
-    """The result of a run. `assignments` maps each robot to its variables' values (empty: it has none).
+class SearchResult:
+    """The result of a search by robots. `assignments` maps each robot to its variables' values (empty: it has none).
 
     `witness` is the robot that concluded the verdict alone; None when it follows from quiescence or a limit. `lost`
     says why, by name, robots were lost whose loss broke the search off. `findings` is what robots know of the whole.
