@@ -89,8 +89,8 @@ def test_a_robot_all_of_whose_values_are_out_has_proven_that_there_is_no_solutio
 
 
 def test_what_has_the_wrong_size_or_comes_too_early_is_refused() -> None:
-    assert_refused(middle, [("RA", Q([[0, 0]], settled=True))], "before R")
-    assert_refused(middle, [("RC", R([[0, 0, 0]], settled=True))], "has not 1 rows of 2 entries")
+    assert_refused(middle, [("RA", Q([[0, 0]], settled=True))], "before it received R")
+    assert_refused(middle, [("RC", R([[0, 0, 0]], settled=True))], "must have 1 rows of 2 entries")
 
 
 @count("trees", 25, 500)

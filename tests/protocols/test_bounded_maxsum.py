@@ -225,8 +225,8 @@ def test_a_run_says_optimal_where_the_result_meets_the_bound(teams: int) -> None
 
 
 def test_what_cannot_be_is_refused() -> None:
-    assert_refused(lambda: robot(pair(), "RA"), [("RB", Dependency(float("nan"), []))], "weighs nan")
-    assert_refused(lambda: robot(pair(), "RA"), [("RB", Dependency(1, [1, 2, 3]))], "has not 1 rows of 2 entries")
+    assert_refused(lambda: robot(pair(), "RA"), [("RB", Dependency(float("nan"), []))], "weight nan")
+    assert_refused(lambda: robot(pair(), "RA"), [("RB", Dependency(1, [1, 2, 3]))], "must have 1 rows of 2 entries")
 
 
 def test_costs_that_floats_do_not_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

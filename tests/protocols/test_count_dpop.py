@@ -108,14 +108,14 @@ def test_numbers_that_cannot_be_are_refused() -> None:
 
     assert replies(with_costs(), ("RB", Counts(1, bytes([1])))) == []
     for wrong, why in (
-        (Counts(1, bytes([1, 0])), "a cost without an assignment"),
+        (Counts(1, bytes([1, 0])), "a number does not match its cost"),
         (Counts(1, bytes([4, 1])), "larger than 2\\^2"),
-        (Counts(2, bytes([1, 0, 1, 0])), "no piece"),
-        (Counts(1, bytes([1, 1, 1])), "no piece"),
-        (Counts(1, b""), "no piece"),
+        (Counts(2, bytes([1, 0, 1, 0])), "do not fit"),
+        (Counts(1, bytes([1, 1, 1])), "do not fit"),
+        (Counts(1, b""), "do not fit"),
     ):
         assert_refused(with_costs, [("RB", wrong)], why)
-    assert_refused(root, [("RB", Counts(1, bytes([1, 1])))], "its costs have not come")
+    assert_refused(root, [("RB", Counts(1, bytes([1, 1])))], "before its costs")
 
 
 def test_numbers_that_could_be_too_long_end_the_run_and_they_are_part_of_the_memory_need() -> None:

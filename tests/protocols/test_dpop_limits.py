@@ -132,13 +132,13 @@ def test_a_table_that_was_not_asked_for_is_refused() -> None:
 def test_a_table_of_another_size_or_costs_above_the_bound_is_refused(costs: bytes) -> None:
     robot = begun(products("AB", "AB"), "RA", below="B")
     replies(robot, ("RB", dimensions({"RA": 3})))
-    with pytest.raises(ValueError, match=r"no piece|more than the most"):
+    with pytest.raises(ValueError, match=r"do not fit|above the announced maximum"):
         replies(robot, ("RB", UTIL(1, costs)))
 
 
 def test_children_that_contradict_each_other_are_refused() -> None:
     robot = begun(products("ABCD", "AB BC BD"), "RB", "A", "CD")
-    with pytest.raises(ValueError, match="RC says that RA has 4 values"):
+    with pytest.raises(ValueError, match="RC sent a wrong domain size: 4 values of RA"):
         replies(robot, ("RA", domain()), ("RC", dimensions({"RA": 4})), ("RD", dimensions({"RA": 3})))
 
 
@@ -146,7 +146,7 @@ def test_children_that_contradict_each_other_are_refused() -> None:
 def test_who_speaks_twice_or_out_of_place_is_refused(sender: str, message: Message) -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
     replies(robot, ("RC", dimensions({"RB": 3})))
-    with pytest.raises(ValueError, match=f"{sender} had nothing to say"):
+    with pytest.raises(ValueError, match=f"{sender} sent an unexpected or repeated message"):
         replies(robot, (sender, message))
 
 
@@ -165,12 +165,12 @@ def test_who_has_no_room_does_not_proceed() -> None:
 ])  # fmt: skip
 def test_dimensions_that_cannot_be_are_refused(said: Dimensions) -> None:
     robot = begun(products("ABC", "AB BC"), "RB", "A", "C")
-    with pytest.raises(ValueError, match="cannot be"):
+    with pytest.raises(ValueError, match="sent invalid dimensions"):
         replies(robot, ("RC", said))
 
 
 def test_axes_that_are_not_the_separator_s_are_refused() -> None:
-    with pytest.raises(ValueError, match="is none"):
+    with pytest.raises(ValueError, match="its separator is RA, RB"):
         replies(leaf(products("ABC", "AB BC AC")), ("RB", Proceed(["RB"])))
 
 
@@ -178,14 +178,14 @@ def test_axes_that_are_not_the_separator_s_are_refused() -> None:
 def test_values_that_are_none_are_refused(assignment: list[int]) -> None:
     robot = leaf(products("ABC", "AB BC AC"))
     replies(robot, ("RB", Proceed(["RB", "RA"])))
-    with pytest.raises(ValueError, match="are no values of RB, RA"):
+    with pytest.raises(ValueError, match="are not values of RB, RA"):
         replies(robot, ("RB", VALUE(assignment)))
 
 
 def test_a_value_that_comes_twice_is_refused() -> None:
     robot = leaf(products("ABC", "AB BC AC"))
     replies(robot, ("RB", Proceed(["RB", "RA"])), ("RB", VALUE([0, 0])))
-    with pytest.raises(ValueError, match="RC has a value already"):
+    with pytest.raises(ValueError, match="RC already has a value"):
         replies(robot, ("RB", VALUE([0, 0])))
 
 

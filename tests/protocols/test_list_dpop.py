@@ -108,10 +108,10 @@ def test_what_is_said_of_optima_in_words() -> None:
 
 @looped(("message", "why"), [
     (ListedValues([], []), "0 combinations"),
-    (ListedValues([[0]], ["0", "0"]), "1 combinations of values, and 2 numbers"),
+    (ListedValues([[0]], ["0", "0"]), "1 combinations of values, 2 numbers"),
     (ListedValues([[0]] * 101, ["0"] * 101), "101 combinations"),
-    (ListedValues([[2]], ["0"]), "are no values"), (ListedValues([[-1]], ["0"]), "are no values"),
-    (ListedValues([[0, 0]], ["0"]), "are no values"), (ListedValues([[0]], ["1"]), "has no optimum 1"),
+    (ListedValues([[2]], ["0"]), "are not values"), (ListedValues([[-1]], ["0"]), "are not values"),
+    (ListedValues([[0, 0]], ["0"]), "are not values"), (ListedValues([[0]], ["1"]), "has no optimum 1"),
 ])  # fmt: skip
 def test_optima_that_cannot_be_are_refused(message: Message, why: str) -> None:
     robot = robot_of("RB", "A")
@@ -125,7 +125,7 @@ def test_optima_that_come_twice_or_too_early_are_refused() -> None:
     with pytest.raises(ValueError, match="no table yet"):
         replies(robot, ("RA", ListedValues([[]], ["0"])))
     replies(robot, ("RA", Proceed(["RA"])), ("RA", ListedValues([[0]], ["0"])))
-    with pytest.raises(ValueError, match="values already"):
+    with pytest.raises(ValueError, match="already has values"):
         replies(robot, ("RA", ListedValues([[0]], ["0"])))
 
 

@@ -90,7 +90,7 @@ def test_the_value_is_that_which_costs_least_by_all_functions() -> None:
     assert value(robot) == (1,)
 
 
-def test_a_cycle_is_r_of_all_functions_and_then_q_of_all_variables() -> None:
+def test_a_cycle_is_last_r_all_functions_and_then_last_q_all_variables() -> None:
     robot = middle(chain())
     assert replies(robot, ("RC", R([[0, 0]]))) == []
     assert [receiver for receiver, _ in replies(robot, ("RA", TWO))] == ["RA", "RC"]

@@ -119,11 +119,11 @@ def test_before_values_are_told_a_robot_without_a_value_has_a_proof_and_afterwar
 
 def test_what_has_the_wrong_size_is_refused() -> None:
     robot = middle()
-    with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
+    with pytest.raises(ValueError, match="must have 1 rows of 2 entries"):
         replies(robot, ("RC", R([[0, 0, 0]])))
     robot = middle()
     replies(robot, ("RC", R([[0, 0]])))
-    with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
+    with pytest.raises(ValueError, match="must have 1 rows of 2 entries"):
         replies(robot, ("RA", Q([[0, 0, 0]])))
     robot = middle("ADVP")
     replies(robot, ("RC", R([[0, 0]])))

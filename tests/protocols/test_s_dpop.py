@@ -155,13 +155,13 @@ def test_a_proof_of_no_solution_stands_while_constraints_come() -> None:
 
 def test_reuse_of_a_table_that_is_not_there_is_refused() -> None:
     robot = placed(SDPOP, products("ABC", "AB BC"), "RB", "RA", children=["RC"])
-    with pytest.raises(ValueError, match="there is none"):
+    with pytest.raises(ValueError, match="has no table of it"):
         replies(robot, ("RC", Reuse()))
 
 
 def test_a_tree_that_does_not_stand_is_not_begun() -> None:
     robot = placed(SDPOP, products("AB", "AB"), "RB", "RA")
-    with pytest.raises(ValueError, match="has begun already"):
+    with pytest.raises(ValueError, match="has already started"):
         replies(robot, ("RA", Check([])))
 
 
@@ -174,7 +174,7 @@ def test_a_table_that_was_not_asked_for_is_refused() -> None:
 def test_who_speaks_twice_is_refused() -> None:
     robot = placed(SDPOP, products("ABCD", "AB BC BD"), "RB", "RA", children=["RC", "RD"])
     once = ("RC", Dimensions({"RB": 3}, 9, 1, Need(1, "RC")))
-    with pytest.raises(ValueError, match="has said it already"):
+    with pytest.raises(ValueError, match="unexpected or repeated"):
         replies(robot, ("RA", domain()), once, once)
 
 

@@ -61,7 +61,7 @@ class ArrayMGM(ArrayGainers):
         self.send_values()
 
     def _step(self) -> None:
-        """Compute the moves, send gains, and move the robots that gain most (`MGM._weigh`, `MGM._move`)."""
+        """Compute the moves, send gains, and move the robots that gain most (`MGM._send_gain`, `MGM._move`)."""
         found = self.value_costs()
         self.receive()
         self.count_checks(self.all_checks)

@@ -1,15 +1,15 @@
 """Asynchronous Max-Sum.
 
-Max-Sum without cycles. Each robot takes in what has arrived, takes the value that costs least by it, and tells its
-neighbours what has changed. When nothing changes any more, all are silent: that is the end.
+Max-Sum without cycles. Each robot processes the messages that have arrived, chooses the cheapest value by them, and
+sends its neighbours the changes. When nothing changes any more, no more messages are sent: that is the end.
 
-- **When to use**: costs, a graph with few cycles, and messages that take unequally long.
-- **Guarantees**: incomplete. It ends, as a robot tells each neighbour at most `limit` messages. On a graph without
+- **When to use**: costs, a graph with few cycles, and messages with unequal delays.
+- **Guarantees**: incomplete. It ends, as a robot sends each neighbour at most `limit` messages. On a graph without
   cycles the result is optimal, if `limit` and `tolerance` do not cut it short; elsewhere it is an estimate. The result
-  are the values at the end, or at a limit of the run. A robot all of whose values cost `inf` proves that there is no
+  are the values at the end, or at a limit of the run. A robot whose values all cost `inf` proves that there is no
   solution.
 - **Parameters (`--set`)**: `damping` (the weight of the last message in a new one; default 0.5), `preference` (the
-  maximum random charge of a value; default 0.01), `tolerance` (smaller changes are not told; default 0.0001), `limit`
+  maximum random charge of a value; default 0.01), `tolerance` (smaller changes are not sent; default 0.0001), `limit`
   (the number of messages to each neighbour; default 200).
 - **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
   the max-sum algorithm", AAMAS 2008, Section 4, which says that nodes may send at any time; for damping: Cohen, Galiki,
@@ -19,12 +19,12 @@ Functions, R, Q, Z and preferences are those of Max-Sum (`maxsum`).
 
 Choices that the papers leave open, and differences:
 
-- What one robot tells another is damped, R and Q, but not what its own nodes tell each other.
-- A damped message is not what the robot knows. So it says that it is not `settled`, and its receiver answers in any
-  case; then the robot tells what is nearer, until the rest is at most `tolerance`. So damping does not change where a
-  graph without cycles ends.
-- All robots begin at once, with what they pay alone.
-- Where messages are lost and nothing comes any more, all robots tell their last messages again, up to ten times.
+- Messages between robots, R and Q, are damped; messages between nodes of the same robot are not.
+- A damped message is not the robot's actual result. So it is marked as not `settled`, and its receiver answers in any
+  case; then the robot sends nearer results, until the rest is at most `tolerance`. So damping does not change the
+  result on a graph without cycles.
+- All robots start at once, with their private costs.
+- If messages are lost and no more arrive, all robots send their last messages again, up to ten times.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -54,9 +54,9 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class AsyncMaxSumSettings(Settings, frozen=True):
-    """`damping`: the weight of the last message. `preference`: the maximum for a value.
+    """`damping`: the weight of the last message. `preference`: its maximum for a value.
 
-    `tolerance`: smaller changes are not told. `limit`: the number of messages to each neighbour.
+    `tolerance`: smaller changes are not sent. `limit`: the number of messages to each neighbour.
     """
 
     damping: float = 0.5
@@ -101,15 +101,15 @@ MORE = " for the moment"
 
 
 REPEATS = 10
-"""The number of times that a robot tells everything again where messages are lost."""
+"""The number of times that a robot sends all its last messages again after a loss."""
 
 
 class AsyncMaxSum(Protocol):
     """One agent of asynchronous Max-Sum.
 
-    `functions` are the own ones, with the last Q from above; None before all robots above have told their domains.
-    `from_below` holds the last R from each robot below, `told` the last rows told to each neighbour, `sent` how many
-    messages that were. `owed` are those who wait for an answer.
+    `functions` are this robot's, with the last Q from above; None until all domains from above have arrived.
+    `from_below` contains the last R from each robot below, `sent_rows` the last rows sent to each neighbour, and
+    `sent_messages` the number of these messages. `owed` are the neighbours that wait for an answer.
     """
 
     messages = Domain | R | Q
@@ -133,19 +133,19 @@ class AsyncMaxSum(Protocol):
         self.functions: Functions | None = None
         self.preferred: Row = []
         self.from_below: dict[str, list[Row]] = {}
-        self.told: dict[str, list[Row]] = {}
-        self.sent: dict[str, int] = {}
+        self.sent_rows: dict[str, list[Row]] = {}
+        self.sent_messages: dict[str, int] = {}
         self.owed: set[str] = set()
         self._domains: dict[str, Sequence[Value]] = {}
         self._repeated = 0
 
     def start(self) -> None:
-        """Take the cheapest value, and tell the domain to the holders of the own functions."""
+        """Choose the cheapest value, and send the domain to the holders of this robot's functions."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
-            burdens = self.problem.lexicographic_costs({})
-            self.value = burdens.index(min(burdens))
+            costs = self.problem.lexicographic_costs({})
+            self.value = costs.index(min(costs))
         else:
             preference = self.settings.preference
             self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
@@ -155,7 +155,7 @@ class AsyncMaxSum(Protocol):
             self.settle()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Keep what is told."""
+        """Store the content of the message."""
         if self.verdict is not None:
             return
         match cast("Domain | R | Q", message):
@@ -166,24 +166,24 @@ class AsyncMaxSum(Protocol):
             case R(rows, settled):
                 many = len(self.from_below.get(sender, rows))
                 self.from_below[sender] = checked(rows, many, len(self.preferred))
-                self._owe(sender, settled=settled)
+                self._record_request(sender, settled=settled)
             case Q(rows, settled):
                 if self.functions is None:
-                    raise ValueError("Q has come before R")
-                self.functions.hear(sender, rows)
-                self._owe(sender, settled=settled)
+                    raise ValueError(f"{sender} sent Q before it received R from {self.problem.agent}")
+                self.functions.receive_q(sender, rows)
+                self._record_request(sender, settled=settled)
             case never:
                 assert_never(never)
 
     def settle(self) -> None:
-        """Take a value by all that has been told, and tell what has changed."""
+        """Choose a value by all received messages, and send the changes."""
         if self.verdict is not None or not self.preferred or len(self._domains) < len(self.above):
             return
         if self.functions is None:
             self.functions = Functions(self.problem.tables(self._domains), self._domains)
         functions = self.functions
         own, _ = functions.answers([[0.0] * len(self.preferred)] * len(functions.factors))
-        rows = [*own, *(row for told in self.from_below.values() for row in told)]
+        rows = [*own, *(row for r in self.from_below.values() for row in r)]
         z = total(self.preferred, rows)
         if min(z) == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
@@ -191,46 +191,46 @@ class AsyncMaxSum(Protocol):
         self.value = cheapest(z)
         q = [from_zero(row) for row in without_each(self.preferred, rows, z)]
         for name, answers in functions.answers(q[: len(own)])[1].items():
-            self._tell(name, answers, R)
+            self._send_changes(name, answers, R)
         rest = iter(q[len(own) :])
-        for name, heard in self.from_below.items():
-            self._tell(name, [next(rest) for _ in heard], Q)
+        for name, r in self.from_below.items():
+            self._send_changes(name, [next(rest) for _ in r], Q)
 
     def go_on(self) -> bool:
-        """Tell everything again, a number of times: messages were lost, and nothing comes any more."""
+        """Send all last messages again, up to `REPEATS` times, as messages were lost and no more will arrive."""
         if self._repeated >= REPEATS or self.verdict is not None or not self.preferred:
             return False
         self._repeated += 1
         for name in self.below:
             if name not in self.from_below:
                 self.send(name, Domain(list(self.problem.values)))
-        for name, rows in self.told.items():
+        for name, rows in self.sent_rows.items():
             self.send(name, (Q if name in self.below else R)(rows, settled=True))
         return True
 
-    def _owe(self, sender: str, *, settled: bool) -> None:
-        """Note whether `sender` waits for an answer."""
+    def _record_request(self, sender: str, *, settled: bool) -> None:
+        """Record whether `sender` waits for an answer."""
         if settled:
             self.owed.discard(sender)
         else:
             self.owed.add(sender)
 
-    def _tell(self, name: str, fresh: list[Row], kind: type[R | Q]) -> None:
-        """Tell `fresh`, damped, if it has changed, or an answer is owed. There may be no rows, or too many messages."""
+    def _send_changes(self, name: str, fresh: list[Row], kind: type[R | Q]) -> None:
+        """Send `fresh`, damped, if it has changed, or an answer is owed; but no empty rows, nor above the limit."""
         tolerance = self.settings.tolerance
-        before = self.told.get(name)
+        before = self.sent_rows.get(name)
         owed = name in self.owed
         self.owed.discard(name)
-        sent = self.sent.get(name, 0)
+        sent = self.sent_messages.get(name, 0)
         if not fresh or sent >= self.settings.limit:
             return
         if before is not None and not owed and _near(before, fresh, tolerance):
             return
         rows = fresh if before is None else self._damped(before, fresh)
         settled = _near(rows, fresh, tolerance)
-        self.told[name] = fresh if settled else rows
-        self.sent[name] = sent + 1
-        self.send(name, kind(self.told[name], settled))
+        self.sent_rows[name] = fresh if settled else rows
+        self.sent_messages[name] = sent + 1
+        self.send(name, kind(self.sent_rows[name], settled))
 
     def _damped(self, before: list[Row], fresh: list[Row]) -> list[Row]:
         damping = self.settings.damping

@@ -1,32 +1,32 @@
 """Bounded Max-Sum.
 
-Max-Sum on a tree is exact. So the robots cut functions until a tree is left, those on which the least depends, and
-solve that. What was cut says how far off the result can be.
+Max-Sum on a tree is exact. So the robots cut the functions with the weakest dependencies until a tree is left, and
+solve that. The weights of the cuts bound the error of the result.
 
 - **When to use**: costs, a large team, and a guarantee without a search.
-- **Guarantees**: incomplete; linear in messages but for the tree. It tells a lower bound of the optimum: the optimum
-  of the tree. The result costs at most the bound plus the weight of all that was cut. Where the graph is a forest,
-  nothing is cut, and the result is optimal. A run says `optimal` wherever the result costs no more than the bound. The
-  bound holds with hard constraints, too. If one of them is cut, the result may break it, and the weight is infinite:
-  then nothing is promised but the bound. A root whose tree costs `inf` proves that there is no solution.
+- **Guarantees**: incomplete; linear in messages except for building the tree. It reports a lower bound of the optimum:
+  the optimum of the tree. The result costs at most the bound plus the weight of all cuts. If the graph is a forest,
+  nothing is cut, and the result is optimal. A run reports `optimal` if the result costs no more than the bound. The
+  bound is valid with hard constraints, too. If one of them is cut, the result may break it, and the weight is infinite:
+  then only the bound is guaranteed. A root whose tree costs `inf` proves that there is no solution.
 - **Parameters**: none.
 - **References**: Rogers, Farinelli, Stranders, Jennings: "Bounded approximate decentralised coordination via the
   max-sum algorithm", Artificial Intelligence 175(2), 2011; for the bound: Rollon, Larrosa: "Improved bounded max-sum
   for distributed constraint optimization", CP 2012.
 
 A function is the sum of all constraints between two robots; the lower of them holds it. The weight of its dependency
-on one of them is the largest difference that this robot's value makes. To cut it is to take the least of it over this
-robot's values, and leave the rest with the other robot. Of the two dependencies of a function only the lighter one is
-ever cut, so the tree is a maximum spanning tree of the robots by these weights. They build it (`spanning`).
+on one of them is the largest difference that this robot's value makes. A cut replaces the function by its minimum over
+this robot's values, and leaves the rest with the other robot. Of the two dependencies of a function only the lighter
+one is ever cut, so the tree is a maximum spanning tree of the robots by these weights. They build it (`spanning`).
 
-Then costs go up the tree, and values down. That is Max-Sum on a tree: R or Q, by who holds the function.
+Then costs go up the tree, and values down. That is Max-Sum on a tree: R or Q, depending on the holder of the function.
 
 Choices that the paper leaves open, and differences:
 
-- Here costs are minimised. The paper maximises, and replaces a cut function by its worst case; then the assignment's
-  own worth is what is told. Here it is the best case, as that alone is a bound of the optimum (Rollon and Larrosa).
-- Values go down the tree, each chosen for that above; so ties need no preferences.
-- Only between two robots: the paper's functions may have more.
+- Here costs are minimised. The paper maximises, and replaces a cut function by its worst case; then the reported value
+  is that of the assignment. Here it is the best case, as only that is a bound of the optimum (Rollon and Larrosa).
+- Values go down the tree, each chosen for the value above; so ties need no preferences.
+- Only functions of two robots; the paper's may have more.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -62,15 +62,15 @@ if TYPE_CHECKING:
 
 
 class Dependency(Message, frozen=True):
-    """The sender's function of both robots: its `weight`, and what stays for the receiver if it is cut.
+    """The sender's function of both robots: its `weight`, and its rest for the receiver if it is cut.
 
-    `weight` is None where there is no function. `rest` is empty where the sender keeps the rest.
+    `weight` is None if there is no function. `rest` is empty if the sender keeps the rest.
     """
 
     weight: float | None
     rest: list[float]
 
-    act = Act(Performative.INFORM, "the receiver learns how much the function binds both")
+    act = Act(Performative.INFORM, "the receiver learns how much the function binds both robots")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
@@ -82,8 +82,8 @@ class Dependency(Message, frozen=True):
 class Branch(Message, frozen=True):
     """A lower bound on the cost of the sender's branch.
 
-    `costs` are of the receiver's values, if the sender holds their function (R), and of its own otherwise (Q). `cut`
-    is the weight of all that was cut there, `most` what all could add up to.
+    `costs` are of the receiver's values, if the sender holds their function (R), and of the sender's otherwise (Q).
+    `cut` is the weight of all cuts there, `most` the highest possible cost of all functions.
     """
 
     costs: list[float]
@@ -98,11 +98,11 @@ class Branch(Message, frozen=True):
 
 
 class Assign(Message, frozen=True):
-    """The receiver's value: the best for the value of the sender, who holds their function."""
+    """The receiver's value: the best for the value of the sender, which holds their function."""
 
     value: Value
 
-    act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
+    act = Act(Performative.REQUEST, "the receiver chooses the value in the message")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
@@ -112,8 +112,8 @@ class Assign(Message, frozen=True):
 class BoundedMaxSum(SpanningProtocol):
     """One agent of bounded Max-Sum.
 
-    `functions` are the own ones, by the robot above that each is shared with. `costs` are those of the own values in
-    the own branch of the tree. A root knows `optimum`, the cost of its tree, and `cut`, the weight of all that was cut.
+    `functions` are this robot's, by the robot above that shares them. `costs` are those of its values in its branch of
+    the tree. A root knows `optimum`, the cost of its tree, and `cut`, the weight of all cuts.
     """
 
     messages = Domain | Dependency | Fragment | Heaviest | Choice | Merged | NewRoot | Branch | ValueMessage | Assign
@@ -145,11 +145,11 @@ class BoundedMaxSum(SpanningProtocol):
 
     @property
     def findings(self) -> Findings:
-        """At a root, a lower bound on the cost of the robots of its tree."""
+        """At a root, a lower bound on the cost of its tree's robots."""
         return Findings(bound=self.optimum)
 
     def start(self) -> None:
-        """Tell the domain to the holders of the own functions."""
+        """Send the domain to the holders of this robot's functions."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -157,17 +157,17 @@ class BoundedMaxSum(SpanningProtocol):
         self._most = _dearest(self.costs)
         for name in self.below:
             self.send(name, Domain(list(self.problem.values)))
-        self.stage = self._weigh
+        self.stage = self._send_dependencies
         self.settle()
 
-    # What binds two robots, and how much
+    # Dependencies and their weights
 
-    def _weigh(self) -> bool:
-        """Make the own functions, once the domains above are known, and tell their weights."""
-        told = self.heard(self.above)
-        if told is None:
+    def _send_dependencies(self) -> bool:
+        """Make this robot's functions, once the domains above are known, and send their weights."""
+        messages = self.next_messages(self.above)
+        if messages is None:
             return False
-        self._domains = {name: list(one.values) for name, one in told.items() if isinstance(one, Domain)}
+        self._domains = {name: list(one.values) for name, one in messages.items() if isinstance(one, Domain)}
         for name, values in self._domains.items():
             for value in values:
                 self.problem.refuse_value(name, value)
@@ -185,39 +185,39 @@ class BoundedMaxSum(SpanningProtocol):
             self.send(name, Dependency(min(theirs, mine), [] if theirs <= mine else self._rests[name]))
             if theirs > mine:
                 self._rests[name] = []
-        self.stage = self._hear_weights
+        self.stage = self._receive_dependencies
         return True
 
-    def _hear_weights(self) -> bool:
-        told = self.heard(self.below)
-        if told is None:
+    def _receive_dependencies(self) -> bool:
+        messages = self.next_messages(self.below)
+        if messages is None:
             return False
-        for name, message in told.items():
+        for name, message in messages.items():
             if isinstance(message, Dependency) and message.weight is not None:
                 if not message.weight >= 0:
-                    raise ValueError(f"a function weighs {message.weight}")
+                    raise ValueError(f"{name} sent a function of weight {message.weight}; it must be 0 or more")
                 self.weights[name] = message.weight
                 self._rests[name] = checked([message.rest], 1, len(self.costs))[0] if message.rest else []
-        self.grow()
+        self.start_spanning()
         return True
 
     # Costs go up the tree
 
     def start_in_tree(self) -> None:
-        """Count what was cut: its weight where it is held, its rest where that stays."""
+        """Add up the cuts: the weight at the holder of a function, the rest at the robot that keeps it."""
         for name, weight in self.weights.items():
             if name not in self.joined:
                 self.cut += weight if name in self.functions else 0
                 if self._rests[name]:
                     self.costs = total(self.costs, [self._rests[name]])
-        self.stage = self._gather
+        self.stage = self._receive_branches
 
-    def _gather(self) -> bool:
-        """Take in the branches of the children; tell the own one to the parent, or choose at the root."""
-        told = self.heard(self.children)
-        if told is None:
+    def _receive_branches(self) -> bool:
+        """Add the children's branches; send this robot's branch to the parent, or choose at the root."""
+        messages = self.next_messages(self.children)
+        if messages is None:
             return False
-        for name, message in told.items():
+        for name, message in messages.items():
             if isinstance(message, Branch):
                 self.costs = total(self.costs, [self._least(name, message.costs)])
                 self.cut += message.cut
@@ -225,12 +225,12 @@ class BoundedMaxSum(SpanningProtocol):
         if self.parent is None:
             self._choose_at_root()
         else:
-            self.send(self.parent, Branch(self._for_parent(), self.cut, self._most))
-            self.stage = self._hear_value
+            self.send(self.parent, Branch(self._costs_for_parent(), self.cut, self._most))
+            self.stage = self._receive_value
         return True
 
     def _least(self, child: str, costs: Row) -> Row:
-        """Return what the branch of `child` costs at least, for each own value."""
+        """Return the least cost of the branch of `child`, for each of this robot's values."""
         table = self.functions.get(child)
         if table is None:
             return checked([costs], 1, len(self.costs))[0]
@@ -238,7 +238,7 @@ class BoundedMaxSum(SpanningProtocol):
         least: Row = (table.T + self._branches[child]).min(axis=1).tolist()
         return least
 
-    def _for_parent(self) -> Row:
+    def _costs_for_parent(self) -> Row:
         table = self.functions.get(self.parent or "")
         if table is None:
             return self.costs
@@ -254,22 +254,22 @@ class BoundedMaxSum(SpanningProtocol):
             self.conclude(Verdict.NO_SOLUTION)
             return
         self.optimum = int(least)
-        self._take(cheapest(self.costs))
+        self._choose_value(cheapest(self.costs))
 
-    def _hear_value(self) -> bool:
-        told = self.heard([] if self.parent is None else [self.parent])
-        if told is None:
+    def _receive_value(self) -> bool:
+        messages = self.next_messages([] if self.parent is None else [self.parent])
+        if messages is None:
             return False
-        for name, message in told.items():
+        for name, message in messages.items():
             if isinstance(message, Assign):
-                self._take(self.problem.values.index(message.value))
+                self._choose_value(self.problem.values.index(message.value))
             elif isinstance(message, ValueMessage):
                 row = self.functions[name][self._domains[name].index(message.value)].tolist()
-                self._take(cheapest(total(self.costs, [row])))
+                self._choose_value(cheapest(total(self.costs, [row])))
         return True
 
-    def _take(self, place: int) -> None:
-        """Take a value; tell it to the children, or what they are to take."""
+    def _choose_value(self, place: int) -> None:
+        """Choose a value; send it to the children, or the values that they have to choose."""
         self.value = place
         for child in self.children:
             table = self.functions.get(child)
@@ -282,7 +282,7 @@ class BoundedMaxSum(SpanningProtocol):
 
 
 def _weight(table: Array) -> float:
-    """Return the largest difference that a place on the first axis makes; what is always forbidden makes none."""
+    """Return the largest difference that a place on the first axis makes; forbidden combinations make none."""
     return max(
         (high - low if low < INFINITE else 0)
         for low, high in zip(table.min(axis=0).tolist(), table.max(axis=0).tolist(), strict=True)

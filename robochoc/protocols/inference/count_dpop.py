@@ -2,32 +2,32 @@
 
 DPOP (see `dpop.py`) whose tables have two entries for each combination of values of the separator: the least cost of
 the subtree, and the number of its assignments that attain it. Tables are joined by adding costs and multiplying
-numbers, and projected by taking the least cost and the sum of the numbers that go with it. So the root knows, besides
-the optimum, how many optima there are. Without costs these are the solutions.
+numbers, and projected by the least cost and the sum of the numbers that belong to it. So the root knows, besides the
+optimum, the number of optima. Without costs these are the solutions.
 
 - **When to use**: to count, without a central solver, on a pseudo-tree with a small induced width. With `--count` the
-  result has the number. As a solver it does no more than `dpop`.
+  result has the number. Otherwise it does no more than `dpop`.
 - **Guarantees**: complete; it terminates with an optimum and the number of optima, or with a proof that there is no
   solution. Numbers are exact, whatever their size.
-- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
-- **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005 (DPOP). That
-  the same elimination counts where sums and products take the place of minima and sums: Dechter, "Bucket elimination:
-  a unifying framework for reasoning", Artificial Intelligence 113, 1999.
+- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
+- **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005 (DPOP). The
+  same elimination counts if sums and products replace minima and sums: Dechter, "Bucket elimination: a unifying
+  framework for reasoning", Artificial Intelligence 113, 1999.
 
 The additions to DPOP are these methods:
 
-    join and project    `_use_joined`                   table to the parent    `_send_table`
-    sizes of numbers    `_plan`, `_kept_bytes`          child's table          `_counts_handler`
+    join and project    `_process_joined`               table to the parent    `_send_table`
+    sizes of numbers    `_plan`, `_additional_bytes`    child's table          `_counts_handler`
 
 Choices:
 
 - Each table of costs (UTIL) is followed by one of numbers (`Counts`), of as many bytes a number as the largest needs.
-- How many bits the numbers can need is sent with the sizes (`CountDimensions`), before any table is made. It is part of
-  the memory need. 2^20 bits or more end the run.
-- A value of a robot with several variables counts as often as local solutions of least cost look like it.
+- The bits of the numbers are sent with the sizes (`CountDimensions`), before any table is made. They are part of the
+  memory need. 2^20 bits or more end the run.
+- A value of a robot with several variables counts once for each of its local solutions of least cost.
 - Unconnected parts have a root each, and each root knows the number of its tree. The run multiplies them.
-- Where robots may withdraw, to have withdrawn is one assignment of a robot.
-- The number itself is not checked, as no check of constraints can tell it.
+- If robots may withdraw, a withdrawn robot has exactly one assignment.
+- The number itself is not checked, as a check of constraints cannot compute it.
 
 >>> from robochoc.generators.random_csp import random_csp
 >>> from robochoc.run import Options, Runtime, solve
@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, keep_once
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, store_once
 from robochoc.protocols.inference.dpop_tables import PIECE, Codes, Extent, Table, costs_for
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -59,14 +59,14 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_BITS = 1 << 20
-"""Stands for all that is longer, too: it ends the run."""
+"""Also represents all larger numbers of bits: it ends the run."""
 
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=MOST_BITS)]
 
 
 class CountDimensions(Dimensions, frozen=True):
-    """DPOP's `Dimensions`; `bits` are enough for the number of all assignments of the sender's subtree."""
+    """DPOP's `Dimensions`; `bits` suffice for the number of all assignments of the sender's subtree."""
 
     bits: Bits
 
@@ -75,7 +75,7 @@ class CountDimensions(Dimensions, frozen=True):
 
 
 class Counts(Message, frozen=True):
-    """A piece of the sender's table of numbers, in the order of UTIL's cells: how many assignments attain each cost.
+    """A piece of the sender's table of numbers, in the order of UTIL's cells: the assignments that attain each cost.
 
     `numbers` are unsigned integers of `width` bytes, little-endian, of any size.
     """
@@ -83,7 +83,7 @@ class Counts(Message, frozen=True):
     width: Annotated[int, msgspec.Meta(ge=1, le=MOST_BITS // 8)]
     numbers: bytes
 
-    act = Act(Performative.INFORM, "the receiver learns in how many ways the sender's subtree attains its costs")
+    act = Act(Performative.INFORM, "the receiver learns the number of ways to attain the costs of the sender's subtree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -98,11 +98,11 @@ WORD = 64
 
 
 _OBJECT = 40
-"""Bytes of Python's for an integer, besides its digits: its header, and the table's pointer to it."""
+"""The bytes of a Python integer besides its digits: its header, and the table's pointer to it."""
 
 
 _SCRATCH = 24
-"""Bytes for each cell while costs are compared: two sums, and what they have in common."""
+"""The bytes for each cell while costs are compared: two sums, and the mask of equal ones."""
 
 
 def bytes_of_numbers(cells: int, bits: int) -> int:
@@ -111,9 +111,9 @@ def bytes_of_numbers(cells: int, bits: int) -> int:
 
 
 def bytes_to_count(cells: int, bits: int, below: int) -> int:
-    """Return the peak size of all that counting needs: the children's tables, `below` bytes, and the own ones.
+    """Return the peak size for counting: the children's tables, `below` bytes, and this robot's.
 
-    The own table is there four times: a product, the sum, what is between, and the piece that is sent.
+    This robot's table exists four times: a product, the sum, an intermediate result, and the piece that is sent.
     """
     return 4 * bytes_of_numbers(cells, bits) + cells * _SCRATCH + 2 * below
 
@@ -121,13 +121,13 @@ def bytes_to_count(cells: int, bits: int, below: int) -> int:
 def count_attaining(
     least: Codes, charges: Sequence[float], tables: Sequence[Table], own: Numbers, below: Sequence[Numbers]
 ) -> Numbers:
-    """Return how many assignments attain each cost of `least`: none where it is infinite.
+    """Return the number of assignments that attain each cost of `least`: 0 if it is infinite.
 
     Args:
         least: The least costs, of `tables` joined.
-        charges: What the own values cost.
-        tables: Tables of costs: the own axis first, then the axes of `least` (see `aligned`).
-        own: How many local solutions stand behind each own value.
+        charges: The costs of this robot's values.
+        tables: Tables of costs: this robot's axis first, then the axes of `least` (see `aligned`).
+        own: The number of local solutions behind each of this robot's values.
         below: The children's tables of numbers, with the same axes.
     """
     wanted = costs_for(least[np.newaxis, ...], 0)
@@ -159,7 +159,7 @@ def packed_numbers(table: Numbers) -> Iterator[tuple[int, bytes]]:
 
 
 class IncomingNumbers:
-    """A table of numbers below 2^`bits` that arrives in pieces, to go with `costs`, which are there already."""
+    """A table of numbers below 2^`bits` that arrives in pieces; its table of `costs` has already arrived."""
 
     def __init__(self, costs: Codes, bits: int, own_bits: int) -> None:
         self._costs = costs
@@ -182,13 +182,15 @@ class IncomingNumbers:
         cells, odd = divmod(len(piece), width)
         start, left = len(self._numbers), self._costs.size - len(self._numbers)
         if odd or not 0 < cells <= left or width > max(1, -(-self._bits // 8)):
-            raise ValueError(f"{len(piece)} bytes, {width} a number, are no piece of a table that lacks {left}")
+            raise ValueError(
+                f"{len(piece):,} bytes with {width} a number do not fit, as the table lacks {left:,} numbers"
+            )
         numbers = [int.from_bytes(piece[at : at + width], "little") for at in range(0, len(piece), width)]
         if max(numbers).bit_length() > self._bits:
             raise ValueError(f"a number is larger than 2^{self._bits}")
         finite = costs_for(self._costs.reshape(1, -1)[:, start : start + cells], 0) < math.inf
         if not np.array_equal(finite, [number > 0 for number in numbers]):
-            raise ValueError("a cost without an assignment, or assignments that cost infinitely much")
+            raise ValueError("a number does not match its cost: it must be 0 exactly if the cost is infinite")
         self._numbers += numbers
 
 
@@ -197,7 +199,7 @@ class CountDPOP(DPOP):
 
     State besides DPOP's:
 
-    - `bits`: enough for the number of assignments of the own subtree; `bits_below`: of the children's;
+    - `bits`: sufficient for the number of assignments of this subtree; `bits_below`: of the children's;
     - `numbers`: the children's tables of numbers;
     - `count`: the number of optima of the whole tree (at its root).
     """
@@ -229,11 +231,11 @@ class CountDPOP(DPOP):
     def handle(self, sender: str, message: Message) -> None:
         match cast("Domain | CountDimensions | Proceed | UTIL | Counts | VALUE", message):
             case Domain(values):
-                keep_once(sender, values, self.domains, self.ancestors)
+                store_once(sender, values, self.domains, self.ancestors)
                 self._measure()
             case CountDimensions() as dimensions:
-                self._check(sender, dimensions)
-                keep_once(sender, dimensions, self.dimensions, self.children)
+                self._check_dimensions(sender, dimensions)
+                store_once(sender, dimensions, self.dimensions, self.children)
                 self.bits_below[sender] = dimensions.bits
                 self._measure()
             case Proceed(separator):
@@ -252,26 +254,26 @@ class CountDPOP(DPOP):
         """Return DPOP's findings; for a root also the number of its tree's optima."""
         return msgspec.structs.replace(super().findings, count=None if self.count is None else f"{self.count:x}")
 
-    # How large tables will be
+    # The sizes of tables
 
     def _plan(self) -> None:
-        """Compute how many bits the own numbers can need."""
+        """Compute the bits of this robot's numbers."""
         own = sum(self.problem.behind).bit_length()
         self.bits = min(own + sum(self.bits_below.values()), MOST_BITS)
 
-    def _tell(self, dimensions: Dimensions) -> None:
-        """Send the parent the dimensions of the own tables."""
+    def _send_dimensions(self, dimensions: Dimensions) -> None:
+        """Send the parent the dimensions of both tables."""
         sizes, dearest, width, most = msgspec.structs.astuple(dimensions)
         self.send(self.parent or "", CountDimensions(sizes, dearest, width, most, self.bits))
 
-    def _refuse(self, most: Need, width: int) -> None:
-        """Raise `TooLargeError` as DPOP does, and for numbers that are too long."""
+    def _check_limits(self, most: Need, width: int) -> None:
+        """Raise `TooLargeError` as DPOP does, and if numbers have too many bits."""
         if self.bits >= MOST_BITS:
-            raise TooLargeError(f"the number of assignments could have {MOST_BITS:,} bits or more")
-        super()._refuse(most, width)
+            raise TooLargeError(f"the number of assignments could have {MOST_BITS:,} bits or more: use dpop")
+        super()._check_limits(most, width)
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """The tables of numbers are there besides those of costs."""
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of the tables of numbers."""
         del inputs
         below = sum(bytes_of_numbers(math.prod(self._child_sizes(child)), self.bits) for child in self.children)
         return bytes_to_count(math.prod(self._own_sizes()), self.bits, below)
@@ -279,9 +281,9 @@ class CountDPOP(DPOP):
     # UTIL, from the leaves up
 
     def _counts_handler(self, child: str, width: int, numbers: bytes) -> None:
-        """Store a piece of the child's table of numbers; compute the own tables when all are complete."""
+        """Store a piece of the child's table of numbers; compute this robot's tables when all are complete."""
         if child not in self.utils or not self.utils[child].complete:
-            raise ValueError(f"{child} sends numbers, and its costs have not come")
+            raise ValueError(f"{child} sent numbers before its costs")
         if child not in self.numbers:
             self.numbers[child] = IncomingNumbers(self.utils[child].costs, self.bits_below[child], self.bits)
         self.numbers[child].add(width, numbers)
@@ -298,10 +300,10 @@ class CountDPOP(DPOP):
         super()._compute_utils_of_all()
 
     def _own_ways(self) -> Numbers:
-        """Return how many local solutions stand behind each own value."""
+        """Return the number of local solutions behind each of this robot's values."""
         return numbers_of(self.problem.behind, self.bits)
 
-    def _use_joined(self, costs: Codes) -> None:
+    def _process_joined(self, costs: Codes) -> None:
         """Count the assignments that attain each of the least `costs`."""
         self._own_numbers = count_attaining(costs, self.problem.charges, self._joined, self._own_ways(), self._below)
         self._below = []

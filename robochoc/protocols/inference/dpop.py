@@ -2,14 +2,14 @@
 
 Dynamic programming on a pseudo-tree, for minimum cost. From the leaves up, each robot sends its parent a table (UTIL):
 the minimum cost of its subtree for every combination of values of its separator, the higher robots that matter to the
-subtree. It adds up its own constraints and its children's tables, and minimises over its own values. From the root
-down, each robot takes the value that was cheapest (VALUE).
+subtree. It adds up its constraints and its children's tables, and minimises over its own values. From the root down,
+each robot chooses the cheapest value (VALUE).
 
 - **When to use**: costs, and a pseudo-tree with a small induced width. The number of messages is linear, but a table
   has as many dimensions as the separator has robots.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. A run that needs
   more memory than allowed ends before any table is made.
-- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005, Algorithm 1.
 
 The methods have the names of its procedures:
@@ -26,17 +26,17 @@ This adds two messages for each robot except the roots, and one for each edge. A
 
 Choices that the paper leaves open, and differences:
 
-- Costs are minimised; `inf` stands for a violated hard constraint. A robot whose whole table is `inf` ends the search.
+- Costs are minimised; `inf` is a violated hard constraint. A robot whose whole table is `inf` ends the search.
 - A separator contains only robots that share a constraint with the subtree.
-- The join is made block by block and is never in memory as a whole. Besides the table, the cheapest own value of each
-  cell is stored (one or two bytes), so the children's tables, larger by an axis, can be freed.
+- The join is made block by block and is never in memory as a whole. Besides the table, this robot's cheapest value for
+  each cell is stored (one or two bytes), so the children's tables, larger by an axis, can be freed.
 - VALUE contains the places of the values in the child's separator, in that order.
 - A table has as few bytes per cost as it needs, and is sent in pieces of up to 16 MiB. Ties go to the first value.
 - A constraint is checked by the lowest robot of its scope, once for each distinguishable combination, when its table
-  is made. Additions and minimisations are no constraint checks.
+  is made. Additions and minimisations do not count as constraint checks.
 - Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
-- The memory limit holds for each robot's arrays. It does not include messages under way in a runtime, nor costs that a
-  local problem caches.
+- The memory limit holds for each robot's arrays. It does not include messages in transit, nor costs that a local
+  problem caches.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -67,9 +67,9 @@ from robochoc.protocols.inference.dpop_tables import (
     Table,
     Width,
     aligned,
+    are_all_infinite,
     bytes_of,
     cells_of,
-    is_hopeless,
     packed_costs,
     piece_in_words,
     project,
@@ -91,25 +91,25 @@ GIB = 1 << 30
 
 
 class DPOPSettings(Settings, frozen=True):
-    """`memory`: the bytes that the tables of a robot may take. A run that needs more ends before it makes a table."""
+    """`memory`: the most bytes of a robot's tables. A run that needs more ends before it makes a table."""
 
     memory: int = GIB
 
     def __post_init__(self) -> None:
         """Raise `ValueError` unless `memory` is positive."""
         if self.memory < 1:
-            raise ValueError(f"memory is a number of bytes, not {self.memory}")
+            raise ValueError(f"memory is {self.memory}; it must be a number of bytes, 1 or more")
 
 
 Size = Annotated[int, msgspec.Meta(ge=2)]
 
 
 Cost = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
-"""2^53 stands for all that is larger, too: it ends the run."""
+"""2^53 also represents all larger costs: it ends the run."""
 
 
 MOST_CELLS = 4096
-"""For larger tables no rule says what they prove: it would take too long."""
+"""Larger tables have no rule about their proofs: it would take too long."""
 
 
 class Need(msgspec.Struct, frozen=True, array_like=True, order=True):
@@ -165,7 +165,7 @@ class Proceed(Message, frozen=True):
 
     separator: list[str]
 
-    act = Act(Performative.REQUEST, "the receiver is to make its table")
+    act = Act(Performative.REQUEST, "the receiver makes its table")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -176,27 +176,27 @@ class Proceed(Message, frozen=True):
 class UTIL(Message, frozen=True):
     """A piece of the sender's table, in the order of its cells; its first axis is the nearest robot's.
 
-    `costs` are unsigned integers of `width` bytes, little-endian; the largest number stands for `inf`.
+    `costs` are unsigned integers of `width` bytes, little-endian; the largest number represents `inf`.
     """
 
     width: Width
     costs: bytes
 
-    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs")
+    act = Act(Performative.INFORM, "the receiver learns the costs of the sender's subtree")
 
     def in_words(self, _: Wording) -> str:
         return piece_in_words(self.costs, self.width)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
-        """Return what the message proves to its receiver. There is no rule for large tables.
+        """Return the bounds on the sender's costs. There is no rule for large tables.
 
-        For each combination of values, some value of the sender costs no more than its cell says: all that is below
-        costs 0 at least. A sender whose neighbours are all above it has nobody below; then no value costs less.
+        For each combination of values, some value of the sender costs no more than its cell, as all robots below cost
+        at least 0. If all neighbours of the sender are above it, no robot is below; then no value costs less.
         """
         axes = axes_of(hearing, hearing.receiver, hearing.sender)
         dimensions = hearing.last(Dimensions, hearing.sender, hearing.receiver)
         if axes is None or dimensions is None:
-            return NOTHING  # told in another epoch, or as labels (MB-DPOP)
+            return NOTHING  # received in another epoch, or as labels (MB-DPOP)
         shape = [dimensions.separator[robot] for robot in axes]
         cells = cells_of(self.costs, self.width)
         if len(cells) != math.prod(shape) or len(cells) > MOST_CELLS:
@@ -220,19 +220,19 @@ class VALUE(Message, frozen=True):
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         axes = axes_of(hearing, hearing.sender, hearing.receiver)
         if axes is None:
-            return NOTHING  # told in another epoch
+            return NOTHING  # received in another epoch
         known = [(robot, hearing.values(robot), place) for robot, place in zip(axes, self.assignment, strict=True)]
         return [StandsAt(robot, values[place]) for robot, values, place in known if values is not None]
 
 
 def axes_of(hearing: Hearing, parent: str, child: str) -> Sequence[str] | None:
-    """Return the axes of a child's table. None: they were not told in this run."""
-    told = hearing.last(Proceed, parent, child)
-    return None if told is None else told.separator
+    """Return the axes of a child's table; None if they were not sent in this run."""
+    proceed = hearing.last(Proceed, parent, child)
+    return None if proceed is None else proceed.separator
 
 
 MOST_AXES = 1_000
-"""Long before that no table fits anywhere."""
+"""No table with this many axes fits into memory."""
 Scope = tuple[str, ...]
 T = TypeVar("T")
 
@@ -244,7 +244,7 @@ class DPOP(TreeProtocol):
 
     - `domains` of the neighbours above, and `dimensions` of the children;
     - `separator`, and `utils`, the children's tables;
-    - `choices`: for each combination of values in the separator the cheapest own value;
+    - `choices`: for each combination of values in the separator this robot's cheapest value;
     - `optimum`: the cost of the whole tree (at its root).
     """
 
@@ -277,7 +277,7 @@ class DPOP(TreeProtocol):
         self._joined: list[Table] = []
 
     def start_in_tree(self) -> None:
-        """Send the own domain to the neighbours below."""
+        """Send the domain to the neighbours below."""
         for name in self.descendants:
             self.send(name, Domain(list(self.problem.values)))
         self._measure()
@@ -285,11 +285,11 @@ class DPOP(TreeProtocol):
     def handle(self, sender: str, message: Message) -> None:
         match cast("Domain | Dimensions | Proceed | UTIL | VALUE", message):
             case Domain(values):
-                keep_once(sender, values, self.domains, self.ancestors)
+                store_once(sender, values, self.domains, self.ancestors)
                 self._measure()
             case Dimensions() as dimensions:
-                self._check(sender, dimensions)
-                keep_once(sender, dimensions, self.dimensions, self.children)
+                self._check_dimensions(sender, dimensions)
+                store_once(sender, dimensions, self.dimensions, self.children)
                 self._measure()
             case Proceed(separator):
                 self._proceed(separator)
@@ -302,57 +302,61 @@ class DPOP(TreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for a root also its tree's optimum, once it has all tables."""
+        """The place in the tree; for a root also the optimum of its tree, once it has all tables."""
         return msgspec.structs.replace(super().findings, bound=self.optimum)
 
-    # How large tables will be
+    # The sizes of tables
 
     def _measure(self) -> None:
-        """Send the dimensions to the parent, or decide as the root, once all domains and dimensions arrived."""
+        """Send the dimensions to the parent, or decide as the root, once all domains and dimensions have arrived."""
         if len(self.domains) < len(self.ancestors) or len(self.dimensions) < len(self.children):
             return
-        self._report()
+        self._compute_dimensions()
 
-    def _report(self) -> None:
-        """Compute the dimensions of the own table, and announce them."""
+    def _compute_dimensions(self) -> None:
+        """Compute the dimensions of this robot's table, and announce them."""
         checked = self.problem.scopes(self.ancestors)
         self._sizes = self._separator_sizes([scope for scope, _ in checked])
         self._dearest = self._upper_bound([charge for _, charge in checked])
         self._plan()
-        self._announce()
+        self._announce_dimensions()
 
-    def _announce(self) -> None:
-        """Send the dimensions of the own table to the parent; a root decides whether all proceed."""
-        width, most = self._extremes()
+    def _announce_dimensions(self) -> None:
+        """Send the parent the dimensions of this robot's table; a root decides whether all proceed."""
+        width, most = self._width_and_need()
         if self.parent is None:
-            self._refuse(most, width)
+            self._check_limits(most, width)
             self._proceed([])
         else:
-            self._tell(Dimensions(self._sizes, self._dearest, width, most))
+            self._send_dimensions(Dimensions(self._sizes, self._dearest, width, most))
 
-    def _extremes(self) -> tuple[int, Need]:
-        """Compute the own memory need; return the induced width and the largest memory need from this robot down."""
-        self._need = self._needed([scope for scope, _ in self.problem.scopes(self.ancestors)])
+    def _width_and_need(self) -> tuple[int, Need]:
+        """Return the induced width and the largest memory need from this robot down."""
+        self._need = self._memory_need([scope for scope, _ in self.problem.scopes(self.ancestors)])
         below = [self.dimensions[child] for child in self.children]
         width = max([len(self._sizes), *(one.induced_width for one in below)])
         return width, max([self._need, *(one.most for one in below)])
 
     def _plan(self) -> None:
-        """Decide what is to be decided before memory needs are known; here nothing."""
+        """Prepare the memory needs, after the sizes of the separator are known; here nothing is needed."""
 
-    def _tell(self, dimensions: Dimensions) -> None:
-        """Send the parent the dimensions of the own table."""
+    def _send_dimensions(self, dimensions: Dimensions) -> None:
+        """Send the parent the dimensions of this robot's table."""
         self.send(self.parent or "", dimensions)
 
-    def _check(self, child: str, dimensions: Dimensions) -> None:
+    def _check_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Raise `ValueError` unless `dimensions` are possible."""
         if not (
             len(dimensions.separator) <= MOST_AXES and dimensions.induced_width >= 0 and dimensions.most.bytes >= 0
         ):
-            raise ValueError(f"{child} tells dimensions that cannot be")
+            axes, width = len(dimensions.separator), dimensions.induced_width
+            raise ValueError(
+                f"{child} sent invalid dimensions: {axes:,} axes (at most {MOST_AXES:,}), induced width {width:,}, and"
+                f" {dimensions.most.bytes:,} bytes"
+            )
 
-    def _refuse(self, most: Need, width: int) -> None:
-        """Raise `TooLargeError` with the largest memory need of the whole tree."""
+    def _check_limits(self, most: Need, width: int) -> None:
+        """Raise `TooLargeError` if the largest memory need of the whole tree is above the limit."""
         check_exact(self._dearest)
         if most.bytes > self.settings.memory:
             raise TooLargeError(
@@ -363,14 +367,14 @@ class DPOP(TreeProtocol):
     def _separator_sizes(self, checked: Sequence[Scope]) -> dict[str, int]:
         """Return the separator, with each robot's domain size.
 
-        It holds the ancestors that share a constraint with this robot or one below it.
+        The separator contains the ancestors that share a constraint with this robot or one below it.
         """
         sizes = {name: len(self.domains[name]) for scope in checked for name in scope}
         own = len(self.problem.values)
         for child in self.children:
             for name, size in self.dimensions[child].separator.items():
                 if size != (own if name == self.problem.agent else sizes.setdefault(name, size)):
-                    raise ValueError(f"{child} says that {name} has {size} values, and it has not")
+                    raise ValueError(f"{child} sent a wrong domain size: {size:,} values of {name}")
         return {name: size for name, size in sizes.items() if size > 1}
 
     def _upper_bound(self, checked: Sequence[float]) -> int:
@@ -379,45 +383,46 @@ class DPOP(TreeProtocol):
         below = sum(self.dimensions[child].dearest for child in self.children)
         return min(int(own + sum(checked) + below), EXACT)
 
-    def _needed(self, checked: Sequence[Scope]) -> Need:
-        """Return the memory that the own tables need; an integer while it is small enough to be sent as one."""
+    def _memory_need(self, checked: Sequence[Scope]) -> Need:
+        """Return the memory that this robot's tables need: an integer, if it is small enough for a message."""
         own = len(self.problem.values)
         inputs = [Extent(own * math.prod(len(self.domains[name]) for name in scope), 8) for scope in checked]
         inputs += [
             Extent(math.prod(self._child_sizes(child)), width_of(self.dimensions[child].dearest))
             for child in self.children
         ]
-        need = bytes_of(self._own_sizes(), own, width_of(self._dearest), inputs) + self._kept_bytes(inputs)
+        need = bytes_of(self._own_sizes(), own, width_of(self._dearest), inputs) + self._additional_bytes(inputs)
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
 
     def _own_sizes(self) -> list[int]:
-        """Return the shape of the own table, its axes in any order."""
+        """Return the shape of this robot's table, its axes in any order."""
         return list(self._sizes.values())
 
     def _child_sizes(self, child: str) -> list[int]:
         """Return the shape of a child's table, its axes in any order."""
         return list(self.dimensions[child].separator.values())
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Return the bytes of what is kept longer than a join of `inputs` takes; here nothing is."""
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of arrays that are stored longer than a join of `inputs`; here there are none."""
         del inputs
         return 0
 
     def _proceed(self, separator: Sequence[str]) -> None:
-        """Make the tables of the own constraints, after the children were allowed to do the same."""
+        """Make the tables of this robot's constraints, after the children were allowed to make theirs."""
         if sorted(separator) != sorted(self._sizes) or self.separator is not None:
-            raise ValueError(f"{self.problem.agent}'s separator is {', '.join(self._sizes)}; {separator} is none")
+            own = ", ".join(self._sizes)
+            raise ValueError(f"{self.problem.agent} received axes {list(separator)}, but its separator is {own}")
         if self._need.bytes > self.settings.memory:
-            raise ValueError(f"{self.problem.agent} has no room for its tables, and was told to proceed")
+            raise ValueError(f"{self.problem.agent} must proceed, but has no room for its tables")
         self.separator = tuple(separator)
         for child in self.children:
-            wanted = self.dimensions[child].separator
-            self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in wanted)
+            needed = self.dimensions[child].separator
+            self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in needed)
             self.send(child, Proceed(list(self._axes[child])))
         self._start_utils()
 
     def _start_utils(self) -> None:
-        """Make the tables of the own constraints; a leaf computes its table at once."""
+        """Make the tables of this robot's constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
         self._joined = [self._aligned(table.charges, (*table.agents, self.problem.agent)) for table in tables]
         del tables
@@ -427,7 +432,7 @@ class DPOP(TreeProtocol):
     # UTIL, from the leaves up
 
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
-        """Store a piece of the child's table; compute the own one when all tables are complete."""
+        """Store a piece of the child's table; compute this robot's table when all children's are complete."""
         if child not in self._axes:
             raise ValueError(f"{child} was not asked for a table")
         if child not in self.utils:
@@ -449,29 +454,29 @@ class DPOP(TreeProtocol):
         return self._axes[child]
 
     def _compute_utils_of_all(self) -> None:
-        """Join the children's tables, all of which have arrived; they are not needed any more."""
+        """Join the children's tables, all of which have arrived, and free them."""
         self._joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
         self.utils.clear()
         self._compute_utils()
 
     def _aligned(self, table: Table, axes: Sequence[str]) -> Table:
-        """Return `table` with the own axis first and the other axes in the own order."""
+        """Return `table` with this robot's axis first and the other axes in the order of its separator."""
         return aligned(table, axes, (self.problem.agent, *(self.separator or ())))
 
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree for each combination of values in the separator."""
         shape = [self._sizes[name] for name in self.separator or ()]
         costs, self.choices = project(shape, self.problem.charges, self._joined, width_of(self._dearest))
-        self._use_joined(costs)
+        self._process_joined(costs)
         self._joined.clear()
-        self._pass_on(costs)
+        self._send_or_choose(costs)
 
-    def _use_joined(self, costs: Codes) -> None:
-        """Compute what else depends on the joined tables, besides the least `costs`; here nothing."""
+    def _process_joined(self, costs: Codes) -> None:
+        """Compute further results of the joined tables, besides the least `costs`; here there are none."""
 
-    def _pass_on(self, costs: Codes) -> None:
-        """Send the own table to the parent; a root chooses, and a table without a finite cost ends the search."""
-        if is_hopeless(costs):
+    def _send_or_choose(self, costs: Codes) -> None:
+        """Send the table to the parent; a root chooses, and a table without a finite cost ends the search."""
+        if are_all_infinite(costs):
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is None:
             self.optimum = int(costs.item())
@@ -491,13 +496,13 @@ class DPOP(TreeProtocol):
         if len(assignment) != len(separator) or not all(
             0 <= index < self._sizes[name] for name, index in zip(separator, assignment, strict=True)
         ):
-            raise ValueError(f"{assignment} are no values of {', '.join(separator)}")
+            raise ValueError(f"{assignment} are not values of {', '.join(separator)}")
         self._choose_optimal(assignment)
 
     def _choose_optimal(self, assignment: Sequence[int]) -> None:
-        """Take the cheapest value, and send the children the values of their separators."""
+        """Choose the cheapest value, and send the children the values of their separators."""
         if self.choices is None:
-            raise ValueError(f"{self.problem.agent} has a value already, or no table yet")
+            raise ValueError(f"{self.problem.agent} already has a value, or has no table yet")
         self.value = self._best_value(self.choices, assignment)
         self.choices = None
         agent_view: Mapping[str, int] = dict(
@@ -507,18 +512,18 @@ class DPOP(TreeProtocol):
             self.send(child, VALUE([agent_view[name] for name in self._axes[child]]))
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of the cheapest own value under these values of the separator."""
+        """Return the place of this robot's cheapest value for these values of the separator."""
         return int(choices[tuple(assignment)])
 
 
-def keep_once(sender: str, item: T, received: dict[str, T], speakers: Sequence[str]) -> None:
-    """Store the one message that each of `speakers` sends.
+def store_once(sender: str, item: T, received: dict[str, T], senders: Sequence[str]) -> None:
+    """Store the one message that each of `senders` sends.
 
     Raises:
-        ValueError: if `sender` is none of them, or has sent one before.
+        ValueError: if `sender` is not one of them, or has already sent one.
     """
-    if sender not in speakers or sender in received:
-        raise ValueError(f"{sender} had nothing to say of this, or has said it already")
+    if sender not in senders or sender in received:
+        raise ValueError(f"{sender} sent an unexpected or repeated message")
     received[sender] = item
 
 

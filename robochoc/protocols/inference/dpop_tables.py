@@ -1,9 +1,9 @@
-"""Tables of costs as DPOP joins, projects, keeps and sends them (see `dpop`).
+"""Tables of costs as DPOP joins, projects, stores and sends them (see `dpop`).
 
-An axis stands for a robot, a place on it for one of the robot's values. Costs are integers, or `inf` where something
-hard is broken; they are added up in float64, which is exact below 2^53. Tables that stay, or travel, are of
-unsigned integers, as narrow as the costs allow; the largest of them stands for `inf`. How much memory an operation
-takes can be told before: `bytes_of`.
+An axis belongs to a robot, a place on it to one of the robot's values. Costs are integers, or `inf` if a hard
+constraint is broken; they are added up in float64, which is exact below 2^53. Stored and sent tables contain unsigned
+integers, as narrow as the costs allow; the largest number represents `inf`. The memory that an operation needs is known
+before: `bytes_of`.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.unsignedinteger[Any]]
 Table = Array | Codes
 Width = Literal[1, 2, 4, 8]
-"""Bytes that a cost takes."""
+"""The bytes of a cost."""
 
 BLOCK = 1 << 17
-"""Cells of a join that are made at a time: they stay near the processor."""
+"""The cells of a join that are made at a time: few enough for the processor's cache."""
 TEMPORARY = 32
-"""Bytes for each of these, at most: sums, a table's costs as they are added, and what finds the least."""
+"""The most bytes for each of these: sums, a table's costs as they are added, and the search for the minimum."""
 LONGEST = 16
-"""So many blocks may be one where a single axis needs it."""
+"""The number of blocks that may form one block if a single axis needs it."""
 PIECE = 1 << 24
-"""16 MiB, at most, of a table in one message: a quarter of what a queue takes."""
+"""The most bytes of a table in one message, 16 MiB: a quarter of the capacity of a queue."""
 _WIDTHS: tuple[Width, ...] = (1, 2, 4, 8)
 
 
 class Projection(NamedTuple):
-    """The minimum cost for each combination of the others' values, and the first own value that attains it."""
+    """The minimum cost for each combination of the others' values, and this robot's first value that attains it."""
 
     costs: Codes
     choices: Codes
@@ -55,11 +55,11 @@ def width_of(dearest: int) -> Width:
 
 
 def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent]) -> int:
-    """Return the peak size of all arrays while a table is made and sent. Nothing is allocated.
+    """Return the peak size of all arrays while a table is made and sent. It allocates nothing.
 
     Args:
         shape: The table's shape.
-        own: The number of own values.
+        own: The number of this robot's values.
         width: The bytes of a cost in it.
         inputs: The tables that are joined.
     """
@@ -82,10 +82,10 @@ def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
 
 
 def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Table], width: Width) -> Projection:
-    """Add up `charges`, of the own values, and `tables`; then minimise over the own values.
+    """Add up `charges`, the costs of this robot's values, and `tables`; then minimise over its values.
 
-    `tables` have the own axis first, then the axes of `shape` (see `aligned`). The join is larger than the result by
-    the own axis. It is never in memory as a whole, but is made block by block. Small tables are added up first.
+    `tables` have this robot's axis first, then the axes of `shape` (see `aligned`). The join is larger than the result
+    by this axis. It is never in memory as a whole, but is made block by block. Small tables are added up first.
     """
     costs = np.full(shape, _top(width), f"<u{width}")
     choices = np.zeros(shape, _choice(len(charges)))
@@ -103,11 +103,11 @@ def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Tab
 
 
 def place_type(sizes: Iterable[int]) -> np.dtype[np.unsignedinteger[Any]]:
-    """Return the narrowest type, little-endian, that holds places of the values of robots with so many values."""
+    """Return the narrowest type, little-endian, for places of values of robots with these numbers of values."""
     return np.min_scalar_type(max(sizes) - 1).newbyteorder("<")
 
 
-def is_hopeless(costs: Codes) -> bool:
+def are_all_infinite(costs: Codes) -> bool:
     """Return whether all costs are `inf`."""
     return bool(costs.min() == _top(costs.itemsize))
 
@@ -118,7 +118,7 @@ def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
     flat = costs.reshape(-1)
     step = PIECE // width
     for start in range(0, flat.size, step):
-        # The code of `inf` is all ones, and so is what is left of it.
+        # The code of `inf` is all ones, and so are its lowest bytes.
         yield width, flat[start : start + step].astype(f"<u{width}", copy=False).tobytes()
 
 
@@ -143,18 +143,19 @@ class IncomingTable:
     def costs(self) -> Codes:
         """The costs that have arrived. Raises `ValueError` before the first piece."""
         if self._costs is None:
-            raise ValueError("no piece of the table has come")
+            raise ValueError("no piece of the table has arrived")
         return self._costs
 
     def add(self, width: Width, piece: bytes) -> None:
         """Append the next piece. Raises `ValueError` for bytes that do not fit."""
         if width > width_of(self._dearest) or (self._costs is not None and width != self._costs.itemsize):
-            raise ValueError(f"{width} bytes a cost are not what the table has")
+            raise ValueError(f"a piece of the table has {width} bytes a cost, not as many as the other pieces")
         if len(piece) % width or not 0 < len(piece) // width <= self._left:
-            raise ValueError(f"{len(piece)} bytes, {width} a cost, are no piece of a table that lacks {self._left}")
+            lack = f"the table lacks {self._left:,} costs"
+            raise ValueError(f"{len(piece):,} bytes with {width} a cost do not fit, as {lack}")
         codes = np.frombuffer(piece, f"<u{width}")
         if _max_finite(codes) > self._dearest:
-            raise ValueError(f"a cost of {_max_finite(codes)} is more than the most, {self._dearest}")
+            raise ValueError(f"a cost is {_max_finite(codes):,}, above the announced maximum of {self._dearest:,}")
         if self._costs is None:
             self._costs = np.empty(self._shape, codes.dtype)
         start = self._costs.size - self._left
@@ -163,7 +164,7 @@ class IncomingTable:
 
 
 def _block(table: Table, place: Sequence[int]) -> Array:
-    """Return the block of `table` at this place on the first axes after the own one, as floats."""
+    """Return the block of `table` at this place on the first axes after this robot's, as floats."""
     steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
     index: tuple[slice | int, ...] = (slice(None), *steps)
     block = table[index]
@@ -174,12 +175,12 @@ def _block(table: Table, place: Sequence[int]) -> Array:
 
 
 def costs_for(table: Table, value: int) -> Array:
-    """Return, as floats, the part of `table` for one place on its first axis; all of it if that has length 1."""
+    """Return, as floats, the part of `table` for one place on its first axis; the whole table if that has length 1."""
     return _block(table[value : value + 1] if len(table) > 1 else table, ()).reshape(table.shape[1:])
 
 
 def place_at(table: NDArray[Any], places: Sequence[int]) -> tuple[int, ...]:
-    """Return where `table` has its entry for `places` on the axes that it is aligned to: those of length 1 have one."""
+    """Return the index in `table` for `places` on the axes that it is aligned to; an axis of length 1 has one entry."""
     return tuple([place if length > 1 else 0 for place, length in zip(places, table.shape, strict=True)])
 
 

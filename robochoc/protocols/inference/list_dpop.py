@@ -1,33 +1,34 @@
 """Listing DPOP: DPOP that also lists the optima.
 
-DPOP (see `dpop.py`) whose robots keep their tables, those of costs and those of numbers (see `count_dpop.py`), until
-values go down. With the numbers the optima of a tree are numbered, and the root sends for several of them at once which
-values it takes, and which number the subtree of each child has then. So does each robot. Without costs, the optima are
-all solutions.
+DPOP (see `dpop.py`) whose robots store their tables, those of costs and those of numbers (see `count_dpop.py`), until
+values go down. The numbers give each optimum of a tree a number. For several optima at once, the root sends its values,
+and the number that the subtree of each child has in each. So does each robot. Without costs, the optima are all
+solutions.
 
-- **When to use**: to see which optima, or solutions, there are, on a pseudo-tree with a small induced width. The result
-  has them as `optima`, each of them checked, and says how many there are in all.
-- **Guarantees**: complete; it terminates with as many different optima as there are, or as are to be listed, or with a
+- **When to use**: to list the optima, or solutions, on a pseudo-tree with a small induced width. The result has them as
+  `optima`, each of them checked, with their total number.
+- **Guarantees**: complete; it terminates with all optima, or with `limit` different ones if there are more, or with a
   proof that there is no solution.
-- **Parameters (`--set`)**: `limit`, the most optima that are listed (default 100, at most 10,000); `memory`, the bytes
-  that the tables of a robot may take (default 1 GiB).
+- **Parameters (`--set`)**: `limit`, the most optima that are listed (default 100, at most 10,000); `memory`, the most
+  bytes of a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005 (DPOP). The
   numbers are those of `count_dpop.py`.
 
 The additions to counting DPOP are these methods:
 
-    tables are kept     `_use_joined`, `_kept_bytes`    which values, and which number for each child    `_pick`
-    values go down      `_list`
+    store the tables        `_process_joined`, `_additional_bytes`
+    values go down          `_list`
+    value and numbers       `_pick`
 
 Choices:
 
-- There is one message for each edge of the tree, whatever the number of optima. A robot learns, for each optimum that
-  is listed, the values of its separator and the own one, and which optimum of its subtree it is, by its number.
-- In the first optimum, each robot has the first value that goes with the values above it. The team takes this one.
-- Optima are told apart by what robots see of each other. Of local solutions of a robot that look alike, as all those
-  of a robot without neighbours do, the first is listed, and they count as one here; `count-dpop` counts them all.
+- There is one message for each edge of the tree, whatever the number of optima. A robot learns, for each listed
+  optimum, the values of its separator and its own, and the number of this optimum in its subtree.
+- In the first optimum, each robot has the first value that is possible with the values above it. The team adopts it.
+- Optima differ if robots see different values of each other. Of local solutions of a robot that look alike, as all
+  those of a robot without neighbours do, the first is listed, and they count as one here; `count-dpop` counts them all.
 - Unconnected parts have a root each, which lists the optima of its tree. The run combines them.
-- The list is checked with the files; where these are on several machines there is none.
+- The list is checked with the files; if these are on several machines, there is none.
 
 >>> from robochoc.generators.random_csp import random_csp
 >>> from robochoc.run import Options, Runtime, solve
@@ -69,7 +70,7 @@ MOST_LISTED = 10_000
 
 
 class ListDPOPSettings(DPOPSettings, frozen=True):
-    """`limit`: the most optima that are listed. `memory`: the bytes that the tables of a robot may take."""
+    """`limit`: the most optima that are listed. `memory`: the most bytes of a robot's tables."""
 
     limit: int = 100
 
@@ -77,15 +78,15 @@ class ListDPOPSettings(DPOPSettings, frozen=True):
         """Raise `ValueError` unless `memory` is positive, and `limit` is too and not too large."""
         super().__post_init__()
         if not 1 <= self.limit <= MOST_LISTED:
-            raise ValueError(f"limit is a number of optima from 1 to {MOST_LISTED:,}, not {self.limit}")
+            raise ValueError(f"limit is {self.limit}; it must be from 1 to {MOST_LISTED:,} optima")
 
 
 Number = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]+\Z", max_length=MOST_BITS // 4)]
-"""In hexadecimal digits, as it may need more than 64 bits."""
+"""Hexadecimal digits, as the number may need more than 64 bits."""
 
 
 class ListedValues(Message, frozen=True):
-    """For each optimum that is listed, what DPOP's VALUE has for one, and which of several the receiver's subtree has.
+    """For each listed optimum, the values of DPOP's VALUE, and the number of the receiver's part in it.
 
     `assignments` are the places of the values of the robots in the receiver's separator. `numbers` count, from 0 on,
     the cheapest assignments of its subtree under these values.
@@ -102,8 +103,8 @@ class ListedValues(Message, frozen=True):
         return f"{len(self.numbers):,} {optima}, with {different} of values of the robots in your separator"
 
 
-class KeptTables(NamedTuple):
-    """The tables that were joined (`costs`), the children's `numbers`, and the own tables (`least`, `ways`)."""
+class StoredTables(NamedTuple):
+    """The joined tables (`costs`), the children's `numbers`, and this robot's tables (`least`, `ways`)."""
 
     costs: Sequence[Table]
     numbers: Mapping[str, Numbers]
@@ -114,10 +115,10 @@ class KeptTables(NamedTuple):
 class ListDPOP(CountDPOP):
     """One agent of listing DPOP.
 
-    State besides counting DPOP's, whose numbers are of assignments that look different:
+    State besides counting DPOP's, whose numbers count assignments that look different:
 
-    - `kept`: the tables, until values have come;
-    - `listed`: the place of the own value in each optimum that is listed.
+    - `kept`: the tables, until values have arrived;
+    - `listed`: the place of this robot's value in each listed optimum.
     """
 
     messages = TreeMessage | Domain | CountDimensions | Proceed | UTIL | Counts | ListedValues
@@ -136,7 +137,7 @@ class ListDPOP(CountDPOP):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.kept: KeptTables | None = None
+        self.kept: StoredTables | None = None
         self.listed: list[int] | None = None
 
     def handle(self, sender: str, message: Message) -> None:
@@ -150,59 +151,61 @@ class ListDPOP(CountDPOP):
 
     @property
     def findings(self) -> Findings:
-        """DPOP's, and the list; for a root also the number of its tree's optima."""
+        """DPOP's findings and the list; for a root also the number of its tree's optima."""
         listing = None if self.listed is None else Listing(self.listed, self.settings.limit)
         return msgspec.structs.replace(super().findings, listing=listing)
 
-    # What is counted, and kept
+    # Counting, and stored tables
 
     def _plan(self) -> None:
-        """Compute how many bits the own numbers can need."""
+        """Compute the bits of this robot's numbers."""
         own = len(self.problem.values).bit_length()
         self.bits = min(own + sum(self.bits_below.values()), MOST_BITS)
 
     def _own_ways(self) -> Numbers:
-        """Values are told apart, and not the local solutions behind them."""
+        """Count values, not the local solutions behind them."""
         return numbers_of([1] * len(self.problem.values), self.bits)
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Besides what counting takes, all tables stay."""
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes for counting, and those of all tables, which are stored."""
         cells = math.prod(self._own_sizes())
         own = cells * (width_of(self._dearest) + bytes_of_numbers(1, self.bits))
         below = sum(bytes_of_numbers(math.prod(self._child_sizes(child)), self.bits) for child in self.children)
-        return super()._kept_bytes(inputs) + own + below + sum(table.cells * table.width for table in inputs)
+        counting = super()._additional_bytes(inputs)
+        return counting + own + below + sum(table.cells * table.width for table in inputs)
 
-    def _use_joined(self, costs: Codes) -> None:
-        """Count the assignments that attain each of the least `costs`; keep what was joined."""
+    def _process_joined(self, costs: Codes) -> None:
+        """Count the assignments that attain each of the least `costs`; store the joined tables."""
         numbers = dict(zip(self._joined_children, self._below, strict=True))
         joined = [*self._joined]
-        super()._use_joined(costs)
+        super()._process_joined(costs)
         if self._own_numbers is not None:
-            self.kept = KeptTables(joined, numbers, costs, self._own_numbers)
+            self.kept = StoredTables(joined, numbers, costs, self._own_numbers)
 
     # Values, from the root down
 
     def _choose_optimal(self, assignment: Sequence[int]) -> None:
-        """As the root, list the optima of the tree, the first ones if there are too many."""
+        """As the root, list the optima of the tree, up to the limit."""
         number = min(self.count or 0, self.settings.limit)
         self._list([assignment] * number, range(number))
 
     def _values_handler(self, assignments: Sequence[Sequence[int]], numbers: Sequence[str]) -> None:
-        """Process the values above. Raises `ValueError` if they are none, or this is not the time."""
+        """Process the values above. Raises `ValueError` if they are invalid, or unexpected."""
         shape = [self._sizes[name] for name in self.separator or ()]
         if not 0 < len(assignments) == len(numbers) <= self.settings.limit:
-            raise ValueError(f"{len(assignments)} combinations of values, and {len(numbers)} numbers")
+            found = f"{len(assignments):,} combinations of values, {len(numbers):,} numbers"
+            raise ValueError(f"{found}; both must be the same, from 1 to {self.settings.limit:,}")
         for assignment in assignments:
             if len(assignment) != len(shape) or not all(
                 0 <= place < size for place, size in zip(assignment, shape, strict=True)
             ):
-                raise ValueError(f"{assignment} are no values of {', '.join(self.separator or ())}")
+                raise ValueError(f"{assignment} are not values of {', '.join(self.separator or ())}")
         self._list(assignments, [int(number, 16) for number in numbers])
 
     def _list(self, assignments: Sequence[Sequence[int]], numbers: Sequence[int]) -> None:
-        """Take the own values of the optima that are listed, and send the children what concerns them."""
+        """Choose this robot's values of the listed optima, and send the children their parts."""
         if self.kept is None:
-            raise ValueError(f"{self.problem.agent} has values already, or no table yet")
+            raise ValueError(f"{self.problem.agent} already has values, or has no table yet")
         picked = [self._pick(self.kept, one, number) for one, number in zip(assignments, numbers, strict=True)]
         self.kept, self.choices = None, None
         self.listed = [place for place, _ in picked]
@@ -215,8 +218,8 @@ class ListDPOP(CountDPOP):
             places = [[view[name] for name in self._axes[child]] for view in views]
             self.send(child, ListedValues(places, [f"{below[child]:x}" for _, below in picked]))
 
-    def _pick(self, kept: KeptTables, assignment: Sequence[int], number: int) -> tuple[int, dict[str, int]]:
-        """Return the own value in the optimum of the subtree with this `number`, and the numbers for the children."""
+    def _pick(self, kept: StoredTables, assignment: Sequence[int], number: int) -> tuple[int, dict[str, int]]:
+        """Return this robot's value in the optimum of its subtree with this `number`, and the children's numbers."""
         at = tuple(assignment)
         least = cost_at(kept.least, at)
         if least == math.inf or number >= int(kept.ways[at]):
@@ -228,7 +231,7 @@ class ListDPOP(CountDPOP):
                 if number < all_ways:
                     return place, _digits(number, ways)
                 number -= all_ways
-        raise ValueError(f"{self.problem.agent}'s tables do not agree")
+        raise ValueError(f"{self.problem.agent}'s tables contradict each other")
 
 
 def _digits(number: int, bases: dict[str, int]) -> dict[str, int]:

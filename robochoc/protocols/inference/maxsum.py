@@ -3,15 +3,15 @@
 Local message passing on the factor graph; here it minimises costs, so it is a min-sum. Each robot's variable is a node,
 and so is each function: the sum of all constraints over the same robots. R, from function to variable, is the minimum
 cost of each value by that function, given the other variables' messages. Q, from variable to function, is the cost of
-each value by all other functions. A robot takes the value with the lowest sum.
+each value by all other functions. A robot chooses the value with the lowest sum.
 
 - **When to use**: costs, a large team, a graph with few cycles.
 - **Guarantees**: incomplete; it stops after `cycles` cycles. On a graph without cycles the result is optimal (without
-  `split`); elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot all of
-  whose values cost `inf` proves that there is no solution.
+  `split`); elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot whose
+  values all cost `inf` proves that there is no solution.
 - **Parameters (`--set`)**: `damping` (the weight of the last Q in a new one; default 0.5), `preference` (the maximum
-  random charge of a value; default 0.01), `split` (each function becomes two; default 0: none does), `cycles` (default
-  100).
+  random charge of a value; default 0.01), `split` (each function becomes two; default 0: no splitting), `cycles`
+  (default 100).
 - **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
   the max-sum algorithm", AAMAS 2008, Section 4; for damping and splitting: Cohen, Galiki, Zivan: "Governing convergence
   of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
@@ -25,26 +25,26 @@ The methods have the names of the first paper's equations:
     split constraint factor graph      `_split`
 
 A function is held by the lowest-priority robot of its scope, the only one that knows the constraint. Messages between
-nodes of one robot are not sent. In a cycle all functions send R, then all variables send Q. All that one robot sends
-another in a phase is one message, with a row for each function that contains both. First, robots send their domains to
-the holders of their functions.
+nodes of the same robot are not sent. In a cycle all functions send R, then all variables send Q. All messages between
+two robots in a phase are one message, with a row for each function that contains both. First, robots send their domains
+to the holders of their functions.
 
 Ties: if values are interchangeable, such as colours, all their costs would stay equal. So each value of each robot has
 a small random charge, its preference (the paper's gamma).
 
-With `split`, each function becomes two: of each entry one has a share, drawn from `split` to 1 - `split`, and the other
-the rest. 0.5 makes equal halves; below it they differ a little. Both are nodes of the graph, so a robot's Q to one of
-them has in it what the other one answered. That works like damping: the search settles sooner. The halves form a cycle,
-so on a tree the result is no longer sure to be optimal.
+With `split`, each function becomes two: the first has a share of each entry, drawn from `split` to 1 - `split`, and the
+other the rest. 0.5 makes equal halves; below it they differ a little. Both are nodes of the graph, so a robot's Q to
+one of them contains the other's R. That works like damping: the search settles sooner. The halves form a cycle, so on a
+tree the result is no longer sure to be optimal.
 
 Choices that the paper leaves open, and differences:
 
 - Q is damped.
-- Q is normalised to a minimum of 0 (in the paper: to a sum of 0), as entries may be infinite: a value that violates a
-  hard constraint whatever others do costs `inf`. Nothing is subtracted from `inf`, so such a value stays ruled out.
+- Q is normalised to a minimum of 0 (in the paper: to a sum of 0), as entries may be infinite: a value that always
+  violates a hard constraint costs `inf`. Nothing is subtracted from `inf`, so such a value remains excluded.
 - Constraints may be n-ary, up to a maximum size of their tables.
-- Where messages are lost, the last R and Q stand for those that are missing. Where a domain is lost, its functions are
-  left out; instead of R their holder tells its own domain, which asks for the other one again.
+- For lost messages, the last R and Q are used. If a domain is lost, its functions are left out; instead of R their
+  holder sends its own domain, to request the other one again.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -72,13 +72,13 @@ from robochoc.protocols.wording import Wording, costs_text
 from robochoc.solver.local_problem import LocalProblem
 
 MAX_SPLIT = 0.5
-"""With this share both halves of a function are alike."""
+"""With this share both halves of a function are equal."""
 
 
 class MaxSumSettings(CycleSettings, frozen=True):
-    """`damping`: the weight of the last Q. `preference`: the maximum for a value. `cycles`: the number of cycles.
+    """`damping`: the weight of the last Q. `preference`: its maximum for a value. `cycles`: the number of cycles.
 
-    `split`: each function becomes two, and the share of each entry is drawn from `split` to 1 - `split`. 0: none is.
+    `split`: each function becomes two, and the share of each entry is drawn from `split` to 1 - `split`. 0: no split.
     """
 
     damping: float = 0.5
@@ -96,14 +96,14 @@ class MaxSumSettings(CycleSettings, frozen=True):
 
 
 class R(wire.Message, frozen=True):
-    """Messages from functions to a variable, a row for each of the sender's functions with the receiver in it.
+    """Messages from functions to a variable, a row for each of the sender's functions that includes the receiver.
 
-    A row holds the minimum cost of the function for each of the receiver's values.
+    A row contains the minimum cost of the function for each of the receiver's values.
     """
 
     rows: list[Row]
 
-    act = Act(Performative.INFORM, "the receiver learns what each of its values costs")
+    act = Act(Performative.INFORM, "the receiver learns the cost of each of its values")
     # Costs are sums over many robots, and may be split, damped or shifted to a minimum of 0.
     proves_nothing = True
 
@@ -116,12 +116,12 @@ class R(wire.Message, frozen=True):
 class Q(wire.Message, frozen=True):
     """Messages from a variable to functions, a row for each of the receiver's functions, in the order of R.
 
-    A row holds the cost of each of the sender's values by all its other functions.
+    A row contains the cost of each of the sender's values by all its other functions.
     """
 
     rows: list[Row]
 
-    act = Act(Performative.INFORM, "the receiver learns what each value costs elsewhere")
+    act = Act(Performative.INFORM, "the receiver learns the cost of each of the sender's values elsewhere")
     # Costs are sums over many robots, and may be split, damped or shifted to a minimum of 0.
     proves_nothing = True
 
@@ -139,7 +139,7 @@ class MaxSum(CycleProtocol):
     """One agent of Max-Sum: its variable, and the functions of which it is the lowest robot.
 
     Robots in `above` receive R from this robot and send Q to it; robots in `below` send R and receive Q. `factors` are
-    the own functions. `edges` holds the last Q to each function: the own ones first, then those of each robot below.
+    its functions. `edges` contains the last Q to each function: its own ones first, then those of each robot below.
     """
 
     messages = Domain | R | Q | AnytimeMessage
@@ -166,26 +166,26 @@ class MaxSum(CycleProtocol):
         self.edges: list[Row] = []
         self._own: list[Row] = []
         self._domains: dict[str, list[wire.Value]] = {}
-        self._q_of: dict[str, Sequence[Row]] = {}
+        self._last_q: dict[str, Sequence[Row]] = {}
         """The last Q of each robot above."""
-        self._r_of: dict[str, Sequence[Row]] = {}
-        """The last R of each robot below that has told one."""
+        self._last_r: dict[str, Sequence[Row]] = {}
+        """The last R of each robot below that has sent one."""
         self._made = False
         self._shape: list[tuple[str, int]] = []
-        """Of whom `edges` are: how many, by robot."""
+        """The number of `edges` of each robot."""
 
     def start_cycles(self) -> None:
-        """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
+        """Choose the value with the lowest private cost, and send the domain to the holders of its functions."""
         preference = self.settings.preference
         self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
         self.choose(cheapest(self.preferred))
         self.multicast(self.below, Domain(list(self.problem.values)))
-        self.listen(self.above, self._build)
+        self.listen(self.above, self._receive_domains)
 
-    def _build(self, messages: Mapping[str, wire.Message]) -> None:
-        """Make the own functions from the received domains."""
+    def _receive_domains(self, messages: Mapping[str, wire.Message]) -> None:
+        """Start the first cycle, once the domains above are known."""
         self._domains = self.checked_domains(messages)
-        self._tell_r()
+        self._send_r()
 
     def _make_functions(self) -> None:
         """Make the functions of robots whose domains are known. All Q are 0 at first."""
@@ -194,10 +194,10 @@ class MaxSum(CycleProtocol):
         self._shape = []
         self.factors = self._split(Factor.joined(self.problem.tables(domains)))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
-        self._q_of = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
+        self._last_q = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
 
     def _split(self, factors: list[Factor]) -> list[Factor]:
-        """Return two functions for each of `factors`, if that is asked for."""
+        """Return two functions for each of `factors`, if the setting `split` is not 0."""
         least = self.settings.split
         if not least:
             return factors
@@ -210,54 +210,54 @@ class MaxSum(CycleProtocol):
             halves += factor.split(np.reshape(drawn, factor.charges.shape))
         return halves
 
-    def _hear_q(self, messages: Mapping[str, wire.Message]) -> None:
+    def _receive_q(self, messages: Mapping[str, wire.Message]) -> None:
         """Process all Q of the cycle."""
         for name, message in messages.items():
-            self._hear(name, message)
-        self._tell_r()
+            self._record(name, message)
+        self._send_r()
 
     def receive_late(self, sender: str, message: wire.Message) -> None:
-        """Note what is new in a message whose phase is over."""
-        self._hear(sender, message)
+        """Store the new information in a message whose phase is over."""
+        self._record(sender, message)
 
-    def _hear(self, name: str, message: wire.Message) -> None:
-        """Note the last R, Q or domain of a robot. Q of functions that have been made anew meanwhile do not fit."""
+    def _record(self, name: str, message: wire.Message) -> None:
+        """Store the last R, Q or domain of a robot; ignore Q of functions that have changed since."""
         if isinstance(message, R):
-            self._r_of[name] = message.rows
+            self._last_r[name] = message.rows
         elif isinstance(message, Domain) and name in self.above:
             self._domains.update(self.checked_domains({name: message}))
             self._made = False
         elif isinstance(message, Domain):
-            self._r_of.pop(name, None)
-        elif isinstance(message, Q) and len(message.rows) == len(self._q_of.get(name, message.rows)):
-            self._q_of[name] = message.rows
+            self._last_r.pop(name, None)
+        elif isinstance(message, Q) and len(message.rows) == len(self._last_q.get(name, message.rows)):
+            self._last_q[name] = message.rows
 
-    def _tell_r(self) -> None:
-        """Send R from the own functions to their variables; the own variable needs no message.
+    def _send_r(self) -> None:
+        """Send R from this robot's functions to their variables; its own variable needs no message.
 
-        Where a robot's domain is lost, there is no R yet: the own domain asks for it.
+        If a robot's domain is lost, there is no R yet: this robot's domain requests it.
         """
         if not self._made:
             self._make_functions()
-        rows = {name: iter(told) for name, told in self._q_of.items()}
-        said: dict[str, list[Row]] = {name: [] for name in self.above}
+        rows = {name: iter(q) for name, q in self._last_q.items()}
+        r: dict[str, list[Row]] = {name: [] for name in self.above}
         self._own = []
         for factor, own in zip(self.factors, self.edges, strict=False):
             answers = factor.r([*[next(rows[name]) for name in factor.agents], own])
             self._own.append(answers.pop())
             for name, row in zip(factor.agents, answers, strict=True):
-                said[name].append(row)
+                r[name].append(row)
         for name in self.above:
-            self.send(name, R(said[name]) if name in self._domains else Domain(list(self.problem.values)))
+            self.send(name, R(r[name]) if name in self._domains else Domain(list(self.problem.values)))
         self.listen(self.below, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
-        """Take the value with the lowest cost by all R, and send Q."""
+        """Choose the value with the lowest cost by all R, and send Q."""
         for name, message in messages.items():
-            self._hear(name, message)
-        told = {name: self._r_of[name] for name in self.below if name in self._r_of}
-        rows = [*self._own, *(row for rows in told.values() for row in rows)]
-        before, self._shape = self._shape, [("", len(self._own)), *((name, len(told[name])) for name in told)]
+            self._record(name, message)
+        received = {name: self._last_r[name] for name in self.below if name in self._last_r}
+        rows = [*self._own, *(row for r in received.values() for row in r)]
+        before, self._shape = self._shape, [("", len(self._own)), *((name, len(received[name])) for name in received)]
         z = self._z(rows)
         if min(z) == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
@@ -267,13 +267,13 @@ class MaxSum(CycleProtocol):
             return
         self.edges = self._q(rows, z, damped=before == self._shape)
         done = len(self.factors)
-        for name, answered in told.items():
+        for name, answered in received.items():
             self.send(name, Q(self.edges[done : done + len(answered)]))
             done += len(answered)
         for name in self.below:
-            if name not in told:
+            if name not in received:
                 self.send(name, Domain(list(self.problem.values)))
-        self.listen(self.above, self._hear_q)
+        self.listen(self.above, self._receive_q)
 
     def _z(self, rows: Sequence[Row]) -> Row:
         """Return the cost of each value: its preference and the sum of all `rows` (Z)."""

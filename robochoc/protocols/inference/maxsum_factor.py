@@ -17,14 +17,14 @@ Row = list[float]
 """An entry for each value of a robot."""
 
 SMALL = 400
-"""Up to so many entries a table over two robots is faster as lists than in numpy."""
+"""Up to this number of entries a table over two robots is faster as lists than in numpy."""
 
 MOST = 2.0**512
-"""The most that a finite entry of Q can be.
+"""The highest finite entry of Q.
 
-In a graph with cycles hard constraints can make entries grow in each cycle by as much as a robot has functions. An
-entry that overflowed would be taken for a value that is forbidden, and prove what is false. Sums of so many entries as
-a robot can have stay finite.
+In a graph with cycles hard constraints can make entries grow in each cycle by the number of a robot's functions. An
+entry that overflowed would count as a forbidden value, and prove something false. Sums of as many entries as a robot
+can have remain finite.
 """
 
 
@@ -50,26 +50,26 @@ class Factor:
     def split(self, shares: Array) -> tuple[Factor, Factor]:
         """Return two functions whose sum is this one: of each entry its share, between 0 and 1, and the rest.
 
-        What is forbidden is so in both.
+        Forbidden combinations are forbidden in both.
         """
         return Factor(self.agents, self.charges * shares), Factor(self.agents, self.charges * (1 - shares))
 
-    def r(self, told: Sequence[Row]) -> list[Row]:
-        """Return the minimum cost of each robot's values, given the others' Q in `told`; in the order of the axes."""
+    def r(self, q: Sequence[Row]) -> list[Row]:
+        """Return the minimum cost of each robot's values, given the others' Q; in the order of the axes."""
         if self._lines:
-            (other, own), (lines, columns) = told, self._lines
+            (other, own), (lines, columns) = q, self._lines
             return [[min(map(add, line, own)) for line in lines], [min(map(add, line, other)) for line in columns]]
-        return [self._least(place, told) for place in range(len(told))]
+        return [self._least(place, q) for place in range(len(q))]
 
-    def _least(self, place: int, told: Sequence[Row]) -> Row:
+    def _least(self, place: int, q: Sequence[Row]) -> Row:
         """Return the minimum cost for each value on the axis at `place`."""
         import numpy as np  # noqa: PLC0415 - for large tables only
 
-        axes = tuple([axis for axis in range(len(told)) if axis != place])
+        axes = tuple([axis for axis in range(len(q)) if axis != place])
         total = self.charges
         for axis in axes:
-            row = np.asarray(told[axis], np.float64)
-            total = total + np.expand_dims(row, tuple([other for other in range(len(told)) if other != axis]))
+            row = np.asarray(q[axis], np.float64)
+            total = total + np.expand_dims(row, tuple([other for other in range(len(q)) if other != axis]))
         least: Row = total.min(axis=axes).tolist()
         return least
 
@@ -77,12 +77,12 @@ class Factor:
 def total(first: Row, rows: Iterable[Row]) -> Row:
     """Return the sum of `first` and all `rows`, entry by entry."""
     for row in rows:
-        first = list(map(add, first, row))  # not `sum`, which rounds as the version of Python has it
+        first = list(map(add, first, row))  # not `sum`, whose rounding depends on the version of Python
     return first
 
 
 def without_each(first: Row, rows: Sequence[Row], z: Row) -> list[Row]:
-    """Return, for each of `rows`, the sum `z` of `first` and all rows without that one.
+    """Return, for each of `rows`, `z` without this row; `z` is the sum of `first` and all rows.
 
     Nothing is subtracted from infinity.
     """
@@ -92,7 +92,7 @@ def without_each(first: Row, rows: Sequence[Row], z: Row) -> list[Row]:
 
 
 def from_zero(row: Row) -> Row:
-    """Return `row` with a minimum of 0, and nothing finite above `MOST`."""
+    """Return `row` shifted to a minimum of 0, with no finite entry above `MOST`."""
     least = min(row)
     shifted = [entry - least for entry in row]
     if max(shifted) <= MOST:
@@ -106,7 +106,7 @@ def cheapest(row: Row) -> int:
 
 
 class Functions:
-    """The functions of a robot: `q` are the last Q to them, for each robot above a row for each function with it.
+    """The functions of a robot. `q`: for each robot above, the rows of its last Q, one for each function with it.
 
     All are 0 at first.
     """
@@ -119,17 +119,17 @@ class Functions:
         }
         self._sizes = {name: len(values) for name, values in domains.items()}
 
-    def hear(self, name: str, rows: list[Row]) -> None:
-        """Keep Q of a robot above. Raises `ValueError` for rows that do not fit."""
+    def receive_q(self, name: str, rows: list[Row]) -> None:
+        """Store Q of a robot above. Raises `ValueError` for rows of another number or size."""
         self.q[name] = checked(rows, len(self.q[name]), self._sizes[name])
 
     def answers(self, own: Sequence[Row]) -> tuple[list[Row], dict[str, list[Row]]]:
-        """Return R to the own variable, and to each robot above; `own` are Q of the own variable."""
-        told = {name: iter(rows) for name, rows in self.q.items()}
+        """Return R to this robot's variable, and to each robot above; `own` are Q of this robot's variable."""
+        q = {name: iter(rows) for name, rows in self.q.items()}
         mine: list[Row] = []
         theirs: dict[str, list[Row]] = {name: [] for name in self.q}
         for factor, row in zip(self.factors, own, strict=True):
-            answers = factor.r([*[next(told[name]) for name in factor.agents], row])
+            answers = factor.r([*[next(q[name]) for name in factor.agents], row])
             mine.append(answers.pop())
             for name, answer in zip(factor.agents, answers, strict=True):
                 theirs[name].append(answer)
@@ -137,7 +137,7 @@ class Functions:
 
 
 def checked(rows: list[Row], many: int, size: int) -> list[Row]:
-    """Return `rows`; `ValueError` if they are not so many, or not all of `size` entries."""
+    """Return `rows`. Raises `ValueError` if they are not `many`, or not all of `size` entries."""
     if len(rows) != many or any(len(row) != size for row in rows):
-        raise ValueError(f"the message has not {many:,} rows of {size:,} entries")
+        raise ValueError(f"the message must have {many:,} rows of {size:,} entries")
     return rows

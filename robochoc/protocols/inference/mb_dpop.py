@@ -1,8 +1,8 @@
 """Memory-bounded DPOP (MB-DPOP).
 
-DPOP (see `dpop.py`) whose tables have at most `k` dimensions. Where a robot's separator is larger, robots of it are
+DPOP (see `dpop.py`) whose tables have at most `k` dimensions. If a robot's separator is larger, some of its robots are
 fixed: the *cycle-cut* robots. Their values are enumerated by a *cluster root*, which sends them down (`Context`) and
-gets a table for each combination. So memory is bounded, and it takes more messages.
+receives a table for each combination. So memory is bounded, and more messages are needed.
 
 - **When to use**: costs, on a pseudo-tree too wide for `dpop`. With a `k` of the induced width or more it is DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
@@ -13,25 +13,26 @@ gets a table for each combination. So memory is bounded, and it takes more messa
 
 Its procedures are these methods:
 
-    labeling, bottom up     `_plan`, `_tell`            UTIL of a context   `_compute_utils`
-    cluster root            `_next_context`             best context        `_choose_optimal`
+    labeling, bottom up     `_plan`, `_send_dimensions`    UTIL of a context   `_compute_utils`
+    cluster root            `_next_context`                best context        `_choose_optimal`
 
-The rules of labeling, leaves first. A robot's list holds the cycle-cut robots of its cluster, also those below it:
+The rules of labeling, leaves first. A robot's list contains the cycle-cut robots of its cluster, also those below it:
 
-- A robot takes over the lists of its children. It is a cluster root if these are not empty, none of their robots is in
-  its own separator, and this has at most `k` robots. Then it enumerates them (it is one of them), and has no list.
+- A robot inherits the lists of its children. It is a cluster root if these are not empty, none of their robots is in
+  its separator, and this has at most `k` robots. Then it enumerates them (it is one of them), and has no list.
 - Otherwise it adds robots of its separator to the list, until at most `k` of the others are left.
 
 Choices that the paper leaves open, and differences:
 
 - The robots highest in the tree are added to a list first. Therefore `DomainAtDepth`, DPOP's `Domain`, has the
   sender's depth.
-- Sizes, limits and the permission to proceed are DPOP's, so that nothing is computed before all are known to fit.
-- A context goes to those children only whose tables depend on it, as places of the values in the order of the child's
-  list. Tables of other children are asked for once.
+- Sizes, limits and the permission to proceed are DPOP's, so that nothing is computed before all tables are known to
+  fit.
+- A context goes only to those children whose tables depend on it, as places of the values in the order of the child's
+  list. Tables of other children are requested once.
 - Once a cluster root has its values, it sends the best context down again, and waits for the tables: then all robots
-  of the cluster have their choices for it, and VALUE goes on as in DPOP.
-- The tables of a robot's own constraints are made once, and are as large as the constraints are.
+  of the cluster have their choices for it, and VALUE continues as in DPOP.
+- The tables of a robot's constraints are made once, and are as large as the constraints are.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -64,7 +65,7 @@ from robochoc.protocols.inference.dpop import (
     Need,
     Proceed,
     Size,
-    keep_once,
+    store_once,
 )
 from robochoc.protocols.inference.dpop_tables import (
     Codes,
@@ -87,7 +88,7 @@ from robochoc.system.plain_text import counted, listed
 
 
 class MBDPOPSettings(DPOPSettings, frozen=True):
-    """`k`: the most dimensions of a table. `memory`: the bytes that the tables of a robot may take."""
+    """`k`: the most dimensions of a table. `memory`: the most bytes of a robot's tables."""
 
     k: int = 4
 
@@ -95,7 +96,7 @@ class MBDPOPSettings(DPOPSettings, frozen=True):
         """Raise `ValueError` unless `memory` and `k` are positive."""
         super().__post_init__()
         if self.k < 1:
-            raise ValueError(f"k is {self.k}; a table has at least one dimension")
+            raise ValueError(f"k is {self.k}; it must be 1 or more, as a table has at least one dimension")
 
 
 Depth = Annotated[int, msgspec.Meta(ge=0)]
@@ -116,7 +117,7 @@ class DomainAtDepth(Message, frozen=True):
         return [HasOnly(hearing.sender, tuple(self.values))]
 
 
-class Axis(msgspec.Struct, frozen=True, array_like=True):
+class SeparatorAxis(msgspec.Struct, frozen=True, array_like=True):
     """A robot of a separator: the size of its domain, and its depth in the tree."""
 
     size: Size
@@ -130,13 +131,13 @@ class Label(Message, frozen=True):
     `induced_width` and `most` are those of DPOP's `Dimensions`.
     """
 
-    separator: dict[str, Axis]
+    separator: dict[str, SeparatorAxis]
     cut: dict[str, Size]
     dearest: Cost
     induced_width: int
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver learns the sender's table, and who is fixed for it")
+    act = Act(Performative.INFORM, "the receiver learns the size of the sender's table, and the robots fixed for it")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -154,7 +155,7 @@ class Context(Message, frozen=True):
 
     values: list[int]
 
-    act = Act(Performative.REQUEST, "the receiver is to make its table for these values")
+    act = Act(Performative.REQUEST, "the receiver makes its table for these values")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -172,8 +173,8 @@ class MBDPOP(DPOP):
 
     - `depth`, and the `depths` of robots above;
     - `cuts`: the children's lists of cycle-cut robots, with the sizes of their domains;
-    - `cut`: the own list; `enumerated`: what a cluster root enumerates;
-    - `context`: the values, as places, that the robots of these lists have now.
+    - `cut`: this robot's list; `enumerated`: the robots that a cluster root enumerates;
+    - `context`: the present values, as places, of the robots of these lists.
     """
 
     messages = TreeMessage | DomainAtDepth | Label | Proceed | Context | UTIL | VALUE
@@ -204,7 +205,7 @@ class MBDPOP(DPOP):
         self._final: Sequence[int] | None = None
 
     def start_in_tree(self) -> None:
-        """Send the own place to the neighbours below; other robots than the root wait for their parent's."""
+        """Send the place to the neighbours below; other robots than the root wait for their parent's place."""
         if self.parent is None:
             self._send_place()
             self._measure()
@@ -212,19 +213,19 @@ class MBDPOP(DPOP):
     def handle(self, sender: str, message: Message) -> None:
         match cast("DomainAtDepth | Label | Proceed | Context | UTIL | VALUE", message):
             case DomainAtDepth(depth, values):
-                keep_once(sender, values, self.domains, self.ancestors)
+                store_once(sender, values, self.domains, self.ancestors)
                 self.depths[sender] = depth
                 if sender == self.parent:
                     self.depth = depth + 1
                     self._send_place()
                 self._measure()
             case Label() as label:
-                self._keep_label(sender, label)
+                self._store_label(sender, label)
                 self._measure()
             case Proceed(separator):
                 self._proceed(separator)
             case Context(values):
-                self._take_context(values)
+                self._receive_context(values)
             case UTIL(width, costs):
                 self._util_message_handler(sender, width, costs)
             case VALUE(assignment):
@@ -238,21 +239,21 @@ class MBDPOP(DPOP):
 
     # Labels, from the leaves up
 
-    def _keep_label(self, child: str, label: Label) -> None:
+    def _store_label(self, child: str, label: Label) -> None:
         """Store a child's label. Raises `ValueError` if its table would have more than `k` dimensions."""
         free = [name for name in label.separator if name not in label.cut]
         if len(free) > self.settings.k or len(label.cut) > MOST_AXES:
-            raise ValueError(f"{child} tells of a table with {len(free)} dimensions, and {self.settings.k} are allowed")
+            raise ValueError(f"{child} announced a table of {len(free)} dimensions, more than {self.settings.k}")
         sizes = {name: axis.size for name, axis in label.separator.items()}
         dimensions = Dimensions(sizes, label.dearest, label.induced_width, label.most)
-        self._check(child, dimensions)
-        keep_once(child, dimensions, self.dimensions, self.children)
+        self._check_dimensions(child, dimensions)
+        store_once(child, dimensions, self.dimensions, self.children)
         self.cuts[child] = label.cut
         for name, axis in label.separator.items():
             self.depths.setdefault(name, axis.depth)
 
     def _plan(self) -> None:
-        """Label this robot: what its cluster enumerates, or the own list of cycle-cut robots."""
+        """Label this robot: the robots that it enumerates as a cluster root, or its list of cycle-cut robots."""
         inherited = {name: size for child in self.children for name, size in self.cuts[child].items()}
         if inherited and self._sizes.keys().isdisjoint(inherited) and len(self._sizes) <= self.settings.k:
             self.enumerated = inherited
@@ -264,9 +265,9 @@ class MBDPOP(DPOP):
     def _by_depth(self, name: str) -> tuple[int, int]:
         return self.depths[name], self.order.rank[name]
 
-    def _tell(self, dimensions: Dimensions) -> None:
-        """Send the parent the own label."""
-        axes = {name: Axis(size, self.depths[name]) for name, size in dimensions.separator.items()}
+    def _send_dimensions(self, dimensions: Dimensions) -> None:
+        """Send the parent this robot's label."""
+        axes = {name: SeparatorAxis(size, self.depths[name]) for name, size in dimensions.separator.items()}
         label = Label(axes, self.cut, dimensions.dearest, dimensions.induced_width, dimensions.most)
         self.send(self.parent or "", label)
 
@@ -277,58 +278,58 @@ class MBDPOP(DPOP):
         sizes = self.dimensions[child].separator
         return [size for name, size in sizes.items() if name not in self.cuts[child]]
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Keep tables for the next context; a cluster root keeps the best cost and context for each cell."""
-        kept = sum(table.cells * table.width for table in inputs)
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of tables stored for the next context; a cluster root also stores the best of each cell."""
+        stored = sum(table.cells * table.width for table in inputs)
         if self.enumerated:
             places = place_type(self.enumerated.values()).itemsize * len(self.enumerated)
-            kept += math.prod(self._own_sizes()) * (width_of(self._dearest) + places)
-        return kept
+            stored += math.prod(self._own_sizes()) * (width_of(self._dearest) + places)
+        return stored
 
     # Tables of a context
 
     def _table_axes(self, child: str) -> Sequence[str]:
-        """Return the robots of a child's table: those that are not fixed for it."""
+        """Return the robots of a child's table that are not fixed for it."""
         return [name for name in self._axes[child] if name not in self.cuts[child]]
 
     @property
     def _free(self) -> tuple[str, ...]:
-        """The robots of the own table's axes."""
+        """The robots of the axes of this robot's table."""
         return tuple(name for name in self.separator or () if name not in self.cut)
 
     def _start_utils(self) -> None:
-        """Make the tables of the own constraints; who waits for nothing computes at once."""
+        """Make the tables of this robot's constraints; compute at once if there is nothing to wait for."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
         self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
         self._start_inference()
         self._compute_if_complete()
 
     def _start_inference(self) -> None:
-        """Begin the first context, unless it is the parent who gives it."""
+        """Start the first context, unless the parent sends it."""
         if self.enumerated:
             self._contexts = itertools.product(*map(range, self.enumerated.values()))
             self._next_context()
         elif not self.cut:
             self.context = {}
 
-    def _take_context(self, values: Sequence[int]) -> None:
+    def _receive_context(self, values: Sequence[int]) -> None:
         """Process the parent's context."""
         if not self.cut or self.separator is None or (self.context is not None and self.choices is None):
-            raise ValueError(f"{self.problem.agent} is not to be given a context now")
+            raise ValueError(f"{self.problem.agent} received an unexpected context")
         if len(values) != len(self.cut) or not all(map(is_place, values, self.cut.values())):
-            raise ValueError(f"{values} are no values of {', '.join(self.cut)}")
+            raise ValueError(f"{values} are not values of {', '.join(self.cut)}")
         self._start_context(dict(zip(self.cut, values, strict=True)))
         self._compute_if_complete()
 
     def _next_context(self) -> bool:
-        """As a cluster root, begin the next context; return whether there was one."""
+        """As a cluster root, start the next context; return whether there was one."""
         values = next(self._contexts, None)
         if values is not None:
             self._start_context(dict(zip(self.enumerated, values, strict=True)))
         return values is not None
 
     def _start_context(self, context: dict[str, int]) -> None:
-        """Ask the children in the cluster for their tables."""
+        """Request the tables of the children in the cluster."""
         self.context, self.choices = context, None
         for child in self.children:
             if self.cuts[child]:
@@ -336,7 +337,7 @@ class MBDPOP(DPOP):
                 self.send(child, Context([context[name] for name in self.cuts[child]]))
 
     def _compute_if_complete(self) -> None:
-        """Compute if there is a context and all tables are there."""
+        """Compute if there is a context and all tables have arrived."""
         if self.context is not None and self.choices is None and self._all_arrived:
             self._compute_utils()
 
@@ -344,9 +345,9 @@ class MBDPOP(DPOP):
         self._compute_if_complete()
 
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
-        """Store a piece of the child's table. Raises `ValueError` if it was not asked for."""
+        """Store a piece of the child's table. Raises `ValueError` for an unexpected one."""
         if self.context is None and self.cuts.get(child):
-            raise ValueError(f"{child} was not asked for a table")
+            raise ValueError(f"{child} sent a table without a request")
         super()._util_message_handler(child, width, costs)
 
     def _compute_utils(self) -> None:
@@ -355,9 +356,9 @@ class MBDPOP(DPOP):
         if self.cut:
             self._send_table(costs)
         elif not self.enumerated:
-            self._pass_on(costs)
+            self._send_or_choose(costs)
         elif self._final is None:
-            self._compare(costs)
+            self._record_best(costs)
         else:
             self._choose_in_context(self._final)
 
@@ -371,7 +372,7 @@ class MBDPOP(DPOP):
         return project([self._sizes[name] for name in axes], charges, tables, width_of(self._dearest))
 
     def _fixed(self, table: Table, axes: Sequence[str], context: Mapping[str, int]) -> tuple[Table, list[str]]:
-        """Return the part of `table` that is left in `context`, and its axes; the own axis stays, with one place."""
+        """Return the part of `table` in `context`, and its axes; this robot's axis remains, with one place."""
         own = self.problem.agent
         index = tuple(
             slice(None) if name not in context
@@ -381,10 +382,10 @@ class MBDPOP(DPOP):
         )  # fmt: skip
         return table[index], [name for name in axes if name not in context or name == own]
 
-    # What a cluster root does
+    # The enumeration of a cluster root
 
-    def _compare(self, costs: Codes) -> None:
-        """Keep what is cheaper in this context than in all before; then begin the next one, or pass on the best."""
+    def _record_best(self, costs: Codes) -> None:
+        """Store cheaper costs of this context than in all before; then start the next one, or send on the best."""
         if self._best is None or self._best_context is None:
             self._best = np.full_like(costs, np.iinfo(costs.dtype).max)
             self._best_context = np.zeros((len(self.enumerated), *costs.shape), place_type(self.enumerated.values()))
@@ -394,17 +395,17 @@ class MBDPOP(DPOP):
             np.copyto(self._best_context[number, ...], value, where=better, casting="unsafe")
         if not self._next_context():
             best, self._best = self._best, None
-            self._pass_on(best)
+            self._send_or_choose(best)
 
     # VALUE, from the root down
 
     def _choose_optimal(self, assignment: Sequence[int]) -> None:
-        """Take the cheapest value; a cluster root first sends its best context down again."""
+        """Choose the cheapest value; a cluster root first sends its best context down again."""
         if not self.enumerated:
             self._choose_in_context(assignment)
             return
         if self._best_context is None or self._final is not None:
-            raise ValueError(f"{self.problem.agent} has a value already, or no table yet")
+            raise ValueError(f"{self.problem.agent} already has a value, or has no table yet")
         self._final = assignment
         best = {
             name: int(places[tuple(assignment)])
@@ -417,15 +418,15 @@ class MBDPOP(DPOP):
             self._start_context(best)
 
     def _choose_in_context(self, assignment: Sequence[int]) -> None:
-        """Take the cheapest value in the context that all of the cluster have."""
+        """Choose the cheapest value in the context of the whole cluster."""
         view = dict(zip(self.separator or (), assignment, strict=True))
         context = self.context or {}
         if any(context.get(name, place) != place for name, place in view.items()):
-            raise ValueError(f"{self.problem.agent} has other fixed values than {assignment}")
+            raise ValueError(f"{self.problem.agent} has other fixed values than the values received: {assignment}")
         super()._choose_optimal(assignment)
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of the cheapest own value; of the fixed one if it is fixed."""
+        """Return the place of this robot's cheapest value, or of its fixed one."""
         free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
         return int(choices[tuple(free)]) + (self.context or {}).get(self.problem.agent, 0)
 

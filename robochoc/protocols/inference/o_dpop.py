@@ -1,21 +1,21 @@
-"""Open DPOP (O-DPOP): DPOP that sends no tables, but their entries, best first and on request.
+"""Open DPOP (O-DPOP): DPOP that sends entries of tables instead of tables, best first and on request.
 
 DPOP (see `dpop.py`) in which a parent asks (`Ask`), and its child answers with one *good*: a combination of values of
-its separator, and the least cost of its subtree for it. Goods come in the order of their costs. So a parent knows what
-all others cost at least, and often needs only a few.
+its separator, and the least cost of its subtree for it. Goods come in the order of their costs. So a parent knows a
+lower bound on all others, and often needs only a few.
 
-- **When to use**: costs, where few combinations are good. The number of messages may be exponential in the induced
-  width, but each is short; a table is never sent as a whole.
+- **When to use**: costs, if few combinations are good. The number of messages may be exponential in the induced width,
+  but each is short; a table is never sent as a whole.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
-- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "O-DPOP: an algorithm for open/distributed constraint optimization", AAAI 2006.
 
 Its rules are these methods:
 
-    ASK / GOOD propagation    `_answer`, `_take_good`     valuation-sufficient good    `_is_complete`
-    VALUE propagation         DPOP's
+    ASK / GOOD propagation    `_ask_or_answer`, `_receive_good`     valuation-sufficient good    `_is_complete`
+    VALUE propagation         as in DPOP
 
-A robot joins what its children have sent. Where a child has sent no matching good, the cost of its last good is a lower
+A robot joins its children's goods. For a combination without a good, the cost of the child's last good is a lower
 bound. The robot's cheapest combination is a good once all children have sent their matching goods for it. Until then it
 asks the children that lack one.
 
@@ -24,7 +24,7 @@ Choices that the paper leaves open, and differences:
 - Domains and sizes are sent as in DPOP, so all combinations are known from the beginning. In the paper, an open problem
   reveals values as they are asked for.
 - A robot asks all children that lack a good at the same time, each once.
-- A robot keeps its costs as a table, of eight bytes a cell, and so has DPOP's need for memory.
+- A robot stores its costs as a table, of eight bytes a cell, and so has DPOP's need for memory.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -43,7 +43,7 @@ import numpy as np
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, table_proves
-from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of, keep_once
+from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of, store_once
 from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -57,7 +57,7 @@ from robochoc.system.plain_text import listed
 class Ask(Message, frozen=True):
     """A request for the receiver's next good."""
 
-    act = Act(Performative.QUERY_REF, "the receiver is to send its next good")
+    act = Act(Performative.QUERY_REF, "the receiver sends its next good")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -73,7 +73,7 @@ class Good(Message, frozen=True):
     assignment: list[int]
     cost: Cost
 
-    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs at least from here on")
+    act = Act(Performative.INFORM, "the receiver learns the least remaining cost of the sender's subtree")
 
     def in_words(self, _: Wording) -> str:
         places = listed([str(place + 1) for place in self.assignment])
@@ -81,13 +81,13 @@ class Good(Message, frozen=True):
         return f"the next best for my subtree costs {cost_text(self.cost)}{where}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: as much as the same cell of a table of DPOP."""
+        """Return the same proofs as for this cell of DPOP's table."""
         axes = axes_of(hearing, hearing.receiver, hearing.sender)
         return NOTHING if axes is None else table_proves(axes, [(self.assignment, self.cost)], hearing)
 
 
 class Done(Message, frozen=True):
-    """The sender has no more goods: all other combinations break something hard."""
+    """The sender has no more goods: all other combinations break a hard constraint."""
 
     act = Act(Performative.INFORM, "the receiver learns that no other combination is possible")
     proves_nothing = True
@@ -101,9 +101,9 @@ class ODPOP(DPOP):
 
     State besides DPOP's:
 
-    - `goods`: for each child the costs of the goods that it has sent (not a number: not sent), by its separator;
+    - `goods`: for each child the costs of its goods (not a number: not sent), by its separator;
     - `last`: for each child the cost of its last good, `inf` if it has no more;
-    - `optimum`: at the root, a lower bound on its tree's cost; in the end it is the optimum.
+    - `optimum`: at the root, a lower bound on its tree's cost; at the end the optimum.
     """
 
     messages = TreeMessage | Domain | Dimensions | Proceed | Ask | Good | Done | VALUE
@@ -131,34 +131,34 @@ class ODPOP(DPOP):
     def handle(self, sender: str, message: Message) -> None:
         match cast("Domain | Dimensions | Proceed | Ask | Good | Done | VALUE", message):
             case Domain(values):
-                keep_once(sender, values, self.domains, self.ancestors)
+                store_once(sender, values, self.domains, self.ancestors)
                 self._measure()
             case Dimensions() as dimensions:
-                self._check(sender, dimensions)
-                keep_once(sender, dimensions, self.dimensions, self.children)
+                self._check_dimensions(sender, dimensions)
+                store_once(sender, dimensions, self.dimensions, self.children)
                 self._measure()
             case Proceed(separator):
                 self._proceed(separator)
             case Ask():
-                self._take_request(sender)
+                self._receive_ask(sender)
             case Good(assignment, cost):
-                self._take_good(sender, assignment, cost)
+                self._receive_good(sender, assignment, cost)
             case Done():
-                self._take_answer(sender, math.inf)
+                self._receive_bound(sender, math.inf)
             case VALUE(assignment):
                 self._value_message_handler(assignment)
             case never:
                 assert_never(never)
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Leave costs as floats: they are added up for each good."""
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of costs as floats, which are added up for each good."""
         cells = len(self.problem.values) * math.prod(self._own_sizes())
         return 40 * cells + sum(10 * table.cells for table in inputs)
 
     # Goods, from the leaves up
 
     def _start_utils(self) -> None:
-        """Add up the own constraints; a root asks itself."""
+        """Add up the costs of this robot's constraints; a root asks itself."""
         shape = [self._sizes[name] for name in self.separator or ()]
         self._local = np.zeros((len(self.problem.values), *shape))
         self._local += np.array(self.problem.charges, np.float64).reshape(-1, *(1 for _ in shape))
@@ -172,37 +172,37 @@ class ODPOP(DPOP):
         self.choices = cast("Codes", np.zeros(shape, np.min_scalar_type(len(self.problem.values))))
         if self.parent is None:
             self._asked = True
-            self._answer()
+            self._ask_or_answer()
 
-    def _take_request(self, sender: str) -> None:
+    def _receive_ask(self, sender: str) -> None:
         if sender != self.parent or self.separator is None or self._asked:
-            raise ValueError(f"{self.problem.agent} is not to be asked now")
+            raise ValueError(f"{sender} sent an unexpected or repeated Ask to {self.problem.agent}")
         self._asked = True
-        self._answer()
+        self._ask_or_answer()
 
-    def _take_good(self, child: str, assignment: Sequence[int], cost: int) -> None:
-        """Store a child's next good. Raises `ValueError` if it is none, or does not come in order."""
+    def _receive_good(self, child: str, assignment: Sequence[int], cost: int) -> None:
+        """Store a child's next good. Raises `ValueError` if it is invalid, or out of order."""
         shape = self.goods[child].shape if child in self.goods else ()
         if len(assignment) != len(shape) or not all(
             0 <= place < size for place, size in zip(assignment, shape, strict=True)
         ):
-            raise ValueError(f"{assignment} are no values of {child}'s separator")
+            raise ValueError(f"{assignment} are not values of {child}'s separator")
         if child in self._waiting:
             if cost < self.last[child] or not np.isnan(self.goods[child][tuple(assignment)]):
-                raise ValueError(f"{child}'s good costs less than its last one, or has come before")
+                raise ValueError(f"{child}'s good costs less than its last one, or is a repeated one")
             self.goods[child][tuple(assignment)] = cost
-        self._take_answer(child, cost)
+        self._receive_bound(child, cost)
 
-    def _take_answer(self, child: str, cost: float) -> None:
-        """Note that all that `child` has not sent costs at least `cost`."""
+    def _receive_bound(self, child: str, cost: float) -> None:
+        """Store that all remaining combinations of `child` cost at least `cost`."""
         if child not in self._waiting:
             raise ValueError(f"{child} was not asked for a good")
         self._waiting.discard(child)
         self.last[child] = cost
-        self._answer()
+        self._ask_or_answer()
 
-    def _answer(self) -> None:
-        """Send the next good if it is known and asked for; otherwise ask the children that lack one."""
+    def _ask_or_answer(self) -> None:
+        """Send the requested next good if it is known; otherwise ask the children that lack one."""
         if not self._asked or self._waiting:
             return
         costs = self._lower_bounds()
@@ -231,7 +231,7 @@ class ODPOP(DPOP):
             self.send(self.parent, Good(list(cell), int(cost)))
 
     def _send_end(self) -> None:
-        """Send that there are no more goods; if there was none, nothing is possible at all."""
+        """Send that there are no more goods; if there was none, there is no solution."""
         if self._unsent.all():
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is not None:
@@ -239,7 +239,7 @@ class ODPOP(DPOP):
             self.send(self.parent, Done())
 
     def _lower_bounds(self) -> Array:
-        """Return a lower bound on the subtree's cost for each own value and each combination of the separator's."""
+        """Return lower bounds on the subtree's cost for each of this robot's values and each combination."""
         costs = self._local
         for child, goods in self.goods.items():
             bounds = np.where(np.isnan(goods), self.last[child], goods)
@@ -247,14 +247,14 @@ class ODPOP(DPOP):
         return costs
 
     def _is_complete(self, child: str, places: Sequence[int]) -> bool:
-        """Return whether `child` has sent its good for these places of the own value and the separator's values."""
+        """Return whether `child` has sent its good for these places of this robot's value and the separator's."""
         view = dict(zip((self.problem.agent, *(self.separator or ())), places, strict=True))
         return not np.isnan(self.goods[child][tuple(view[name] for name in self._axes[child])])
 
     # VALUE, from the root down
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of the own value in the good that was sent for `assignment`."""
+        """Return the place of this robot's value in the good that it sent for `assignment`."""
         if self._unsent[tuple(assignment)]:
             raise ValueError(f"{self.problem.agent} has sent no good for {list(assignment)}")
         return super()._best_value(choices, assignment)

@@ -1,10 +1,10 @@
 """Refined memory-bounded DPOP (RMB-DPOP).
 
-MB-DPOP (see `mb_dpop.py`), with fewer and smaller enumerations. A *cluster* is made of neighbouring robots in the tree
+MB-DPOP (see `mb_dpop.py`), with fewer and smaller enumerations. A *cluster* consists of neighbouring robots in the tree
 whose separators have more than `k` robots; the robot above it is its *cluster root*. Robots are cut (fixed) one by
 one, so that each relieves as many robots of the cluster as possible. A cut robot within the cluster enumerates its own
-values, for its own branch; the cluster root enumerates the others. So branches go on at the same time, and each is
-given only the values that it needs.
+values, for its own branch; the cluster root enumerates the others. So branches work at the same time, and each receives
+only the values that it needs.
 
 - **When to use**: costs, on a pseudo-tree too wide for `dpop`, as `mb-dpop`. With a `k` of the induced width or more it
   is DPOP.
@@ -15,25 +15,25 @@ given only the values that it needs.
 
 Its messages and mechanisms are these methods:
 
-    LABEL, SEP_DEGREE    `_announce`        CONTEXT, distributed enumeration    `_start_context`, `_ask`
-    ALLOCATION           `_allocate`        cache of a child's table            `_ask`
-    UTIL                 `_compute_utils`   CC_VALUE                            `_settle`
+    LABEL, SEP_DEGREE    `_announce_dimensions`    CONTEXT, distributed enumeration    `_start_context`
+    ALLOCATION           `_allocate`               cache of a child's table            `_request_tables`
+    UTIL                 `_compute_utils`          CC_VALUE                            `_apply_cut_values`
 
 How robots are chosen, in a cluster:
 
 - A robot whose separator has more than `k` robots that are not cut yet proposes all of these. Proposals go up, and are
-  added up for each candidate. Of candidates that are not above a robot, it passes only the best on.
+  added up for each candidate. Of candidates that are not above a robot, it sends on only the best.
 - The cluster root chooses the candidate that relieves the most robots; of several, the one nearest to the lowest robot
-  that it relieves. Then it asks again, until nobody proposes any.
+  that it relieves. Then it asks again, until there are no more proposals.
 
 Choices that the paper leaves open, and differences:
 
-- Only branches that proposed a robot learn that it is cut. Where tables are small enough already, it stays an axis.
+- Only branches that proposed a robot learn that it is cut. If tables are small enough already, it remains an axis.
 - A table goes up with the best values of the cut robots below, for each cell (`CutUTIL`). In the end they are sent down
-  once (`CutValue`), so that all of the cluster choose under them. A branch without cut robots, whose last context had
+  once (`CutValue`), so that the whole cluster chooses under them. A branch without cut robots, whose last context had
   the same values, is not asked.
 - Separators are known bottom-up, as in `mb_dpop.py`, and so are memory needs, before any table is made.
-- Of what a cluster root enumerates, the robots that the fewest children depend on change fastest.
+- In the enumeration of a cluster root, the robots that the fewest children depend on change fastest.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -54,7 +54,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.inference.dpop import MOST_AXES, UTIL, VALUE, Cost, Dimensions, Need, Proceed, Size, keep_once
+from robochoc.protocols.inference.dpop import MOST_AXES, UTIL, VALUE, Cost, Dimensions, Need, Proceed, Size, store_once
 from robochoc.protocols.inference.dpop_tables import (
     PIECE,
     Codes,
@@ -67,7 +67,7 @@ from robochoc.protocols.inference.dpop_tables import (
     place_type,
     width_of,
 )
-from robochoc.protocols.inference.mb_dpop import MBDPOP, Axis, Context, Depth, DomainAtDepth, Sizes, is_place
+from robochoc.protocols.inference.mb_dpop import MBDPOP, Context, Depth, DomainAtDepth, SeparatorAxis, Sizes, is_place
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -91,18 +91,18 @@ class Candidate(msgspec.Struct, frozen=True, array_like=True):
 
 
 class ClusterLabel(Message, frozen=True):
-    """The sender's separator; where this is too large, also who may be cut for the sender and its cluster below.
+    """The sender's separator; if it is too large, also the robots that may be cut for the sender and its cluster below.
 
     `dearest`, `induced_width` and `most` are those of DPOP's `Dimensions`.
     """
 
-    separator: dict[str, Axis]
+    separator: dict[str, SeparatorAxis]
     candidates: dict[str, Candidate]
     dearest: Cost
     induced_width: int
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver learns the sender's table, and who may be fixed for it")
+    act = Act(Performative.INFORM, "the receiver learns the sender's separator, and the robots that may be fixed")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -115,12 +115,12 @@ class ClusterLabel(Message, frozen=True):
 
 
 class SepDegree(Message, frozen=True):
-    """The robots that may still be cut for the cluster below; `most` is the largest memory need there by now."""
+    """The robots that may still be cut for the cluster below; `most` is the present largest memory need there."""
 
     candidates: dict[str, Candidate]
     most: Need
 
-    act = Act(Performative.INFORM, "the receiver learns who else may be fixed")
+    act = Act(Performative.INFORM, "the receiver learns which other robots may be fixed")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -128,11 +128,11 @@ class SepDegree(Message, frozen=True):
 
 
 class Allocation(Message, frozen=True):
-    """The cluster root's choice: `robot` is cut, and fixed for the tables that it makes too large."""
+    """The cluster root's choice: `robot` is cut, and fixed for the tables that are too large because of it."""
 
     robot: str
 
-    act = Act(Performative.REQUEST, "the receiver is to make its tables for fixed values of one more robot")
+    act = Act(Performative.REQUEST, "the receiver makes its tables for fixed values of one more robot")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -149,7 +149,7 @@ class CutUTIL(Message, frozen=True):
     costs: bytes
     places: bytes
 
-    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs, and the values for it")
+    act = Act(Performative.INFORM, "the receiver learns the costs of the sender's subtree, and the values for them")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -158,11 +158,11 @@ class CutUTIL(Message, frozen=True):
 
 
 class CutValue(Message, frozen=True):
-    """The optimal values, as places, of the receiver's cut robots: those above it, then those from it down."""
+    """The optimal values, as places, of the receiver's cut robots: first those above it, then those from it down."""
 
     values: list[int]
 
-    act = Act(Performative.REQUEST, "the receiver is to make its table for the optimal values")
+    act = Act(Performative.REQUEST, "the receiver makes its table for the optimal values")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -171,19 +171,19 @@ class CutValue(Message, frozen=True):
 
 
 def _in_words(candidates: dict[str, Candidate]) -> str:
-    told = [f"{robot} (for {counted(one.relieved, 'table')})" for robot, one in candidates.items()]
-    return f"from me down, tables are too large, unless robots are fixed: {listed(told)}"
+    texts = [f"{robot} (for {counted(one.relieved, 'table')})" for robot, one in candidates.items()]
+    return f"from me down, tables are too large, unless robots are fixed: {listed(texts)}"
 
 
 Places = NDArray[np.unsignedinteger[Any]]
 
 
 SCRATCH = 16
-"""Bytes for each cell while results are compared: an index, a mask, and the part of a table that is better."""
+"""The bytes for each cell while results are compared: an index, a mask, and the better part of a table."""
 
 
 def added_up(all_candidates: Iterable[Mapping[str, Candidate]]) -> dict[str, Candidate]:
-    """Return the candidates of several robots or branches together."""
+    """Return the sums of the candidates of several robots or branches."""
     found = dict[str, Candidate]()
     for candidates in all_candidates:
         for name, one in candidates.items():
@@ -205,7 +205,7 @@ def best(candidates: Mapping[str, Candidate]) -> str:
 
 
 def thinned(candidates: Mapping[str, Candidate], above: Mapping[str, int]) -> dict[str, Candidate]:
-    """Return the candidates `above`, and the best of the others: their numbers do not grow any more."""
+    """Return the candidates `above`, and the best of the others, whose numbers cannot grow any more."""
     kept = {name: one for name, one in candidates.items() if name in above}
     others = {name: one for name, one in candidates.items() if name not in above}
     if others:
@@ -214,7 +214,7 @@ def thinned(candidates: Mapping[str, Candidate], above: Mapping[str, int]) -> di
 
 
 class BestTables:
-    """The best of several tables, cell by cell: costs, the own value, and the values of `cut` robots, as places."""
+    """The best of several tables, cell by cell: costs, this robot's value, and values of `cut` robots, as places."""
 
     def __init__(self, shape: Sequence[int], costs: np.dtype[Any], own: int, cut: Sequence[int]) -> None:
         self.costs: Codes = np.full(shape, np.iinfo(costs).max, costs)
@@ -224,7 +224,7 @@ class BestTables:
     def improve(
         self, at: Sequence[slice | int], costs: Codes, choices: Codes | int, places: Sequence[Table | int]
     ) -> None:
-        """Take over, in the part `at` these axes, what is cheaper."""
+        """Adopt the cheaper cells, in the part `at` these axes."""
         part = (*at, ...)
         better = costs < self.costs[part]
         np.copyto(self.costs[part], costs, where=better)
@@ -242,14 +242,14 @@ class BestTables:
 
 
 def bytes_of_best(shape: Sequence[int], width: int, own: int, cut: Sequence[int]) -> int:
-    """Return the peak size of `BestTables` and of what is sent of them."""
+    """Return the peak size of `BestTables` and of its packed pieces."""
     row = place_type(cut or [own]).itemsize * len(cut)
     cells = math.prod(shape)
     return cells * (width + place_type([own]).itemsize + row + SCRATCH) + min(cells, PIECE) * row
 
 
 class IncomingPlaces:
-    """The places of the values of cut robots, of so many values (`cut`), that come with a table of this `shape`."""
+    """The places of cut robots' values that come with a table of this `shape`; `cut`: their numbers of values."""
 
     def __init__(self, shape: Sequence[int], cut: Sequence[int]) -> None:
         self._limits = np.array(cut).reshape(-1, 1)
@@ -257,23 +257,23 @@ class IncomingPlaces:
         self.table: Places = np.empty((len(cut), *shape), place_type(cut))
 
     def add(self, cells: int, piece: bytes) -> None:
-        """Append the next piece, of so many cells. Raises `ValueError` for bytes that do not fit."""
+        """Append the next piece, of `cells` cells. Raises `ValueError` for bytes that do not fit."""
         rows = self.table.reshape(len(self.table), -1)
         if len(piece) != cells * len(rows) * rows.itemsize or cells > rows.shape[1] - self._start:
             raise ValueError(f"{len(piece)} bytes are not the places of {len(rows)} robots for {cells} cells")
         places = np.frombuffer(piece, rows.dtype).reshape(len(rows), cells)
         if (places >= self._limits).any():
-            raise ValueError("a robot has not so many values")
+            raise ValueError(f"a place of a value is too large: the robots have {self._limits.ravel().tolist()} values")
         rows[:, self._start : self._start + cells] = places
         self._start += cells
 
 
 def picked(table: Table, choices: Codes) -> Table:
-    """Return the part of `table` at the own values in `choices`; the own axis is the table's first."""
+    """Return the part of `table` at this robot's values in `choices`; this robot's axis is the table's first."""
     if len(table) == 1:
         return np.broadcast_to(table[0], choices.shape)
-    whole = np.broadcast_to(table, (len(table), *choices.shape))
-    found: Table = np.take_along_axis(whole, choices[np.newaxis].astype(np.intp), 0)[0]
+    full = np.broadcast_to(table, (len(table), *choices.shape))
+    found: Table = np.take_along_axis(full, choices[np.newaxis].astype(np.intp), 0)[0]
     return found
 
 
@@ -287,9 +287,9 @@ class RMBDPOP(MBDPOP):
 
     State besides MB-DPOP's, whose `cut` are here the cut robots above, and `cuts` those above each child:
 
-    - `proposed`: the children's candidates; `candidates`: all together; `awaited`: who is to propose again;
+    - `proposed`: the children's candidates; `candidates`: their sum; `awaited`: children that will propose again;
     - `below`: the cut robots from this one down; `inner`: from each child down;
-    - `best`: the tables of the enumeration; `settled`: whether the cut robots have their last values.
+    - `best`: the tables of the enumeration; `settled`: whether the cut robots have their final values.
     """
 
     messages = TreeMessage | RMBMessage
@@ -315,13 +315,13 @@ class RMBDPOP(MBDPOP):
         self.settled = False
         self._labelled = False
         self._above: dict[str, int] = {}
-        self._asked: dict[str, list[int]] = {}
+        self._requested: dict[str, list[int]] = {}
         self._places: dict[str, IncomingPlaces] = {}
 
     def handle(self, sender: str, message: Message) -> None:
         match cast("RMBMessage", message):
             case ClusterLabel() as label:
-                self._keep_cluster_label(sender, label)
+                self._store_cluster_label(sender, label)
                 self._measure()
             case SepDegree() as degrees:
                 self._sep_degree_handler(sender, degrees)
@@ -331,9 +331,9 @@ class RMBDPOP(MBDPOP):
                 self._places_of(sender).add(len(costs) // width, places)
                 self._util_message_handler(sender, width, costs)
             case CutValue(values):
-                self._take_cut_values(values)
+                self._receive_cut_values(values)
             case UTIL() if self.inner.get(sender) and not self.settled:
-                raise ValueError(f"{sender} sends a table without the values that it is for")
+                raise ValueError(f"{sender} sent a table without the values of its cut robots")
             case DomainAtDepth() | Proceed() | Context() | UTIL() | VALUE() as others:
                 super().handle(sender, others)
             case never:
@@ -342,45 +342,46 @@ class RMBDPOP(MBDPOP):
     # Labels and the choice of cut robots
 
     @property
-    def _crowded(self) -> bool:
-        """Whether the own separator is too large: the robot is in a cluster, below its root."""
+    def _is_in_cluster(self) -> bool:
+        """Whether the separator is too large: the robot is in a cluster, below its root."""
         return len(self._sizes) > self.settings.k
 
-    def _keep_cluster_label(self, child: str, label: ClusterLabel) -> None:
-        """Store a child's label. Raises `ValueError` for one that cannot be."""
+    def _store_cluster_label(self, child: str, label: ClusterLabel) -> None:
+        """Store a child's label. Raises `ValueError` for an impossible one."""
         sizes = {name: axis.size for name, axis in label.separator.items()}
         dimensions = Dimensions(sizes, label.dearest, label.induced_width, label.most)
-        self._check(child, dimensions)
+        self._check_dimensions(child, dimensions)
         if bool(label.candidates) != (len(sizes) > self.settings.k):
-            raise ValueError(f"{child} tells of a separator of {len(sizes)}, and {len(label.candidates)} candidates")
-        keep_once(child, dimensions, self.dimensions, self.children)
-        self._keep_candidates(child, label.candidates)
+            sizes_text = f"a separator of {len(sizes)} robots and {counted(len(label.candidates), 'candidate')}"
+            raise ValueError(f"{child} sent {sizes_text}: exactly separators above {self.settings.k} have candidates")
+        store_once(child, dimensions, self.dimensions, self.children)
+        self._store_candidates(child, label.candidates)
         self.cuts[child], self.inner[child] = {}, {}
         for name, axis in label.separator.items():
             self.depths.setdefault(name, axis.depth)
 
-    def _keep_candidates(self, child: str, candidates: Mapping[str, Candidate]) -> None:
-        """Store a child's candidates. Raises `ValueError` if there are others than of its separator, and one below."""
+    def _store_candidates(self, child: str, candidates: Mapping[str, Candidate]) -> None:
+        """Store a child's candidates. Raises `ValueError` unless they are of its separator, and at most one below."""
         sizes = self.dimensions[child].separator
         others = [name for name in candidates if name not in sizes]
         wrong = any(one.size != sizes.get(name, one.size) for name, one in candidates.items())
         if len(others) > 1 or self.problem.agent in others or wrong:
-            raise ValueError(f"{child} proposes robots that cannot be cut: {', '.join(candidates)}")
+            raise ValueError(f"{child} proposed robots that cannot be cut: {', '.join(candidates)}")
         self.proposed[child] = candidates
 
     def _plan(self) -> None:
-        """Do nothing: the cluster root chooses the robots that are cut."""
+        """Do nothing: the cluster root chooses the cut robots."""
 
-    def _announce(self) -> None:
-        """Tell the parent who may be cut. A cluster root chooses; if nobody needs be cut any more, it has its label."""
+    def _announce_dimensions(self) -> None:
+        """Send the parent the candidates. A cluster root chooses one; without candidates it sends its label."""
         self.candidates = self._all_candidates()
-        if self._crowded:
+        if self._is_in_cluster:
             self.candidates = thinned(self.candidates, self._sizes)
             self._propose()
         elif self.candidates:
             self._allocate(best(self.candidates))
         else:
-            super()._announce()
+            super()._announce_dimensions()
 
     def _all_candidates(self) -> dict[str, Candidate]:
         free = [name for name in self._sizes if name not in self.cut]
@@ -388,45 +389,45 @@ class RMBDPOP(MBDPOP):
         return added_up([own if len(free) > self.settings.k else {}, *self.proposed.values()])
 
     def _propose(self) -> None:
-        """Send the parent the candidates: at first with the label."""
-        width, most = self._extremes()
+        """Send the parent the candidates: the first time with the label."""
+        width, most = self._width_and_need()
         if self._labelled:
             self.send(self.parent or "", SepDegree(self.candidates, most))
         else:
-            self._tell(Dimensions(self._sizes, self._dearest, width, most))
+            self._send_dimensions(Dimensions(self._sizes, self._dearest, width, most))
         self._labelled = True
 
-    def _tell(self, dimensions: Dimensions) -> None:
-        """Send the parent the own label."""
-        axes = {name: Axis(size, self.depths[name]) for name, size in dimensions.separator.items()}
-        candidates = self.candidates if self._crowded else {}
+    def _send_dimensions(self, dimensions: Dimensions) -> None:
+        """Send the parent this robot's label."""
+        axes = {name: SeparatorAxis(size, self.depths[name]) for name, size in dimensions.separator.items()}
+        candidates = self.candidates if self._is_in_cluster else {}
         label = ClusterLabel(axes, candidates, dimensions.dearest, dimensions.induced_width, dimensions.most)
         self.send(self.parent or "", label)
 
     def _sep_degree_handler(self, child: str, degrees: SepDegree) -> None:
-        """Process what a child proposes after an allocation; go on when all that were told have answered."""
+        """Process a child's proposals after an allocation; continue when all awaited children have answered."""
         if child not in self.awaited or degrees.most.bytes < 0:
-            raise ValueError(f"{child} was not asked who may be cut")
-        self._keep_candidates(child, degrees.candidates)
+            raise ValueError(f"{child} sent an unexpected or invalid SepDegree")
+        self._store_candidates(child, degrees.candidates)
         self.dimensions[child] = msgspec.structs.replace(self.dimensions[child], most=degrees.most)
         self.awaited.remove(child)
         if not self.awaited:
-            self._announce()
+            self._announce_dimensions()
 
     def _allocation_handler(self, robot: str) -> None:
         """Process the choice of the cluster root. Raises `ValueError` if this robot did not propose it."""
-        if not self._crowded or not self._labelled or self.awaited or robot not in self.candidates:
+        if not self._is_in_cluster or not self._labelled or self.awaited or robot not in self.candidates:
             raise ValueError(f"{self.problem.agent} did not propose to cut {robot}")
         self._allocate(robot)
         if not self.awaited:
-            self._announce()
+            self._announce_dimensions()
 
     def _allocate(self, robot: str) -> None:
-        """Cut `robot`, and tell the children that proposed it."""
+        """Cut `robot`, and inform the children that proposed it."""
         size = self.candidates[robot].size
         if len(self.cut) + len(self.below) >= MOST_AXES:
-            raise ValueError(f"more than {MOST_AXES} robots are cut")
-        if robot in self._sizes and self._crowded:
+            raise ValueError(f"{self.problem.agent} cannot cut {robot}: {MOST_AXES} robots are cut already")
+        if robot in self._sizes and self._is_in_cluster:
             self.cut[robot] = size
         elif robot in (*self._sizes, self.problem.agent):
             self.enumerated[robot] = size
@@ -439,56 +440,56 @@ class RMBDPOP(MBDPOP):
                 self.awaited.add(child)
                 self.send(child, Allocation(robot))
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Tables stay for the next context, and so do the best costs and values for each cell."""
-        kept = sum(table.cells * table.width for table in inputs)
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of tables stored for the next context, and of the best costs and values for each cell."""
+        stored = sum(table.cells * table.width for table in inputs)
         for child, cut in self.inner.items():
             row = place_type(cut.values()).itemsize * len(cut) if cut else 0
-            kept += math.prod(self._child_sizes(child)) * row
+            stored += math.prod(self._child_sizes(child)) * row
         own, below = len(self.problem.values), [*self.below.values()]
-        return kept + bytes_of_best(self._own_sizes(), width_of(self._dearest), own, below)
+        return stored + bytes_of_best(self._own_sizes(), width_of(self._dearest), own, below)
 
-    # Contexts: each enumerates its part
+    # Contexts: each robot enumerates its part
 
     def _start_inference(self) -> None:
-        """Begin to enumerate, unless it is the parent who gives a context."""
+        """Start to enumerate, unless the parent sends a context."""
         shared = {name: sum(name in cut for cut in self.cuts.values()) for name in self.enumerated}
         self.enumerated = {name: self.enumerated[name] for name in sorted(shared, key=lambda name: -shared[name])}
         if not self.cut:
             self._start_context({})
 
     def _start_context(self, context: dict[str, int]) -> None:
-        """Begin the own enumeration in the parent's context."""
+        """Start this robot's enumeration in the parent's context."""
         self._above, self.choices, self.best = context, None, None
         self._contexts = itertools.product(*map(range, self.enumerated.values()))
         self._next_context()
 
     def _next_context(self) -> bool:
-        """Begin the next context of the own enumeration; return whether there was one."""
+        """Start the next context of this robot's enumeration; return whether there was one."""
         values = next(self._contexts, None)
         if values is not None:
             self.context = {**self._above, **dict(zip(self.enumerated, values, strict=True))}
-            self._ask(self.context)
+            self._request_tables(self.context)
         return values is not None
 
-    def _ask(self, context: Mapping[str, int]) -> None:
-        """Ask the children in the cluster for their tables, but for those whose values are the last ones again."""
+    def _request_tables(self, context: Mapping[str, int]) -> None:
+        """Request tables from the children in the cluster, except those whose values are the last ones again."""
         for child, cut in self.cuts.items():
             values = [context[name] for name in cut]
-            if self._asked.get(child, []) != values:
-                self._forget(child, values)
+            if self._requested.get(child, []) != values:
+                self._discard_table(child, values)
                 self.send(child, Context(values))
 
-    def _forget(self, child: str, values: list[int]) -> None:
-        self._asked[child] = values
+    def _discard_table(self, child: str, values: list[int]) -> None:
+        self._requested[child] = values
         self.utils.pop(child, None)
         self._places.pop(child, None)
 
     def _places_of(self, child: str) -> IncomingPlaces:
-        """Return what has come of the values with a child's table."""
+        """Return the received values that belong to a child's table."""
         cut = self.inner.get(child)
-        if not cut or child not in self._asked or self.settled:
-            raise ValueError(f"{child} was not asked for a table with values")
+        if not cut or child not in self._requested or self.settled:
+            raise ValueError(f"{child} sent a table with values without a request")
         if child not in self._places:
             sizes = self.dimensions[child].separator
             shape = [sizes[name] for name in self._table_axes(child)]
@@ -519,12 +520,12 @@ class RMBDPOP(MBDPOP):
         return [rows[name] if name in rows else context[name] for name in self.below]
 
     def _end_contexts(self, found: BestTables) -> None:
-        """Send the best of all contexts: a robot of a cluster to its parent, as others do in DPOP."""
+        """Send the best of all contexts: a robot of a cluster to its parent, others as in DPOP."""
         self.choices = found.choices
         if self._final is not None:
             self._choose_in_context(self._final)
-        elif not self._crowded:
-            self._pass_on(found.costs)
+        elif not self._is_in_cluster:
+            self._send_or_choose(found.costs)
         elif self.settled or not self.below:
             self._send_table(found.costs)
         else:
@@ -534,40 +535,40 @@ class RMBDPOP(MBDPOP):
     # VALUE, from the root down
 
     def _choose_optimal(self, assignment: Sequence[int]) -> None:
-        """Take the cheapest value; a cluster root first sends the best values of cut robots down."""
-        if self._crowded or not any(self.cuts.values()):
+        """Choose the cheapest value; a cluster root first sends the best values of cut robots down."""
+        if self._is_in_cluster or not any(self.cuts.values()):
             if self.below and not self.settled:
                 raise ValueError(f"{self.problem.agent} does not know the best values of the cut robots")
             self._choose_in_context(assignment)
             return
         if self.best is None or self.choices is None or self._final is not None:
-            raise ValueError(f"{self.problem.agent} has a value already, or no table yet")
+            raise ValueError(f"{self.problem.agent} already has a value, or has no table yet")
         self._final = assignment
         values = dict(zip(self.separator or (), assignment, strict=True))
         rows = zip(self.below, self.best.places, strict=True)
-        self._settle({**values, **{name: int(row[tuple(assignment)]) for name, row in rows}})
+        self._apply_cut_values({**values, **{name: int(row[tuple(assignment)]) for name, row in rows}})
 
-    def _take_cut_values(self, values: Sequence[int]) -> None:
-        """Process the best values of cut robots. Raises `ValueError` if this is not the time, or they are none."""
+    def _receive_cut_values(self, values: Sequence[int]) -> None:
+        """Process the best values of cut robots. Raises `ValueError` if they are unexpected or invalid."""
         cut = {**self.cut, **self.below}
         if not self.cut or self.choices is None or self.settled:
-            raise ValueError(f"{self.problem.agent} is not to be given the best values now")
+            raise ValueError(f"{self.problem.agent} received unexpected values of cut robots")
         if len(values) != len(cut) or not all(map(is_place, values, cut.values())):
-            raise ValueError(f"{values} are no values of {', '.join(cut)}")
-        self._settle(dict(zip(cut, values, strict=True)))
+            raise ValueError(f"{values} are not values of {', '.join(cut)}")
+        self._apply_cut_values(dict(zip(cut, values, strict=True)))
 
-    def _settle(self, values: Mapping[str, int]) -> None:
-        """Pass the best values of cut robots on, and make the own table under them."""
+    def _apply_cut_values(self, values: Mapping[str, int]) -> None:
+        """Send on the best values of cut robots, and make this robot's table under them."""
         self.settled, self.choices, self.best = True, None, None
         self.context = {name: values[name] for name in (*self.cut, *self.enumerated)}
         for child, cut in self.cuts.items():
-            wanted = [values[name] for name in (*cut, *self.inner[child])]
-            if self.inner[child] or self._asked.get(child, []) != wanted:
-                self._forget(child, wanted)
-                self.send(child, CutValue(wanted))
+            needed = [values[name] for name in (*cut, *self.inner[child])]
+            if self.inner[child] or self._requested.get(child, []) != needed:
+                self._discard_table(child, needed)
+                self.send(child, CutValue(needed))
         self._compute_if_complete()
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of the cheapest own value: tables here hold the fixed one if it is fixed."""
+        """Return the place of this robot's cheapest value; the tables here contain its fixed one, if it is fixed."""
         free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
         return int(choices[tuple(free)])

@@ -1,37 +1,38 @@
-"""Self-stabilizing DPOP (S-DPOP): DPOP that keeps what stands when the problem changes.
+"""Self-stabilizing DPOP (S-DPOP): DPOP that reuses its results when the problem changes.
 
-DPOP (see `dpop.py`) whose robots keep their place in the pseudo-tree, their children's tables and their choices. After
-a change, only robots compute anew whose separator, constraint, or child's table has changed. All others send an empty
+DPOP (see `dpop.py`) whose robots store their place in the pseudo-tree, their children's tables and their choices. After
+a change, only robots compute again whose separator, constraint, or child's table has changed. All others send an empty
 message (`Reuse`) instead of a table.
 
 - **When to use**: costs, a pseudo-tree with a small induced width, and a problem that changes during the run.
-- **Guarantees**: complete; each epoch terminates with an optimum, or with a proof that there is no solution. What is
-  kept depends on nothing that a change has invalidated.
-- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
+- **Guarantees**: complete; each epoch terminates with an optimum, or with a proof that there is no solution. Reused
+  results depend on nothing that a change has invalidated.
+- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "S-DPOP: superstabilizing, fault-containing multiagent combinatorial optimization",
   AAAI 2005.
 
 The three parts of the paper are these methods:
 
-    self-stabilizing tree   `change`, `resume`, `_renew`      UTIL propagation    `_measure`, `_reuse`, `_pass_on`
+    self-stabilizing tree   `change`, `resume`, `_start_new_tree`
+    UTIL propagation        `_measure`, `_receive_reuse`, `_send_or_choose`
     VALUE propagation       `_choose_optimal`
 
-An epoch on a tree that stands goes as follows. The root lets all begin (`Check`), and so everyone learns whose domains
-above it have changed. From the leaves up, each robot says whether its table can have changed: `Reuse`, or DPOP's
-`Dimensions`. Where it can, the root lets those robots proceed. A table that turns out to be the same is not sent, but
-`Reuse` once more. Down the tree, VALUE goes to children that have computed, or whose separator has other values.
+An epoch on the tree of the previous epoch is as follows. The root starts it (`Check`), and so all robots learn which
+domains above them have changed. From the leaves up, each robot reports whether its table can have changed: by `Reuse`,
+or DPOP's `Dimensions`. Then the root lets the robots with `Dimensions` proceed. A table that is the same after all is
+not sent, but `Reuse` once more. VALUE is sent to children that have computed, or whose separator has other values.
 
 Choices that the paper leaves open, and differences:
 
 - The runtime propagates the changes to all robots before any robot continues.
-- A robot that has a new neighbour, or has lost its parent, begins a new tree for all that are connected with it, by the
-  first wave of an election (see `shared/dfs.py`). A lost child, or another lost neighbour, needs none. In the paper, a
-  new link needs no new tree if one end is above the other; here that is not known, and tables are reused on the new
-  tree as well.
-- A wave that comes on a tree that stood ends what was begun there. What neighbours sent before their first wave is
-  dropped; who has computed by then computes again.
-- After an epoch in which messages were lost (it was interrupted, or had no solution), all begin anew.
-- A proof of no solution stands as long as constraints come, and values go.
+- A robot that has a new neighbour, or has lost its parent, starts a new tree for all connected robots, by the first
+  wave of an election (see `shared/dfs.py`). A lost child, or another lost neighbour, needs none. In the paper, a new
+  link needs no new tree if one end is above the other; here that is not known, and tables are reused on the new tree as
+  well.
+- A wave on the old tree ends the epoch's work there. Messages that neighbours sent before their first wave are dropped;
+  a robot that has already computed computes again.
+- After an epoch in which messages were lost (it was interrupted, or had no solution), all robots start again.
+- A proof of no solution remains valid if constraints are added or values removed.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -49,7 +50,7 @@ import numpy as np
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.dynamic import DynamicProtocol
-from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Proceed, keep_once
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Proceed, store_once
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, IncomingTable, Table, Width, project, width_of
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
@@ -62,14 +63,14 @@ from robochoc.system.plain_text import listed
 
 
 class Check(Message, frozen=True):
-    """The tree stands; `changed` are the robots above the receiver whose domains have changed.
+    """The tree is unchanged; `changed` are the robots above the receiver whose domains have changed.
 
     Those of them that share a constraint with the receiver send it their domains themselves.
     """
 
     changed: list[str]
 
-    act = Act(Performative.REQUEST, "the receiver is to tell whether its table has changed")
+    act = Act(Performative.REQUEST, "the receiver reports whether its table has changed")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -80,7 +81,7 @@ class Check(Message, frozen=True):
 class Reuse(Message, frozen=True):
     """The sender's table is the one that the receiver has."""
 
-    act = Act(Performative.CONFIRM, "the receiver may go on with the sender's table that it has")
+    act = Act(Performative.CONFIRM, "the receiver may use the sender's last table again")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -92,9 +93,9 @@ class SDPOP(DPOP, DynamicProtocol):
 
     State besides DPOP's, kept from epoch to epoch:
 
-    - `basis`: what the own table was computed from, but for the children's tables;
-    - `sent`: the own table, if the parent has it;
-    - `told`: for each child the values that it was told last.
+    - `basis`: the inputs of this robot's table, without the children's tables;
+    - `sent`: this robot's table, if the parent has it;
+    - `sent_values`: for each child the values that it received last.
     """
 
     messages = TreeMessage | Check | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE
@@ -115,24 +116,24 @@ class SDPOP(DPOP, DynamicProtocol):
         super().__init__(problem, order)
         self.basis: tuple[object, ...] | None = None
         self.sent: Codes | None = None
-        self.told: dict[str, list[int]] = {}
+        self.sent_values: dict[str, list[int]] = {}
         self.known_values: list[Value] = []
-        """The own domain, as robots below know it."""
+        """The domain that robots below know."""
         self._own_tables: list[tuple[Table, tuple[str, ...]]] = []
         self._tabulated: tuple[object, ...] = ()
-        """The costs of which the tables of the own constraints were made."""
+        """The inputs of the tables of this robot's constraints."""
         self._has_new_values = False
-        self._stands = False
-        """Whether the tree is that of the epoch before."""
+        self._is_old_tree = False
+        """Whether the tree is that of the previous epoch."""
         self._needs_tree = False
-        self._unheard: set[str] = set()
-        """Neighbours whose first wave has not come; what they sent before it belongs to a tree that is gone."""
+        self._before_wave: set[str] = set()
+        """Neighbours whose first wave has not arrived; their earlier messages belong to an old tree."""
         self._last_parent: str | None = None
         self._last_optimum: int | None = None
         self._start_epoch()
 
     def _start_epoch(self) -> None:
-        """Forget what an epoch, or a tree, knows by itself."""
+        """Reset the state that belongs to one epoch, or one tree."""
         self._expected: set[str] | None = None
         """Robots above that send their domains; None: not known yet."""
         self._new_domains: dict[str, list[Value]] = {}
@@ -142,14 +143,14 @@ class SDPOP(DPOP, DynamicProtocol):
         self._waiting: set[str] = set()
         self._incoming: dict[str, IncomingTable] = {}
         self._inputs: tuple[object, ...] = ()
-        self._fresh = self._proceeding = self._tables_changed = self._axes_changed = False
+        self._computes = self._proceeding = self._tables_changed = self._axes_changed = False
 
     # The tree
 
     def start(self) -> None:
-        """Begin a tree, with the neighbours that there are now."""
+        """Start a tree with the present neighbours."""
         self.leave_tree()
-        self._unheard = {*self.problem.neighbours}
+        self._before_wave = {*self.problem.neighbours}
         super().start()
 
     def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
@@ -169,16 +170,16 @@ class SDPOP(DPOP, DynamicProtocol):
         self.problem, self.order = problem, order
 
     def resume(self, *, lossless: bool) -> None:
-        """Continue on the tree, if it stands; otherwise begin a new one."""
+        """Continue on the old tree, if possible; otherwise start a new one."""
         if self.verdict is not None:
             return
         self._start_epoch()
         if not lossless:
             self._forget_all()
         if not lossless or self._needs_tree or not self.placed or not self.problem.values:
-            self._renew()
+            self._start_new_tree()
             return
-        self._stands = True
+        self._is_old_tree = True
         around = self.problem.neighbours
         for name in self.children:
             if name not in around:
@@ -191,31 +192,31 @@ class SDPOP(DPOP, DynamicProtocol):
         if self._has_new_values:
             self._send_domain()
         if self.parent is None:
-            self._go([])
+            self._check_subtree([])
 
     def receive(self, sender: str, message: Message) -> None:
-        """Process a message; a wave on a tree that stood ends it."""
+        """Process a message; a wave ends work on the old tree."""
         if self.verdict is not None:
             return
         if isinstance(message, Wave):
-            if self._stands:
-                self.told = {}
-                self._renew()
-            self._unheard.discard(sender)
-        elif sender in self._unheard:
+            if self._is_old_tree:
+                self.sent_values = {}
+                self._start_new_tree()
+            self._before_wave.discard(sender)
+        elif sender in self._before_wave:
             return
         super().receive(sender, message)
 
-    def _renew(self) -> None:
-        """Begin a new tree. What was begun in this epoch is computed again."""
-        if self._fresh:
+    def _start_new_tree(self) -> None:
+        """Start a new tree. This epoch's unfinished work is done again."""
+        if self._computes:
             self.basis = self.sent = None
-        self._stands = self._needs_tree = False
+        self._is_old_tree = self._needs_tree = False
         self._start_epoch()
         self.start()
 
     def start_in_tree(self) -> None:
-        """Keep the tables of those who are still children, and send the own domain to the neighbours below."""
+        """Reuse the tables of robots that are still children, and send the domain to the neighbours below."""
         if self.parent != self._last_parent:
             self.basis = self.sent = None
         self._last_parent = self.parent
@@ -235,11 +236,11 @@ class SDPOP(DPOP, DynamicProtocol):
         self.utils.pop(name, None)
         self.dimensions.pop(name, None)
         self._axes.pop(name, None)
-        self.told.pop(name, None)
+        self.sent_values.pop(name, None)
 
     def _forget_all(self) -> None:
         self.basis = self.sent = self.choices = None
-        for name in [*self.utils, *self.dimensions, *self._axes, *self.told]:
+        for name in [*self.utils, *self.dimensions, *self._axes, *self.sent_values]:
             self._forget_child(name)
 
     # Messages
@@ -247,14 +248,14 @@ class SDPOP(DPOP, DynamicProtocol):
     def handle(self, sender: str, message: Message) -> None:
         match cast("Check | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE", message):
             case Check(changed):
-                self._go(changed)
+                self._check_subtree(changed)
             case Domain(values):
-                keep_once(sender, values, self._new_domains, self.ancestors)
+                store_once(sender, values, self._new_domains, self.ancestors)
                 self._measure()
             case Dimensions() as dimensions:
-                self._keep_dimensions(sender, dimensions)
+                self._store_dimensions(sender, dimensions)
             case Reuse():
-                self._reuse(sender)
+                self._receive_reuse(sender)
             case Proceed(separator):
                 self._proceed(separator)
             case UTIL(width, costs):
@@ -264,32 +265,32 @@ class SDPOP(DPOP, DynamicProtocol):
             case never:
                 assert_never(never)
 
-    def _go(self, changed: Sequence[str]) -> None:
-        """Pass on that the tree stands, and whose domains have changed."""
-        if not self._stands or self._expected is not None:
-            raise ValueError(f"{self.problem.agent} has begun already")
+    def _check_subtree(self, changed: Sequence[str]) -> None:
+        """Start the epoch on the old tree; send the children the robots whose domains have changed."""
+        if not self._is_old_tree or self._expected is not None:
+            raise ValueError(f"{self.problem.agent} has already started this epoch")
         self._expected = {*changed} & {*self.ancestors}
         own = [self.problem.agent] if self._has_new_values else []
         for child in self.children:
             self.send(child, Check([*changed, *own]))
         self._measure()
 
-    # How large tables will be, and whether they stand
+    # The sizes of tables, and whether they are unchanged
 
-    def _keep_dimensions(self, child: str, dimensions: Dimensions) -> None:
+    def _store_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Store the dimensions of a table that may have changed."""
-        self._check(child, dimensions)
+        self._check_dimensions(child, dimensions)
         if child not in self.children or child in self._reports:
-            raise ValueError(f"{child} had nothing to say of this, or has said it already")
+            raise ValueError(f"{child} sent unexpected or repeated Dimensions")
         self.dimensions[child] = dimensions
         self._reports.add(child)
         self._renewed.add(child)
         self._measure()
 
-    def _reuse(self, child: str) -> None:
-        """Process that a child's table stands: it needs not be computed, or turned out to be the same."""
+    def _receive_reuse(self, child: str) -> None:
+        """Reuse a child's table: it did not have to be computed, or is the same after all."""
         if child not in self.utils or child not in self.children or child in self._incoming:
-            raise ValueError(f"{child} says that its table stands, and there is none")
+            raise ValueError(f"{child} sent Reuse, but {self.problem.agent} has no table of it")
         if child not in self._reports:
             self._reports.add(child)
             self._measure()
@@ -297,50 +298,51 @@ class SDPOP(DPOP, DynamicProtocol):
             self._waiting.discard(child)
             self._compute_if_complete()
         else:
-            raise ValueError(f"{child} had nothing to say of this, or has said it already")
+            raise ValueError(f"{child} sent an unexpected or repeated Reuse")
 
     def _measure(self) -> None:
-        """Once all is known that the own table depends on, say that it stands, or how large it will be."""
+        """Once all inputs of this robot's table are known, send Reuse, or its dimensions."""
         if self._expected is None or not self._expected <= self._new_domains.keys():
             return
         if len(self._reports) < len(self.children) or self._inputs:
             return
-        known = {**self.domains, **self._new_domains} if self._stands else self._new_domains
+        known = {**self.domains, **self._new_domains} if self._is_old_tree else self._new_domains
         self.domains = {name: known[name] for name in self.ancestors}
         self._inputs = self._own_inputs()
         if self._renewed or self._inputs != self.basis:
-            self._fresh = True
-            self._report()
+            self._computes = True
+            self._compute_dimensions()
         elif self.parent is not None:
             self.send(self.parent, Reuse())
         else:
             self.optimum = self._last_optimum
 
     def _own_inputs(self) -> tuple[object, ...]:
-        """Return what the own table is computed from, besides the children's tables."""
+        """Return the inputs of this robot's table, besides the children's tables."""
         seen = {name for scope, _ in self.problem.scopes(self.ancestors) for name in scope}
         domains = {name: self.domains[name] for name in seen}
         return self.problem.table_inputs(self.ancestors), domains, {*self.children}
 
-    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Return the bytes of tables that stay: the children's, also while new ones arrive, and the own one as sent."""
+    def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of stored tables: the children's, also while new ones arrive, and this robot's as sent."""
         tables = sum(table.cells * table.width for table in inputs)
         return 2 * (tables + math.prod(self._own_sizes()) * width_of(self._dearest))
 
     def _proceed(self, separator: Sequence[str]) -> None:
-        """Let those children proceed whose tables may have changed, and wait for their tables."""
-        if sorted(separator) != sorted(self._sizes) or not self._fresh or self._proceeding:
-            raise ValueError(f"{self.problem.agent}'s separator is {', '.join(self._sizes)}; {separator} is none")
+        """Let the children proceed whose tables may have changed, and wait for their tables."""
+        if sorted(separator) != sorted(self._sizes) or not self._computes or self._proceeding:
+            own = ", ".join(self._sizes)
+            raise ValueError(f"{self.problem.agent} received axes {list(separator)}, but its separator is {own}")
         if self._need.bytes > self.settings.memory:
-            raise ValueError(f"{self.problem.agent} has no room for its tables, and was told to proceed")
+            raise ValueError(f"{self.problem.agent} must proceed, but has no room for its tables")
         self._proceeding = True
         self._axes_changed = self.separator != tuple(separator)
         self.separator = tuple(separator)
         self._waiting = {*self._renewed}
         for child in self.children:
             if child in self._renewed:
-                wanted = self.dimensions[child].separator
-                self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in wanted)
+                needed = self.dimensions[child].separator
+                self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in needed)
                 self.send(child, Proceed(list(self._axes[child])))
         if self._inputs != self._tabulated:
             tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
@@ -367,7 +369,7 @@ class SDPOP(DPOP, DynamicProtocol):
             self._compute_if_complete()
 
     def _compute_if_complete(self) -> None:
-        """Compute once the children's tables are there; not if nothing turned out to have changed."""
+        """Compute once all children's tables have arrived; not if nothing has changed after all."""
         if self._waiting:
             return
         if self._inputs == self.basis and not self._tables_changed and not self._axes_changed:
@@ -382,11 +384,11 @@ class SDPOP(DPOP, DynamicProtocol):
         shape = [self._sizes[name] for name in self.separator or ()]
         costs, self.choices = project(shape, self.problem.charges, joined, width_of(self._dearest))
         self.basis = self._inputs
-        self._pass_on(costs)
+        self._send_or_choose(costs)
         self._last_optimum = self.optimum
 
     def _send_table(self, costs: Codes) -> None:
-        """Send the parent the own table, unless it has the same one."""
+        """Send the parent this robot's table, unless the parent has the same one."""
         same = self.sent is not None and not self._axes_changed and self.sent.dtype == costs.dtype
         if same and np.array_equal(cast("Codes", self.sent), costs):
             self.send(self.parent or "", Reuse())
@@ -397,13 +399,13 @@ class SDPOP(DPOP, DynamicProtocol):
     # VALUE, from the root down
 
     def _choose_optimal(self, assignment: Sequence[int]) -> None:
-        """Take the cheapest value; tell children who have computed, or whose separator has other values."""
+        """Choose the cheapest value; send VALUE to children that have computed, or whose separator has other values."""
         if self.choices is None:
             raise ValueError(f"{self.problem.agent} has no table yet")
         self.value = self._best_value(self.choices, assignment)
         view = dict(zip((self.problem.agent, *(self.separator or ())), (self.value, *assignment), strict=True))
         for child in self.children:
             places = [view[name] for name in self._axes[child]]
-            if child in self._renewed or self.told.get(child) != places:
-                self.told[child] = places
+            if child in self._renewed or self.sent_values.get(child) != places:
+                self.sent_values[child] = places
                 self.send(child, VALUE(places))

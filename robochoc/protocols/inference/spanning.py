@@ -1,12 +1,13 @@
 """Maximum spanning forests that the robots build themselves, as Boruvka's algorithm does.
 
-Each robot begins as a tree of its own. In a round, each tree finds the heaviest function that leads out of it, and all
+Each robot starts as a tree of its own. In a round, each tree finds the heaviest function that leads out of it, and all
 trees that such functions join become one; so there are at most log2(n) rounds. All robots of a tree know its root, and
-tell it to the neighbours (Fragment). What leads out is reported up the tree (Heaviest), its root chooses (Choice), and
-robots tell their neighbours in other trees whether their function was chosen (Merged). Exactly one function of the new
-tree was chosen from both sides; the higher of its robots is the new root, and tells all of the tree (NewRoot).
+send it to their neighbours (Fragment). The heaviest functions are reported up the tree (Heaviest), its root chooses one
+(Choice), and robots tell their neighbours in other trees whether their function was chosen (Merged). Exactly one
+function of the new tree was chosen from both sides; the higher of its robots is the new root, and informs the whole
+tree (NewRoot).
 
-A robot goes on with a round when it has what it needs for it: messages of one robot arrive in the order in which they
+A robot continues with a round when it has all messages for it: messages of one robot arrive in the order in which they
 were sent, and wait until then. No two functions are equally heavy, as ties are broken by the robots' places in the
 order. (Boruvka 1926; with messages: Gallager, Humblet, Spira: "A distributed algorithm for minimum-weight spanning
 trees", ACM TOPLAS 5(1), 1983, which needs no common rounds, and fewer messages.)
@@ -33,7 +34,7 @@ class Fragment(Message, frozen=True):
 
     root: str
 
-    act = Act(Performative.INFORM, "the receiver learns whether both are in one part of the forest")
+    act = Act(Performative.INFORM, "the receiver learns whether both are in the same part of the forest")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
@@ -41,12 +42,12 @@ class Fragment(Message, frozen=True):
 
 
 class Heaviest(Message, frozen=True):
-    """The heaviest function that leads out of the sender's branch, and its robots. None: no function does."""
+    """The heaviest function that leads out of the sender's branch, and its robots. None: there is none."""
 
     weight: float | None
     ends: Ends | None
 
-    act = Act(Performative.PROPOSE, "the tree is to be joined with another one there")
+    act = Act(Performative.PROPOSE, "a function by which the tree may be joined with another one")
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
@@ -56,7 +57,7 @@ class Heaviest(Message, frozen=True):
 
 
 class Choice(Message, frozen=True):
-    """The robots of the function that joins this tree with another one. None: there is no other; the tree is done."""
+    """The robots of the function that joins this tree with another one. None: there is none; the tree is complete."""
 
     ends: Ends | None
 
@@ -82,7 +83,7 @@ class Merged(Message, frozen=True):
 
 
 class NewRoot(Message, frozen=True):
-    """The root of the tree that several have become; the sender is the receiver's parent."""
+    """The root of the tree after several have been joined; the sender is the receiver's parent."""
 
     root: str
 
@@ -94,14 +95,14 @@ class NewRoot(Message, frozen=True):
 
 
 Heaviness = tuple[float, int, int]
-"""A weight, and what breaks ties."""
+"""A weight, and the robots' ranks, which break ties."""
 
 
 class SpanningProtocol(Protocol):
     """One agent that first builds a maximum spanning forest with the others.
 
-    `weights` are those of the functions with neighbours, known on both sides, when `grow` is called. `parent` (None: a
-    root) and `children` are known when `start_in_tree` is called.
+    `weights` are those of the functions with neighbours, known on both sides, when `start_spanning` is called. `parent`
+    (None: a root) and `children` are known when `start_in_tree` is called.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -119,31 +120,31 @@ class SpanningProtocol(Protocol):
 
     @abstractmethod
     def start_in_tree(self) -> None:
-        """Continue, now that the tree is done."""
+        """Continue; the tree is complete."""
 
     @property
     def children(self) -> list[str]:
-        """The neighbours in the tree but for the parent."""
+        """The neighbours in the tree without the parent."""
         return [name for name in self.joined if name != self.parent]
 
     def receive(self, sender: str, message: Message) -> None:
-        """Keep the message for its stage."""
+        """Store the message for its stage."""
         self._waiting[sender].append(message)
 
     def settle(self) -> None:
-        """Do all that the messages so far are enough for."""
+        """Execute all stages whose messages have arrived."""
         while self.verdict is None and self.stage is not None and self.stage():
             pass
 
-    def heard(self, names: Iterable[str]) -> dict[str, Message] | None:
-        """Return the next message of each of `names`; None if one is missing."""
-        wanted = list(names)
-        if not all(self._waiting[name] for name in wanted):
+    def next_messages(self, names: Iterable[str]) -> dict[str, Message] | None:
+        """Remove and return the next message of each of `names`; None if one is missing."""
+        senders = list(names)
+        if not all(self._waiting[name] for name in senders):
             return None
-        return {name: self._waiting[name].pop(0) for name in wanted}
+        return {name: self._waiting[name].pop(0) for name in senders}
 
-    def grow(self) -> None:
-        """Begin the first round."""
+    def start_spanning(self) -> None:
+        """Start the first round."""
         self._outer = list(self.weights)
         self._next_round()
 
@@ -153,21 +154,21 @@ class SpanningProtocol(Protocol):
         self.stage = self._compare
 
     def _compare(self) -> bool:
-        """Keep the functions that lead out of the tree."""
-        told = self.heard(self._outer)
-        if told is None:
+        """Find the functions that lead out of the tree."""
+        messages = self.next_messages(self._outer)
+        if messages is None:
             return False
-        self._outer = [name for name, one in told.items() if isinstance(one, Fragment) and one.root != self.root]
+        self._outer = [name for name, one in messages.items() if isinstance(one, Fragment) and one.root != self.root]
         self.stage = self._report
         return True
 
     def _report(self) -> bool:
         """Report the heaviest function that leads out of the branch; at the root, choose it."""
-        told = self.heard(self.children)
-        if told is None:
+        messages = self.next_messages(self.children)
+        if messages is None:
             return False
         found = {self._ends(name): self._heaviness(self._ends(name), self.weights[name]) for name in self._outer}
-        for report in told.values():
+        for report in messages.values():
             if isinstance(report, Heaviest) and report.ends is not None and report.weight is not None:
                 found[report.ends] = self._heaviness(report.ends, report.weight)
         best = max(found, key=found.__getitem__) if found else None
@@ -175,19 +176,19 @@ class SpanningProtocol(Protocol):
             self._choose(best)
         else:
             self.send(self.parent, Heaviest(found[best][0] if best else None, best))
-            self.stage = self._hear_choice
+            self.stage = self._receive_choice
         return True
 
-    def _hear_choice(self) -> bool:
-        told = self.heard([] if self.parent is None else [self.parent])
-        if told is None:
+    def _receive_choice(self) -> bool:
+        messages = self.next_messages([] if self.parent is None else [self.parent])
+        if messages is None:
             return False
-        for message in told.values():
+        for message in messages.values():
             self._choose(message.ends if isinstance(message, Choice) else None)
         return True
 
     def _choose(self, ends: Ends | None) -> None:
-        """Tell the children the choice, and neighbours in other trees whether it is their function."""
+        """Send the children the choice, and neighbours in other trees whether it is their function."""
         for child in self.children:
             self.send(child, Choice(ends))
         if ends is None:
@@ -202,21 +203,21 @@ class SpanningProtocol(Protocol):
         self.stage = self._join
 
     def _join(self) -> bool:
-        """Add the functions that were chosen from either side to the tree."""
-        told = self.heard(self._outer)
-        if told is None:
+        """Add the functions chosen from either side to the tree."""
+        messages = self.next_messages(self._outer)
+        if messages is None:
             return False
-        chosen = [name for name, one in told.items() if isinstance(one, Merged) and one.joined]
+        chosen = [name for name, one in messages.items() if isinstance(one, Merged) and one.joined]
         new = [name for name in self._outer if name in chosen or name == self._own_choice]
         self._outer = [name for name in self._outer if name not in new]
         self.joined += new
         if self._own_choice in chosen and self._ends(self._own_choice)[0] == self.problem.agent:
             self._set_root(None, self.problem.agent)
         else:
-            self.stage = self._hear_root
+            self.stage = self._receive_root
         return True
 
-    def _hear_root(self) -> bool:
+    def _receive_root(self) -> bool:
         for name in self.joined:
             waiting = self._waiting[name]
             if waiting and isinstance(waiting[0], NewRoot):

@@ -368,8 +368,8 @@ class DUCT(TreeProtocol):
         if sender != self.parent or self._sampling or self.fixed:
             raise ValueError(f"{sender} requested an unexpected sample from {self.problem.agent}")
         if values.keys() != {*self.separator}:
-            expected, got = ", ".join(self.separator), ", ".join(values)
-            raise ValueError(f"{self.problem.agent} depends on {expected}, but received values of {got}")
+            expected = ", ".join(self.separator)
+            raise ValueError(f"{self.problem.agent} depends on {expected}, but received values of other robots")
         self.view = dict(values)
         key = tuple(values[name] for name in self.separator)
         known = self.known.get(key)
