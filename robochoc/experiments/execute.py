@@ -23,8 +23,9 @@ from robochoc.generators.scenario import random_scenario
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.distributed import FOUND_NOTHING, GAVE_UP
-from robochoc.run.options import CENTRAL, Runtime
+from robochoc.run.options import Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.solver.ace import AceProcess

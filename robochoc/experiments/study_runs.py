@@ -13,9 +13,9 @@ from robochoc.experiments.task import GIVEN, Limits, Setup, options_of
 from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.orders import Order
 from robochoc.run.compatibility.option_rules import refuse_options
-from robochoc.run.defaults import AUTO
-from robochoc.run.options import CENTRAL, Preprocess, Runtime, ScheduleName, Withdrawal
-from robochoc.run.protocol_settings import refuse_settings
+from robochoc.run.compatibility.setting_rules import refuse_settings
+from robochoc.run.defaults import AUTO, CENTRAL
+from robochoc.run.options import Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
 from robochoc.solver.errors import UnsupportedError
 

@@ -11,7 +11,8 @@ from typing import Any
 import msgspec
 
 from robochoc.communication.simulator.channel import ChannelModel
-from robochoc.run.options import CENTRAL, Options, Runtime, ScheduleName
+from robochoc.run.defaults import CENTRAL
+from robochoc.run.options import Options, Runtime, ScheduleName
 
 Parameter = str | int | float | bool
 Content = bytes

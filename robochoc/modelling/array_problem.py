@@ -25,9 +25,9 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.message import encode
 from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
+from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.option_values import texts_by_name
 from robochoc.run.options import Options
-from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import counted

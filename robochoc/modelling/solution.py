@@ -157,7 +157,7 @@ class Solution(Outcome, Mapping[str, object]):
     def _repr_html_(self) -> str:
         from robochoc.modelling.solution_html import solution_html  # noqa: PLC0415 - notebooks only
 
-        return solution_html(self)
+        return solution_html(self, self.problem, self.values)
 
     def _is_foreign(self, variable: ModelVariable) -> bool:
         own = self.variables.get(variable.name)

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING
 
 from robochoc.formats.headline import describe_outcome
 from robochoc.model.cost_units import Cost, cost_shown
+from robochoc.model.outcome import Outcome
 from robochoc.model.problem import AddAgent, ProblemKind, Team
 from robochoc.modelling.html_tables import heading, table
 from robochoc.modelling.team_html import shown_values
 
-if TYPE_CHECKING:
-    from robochoc.modelling.solution import Solution
 
-
-def solution_html(solution: Solution) -> str:
-    """Return the HTML of a solution: a headline, the values, the epochs, and the metrics."""
-    team = solution.problem
+def solution_html(outcome: Outcome, team: Team | None, values: Mapping[str, object]) -> str:
+    """Return the HTML of an outcome: a headline, the user's `values` by variable, the epochs, and the metrics."""
     owner = _owners(team) if team else {}
     plain = team is None or team.kind == ProblemKind.DISCSP
-    metrics = solution.metrics
+    metrics = outcome.metrics
     spent = {
         "messages": f"{sum(metrics.messages.values()):,}",
         "bytes": f"{metrics.bytes:,}",
@@ -30,19 +27,19 @@ def solution_html(solution: Solution) -> str:
     }
     epochs = [
         (number, epoch.opened_by, len(epoch.robots), epoch.verdict, _cost(epoch.cost, plain=plain))
-        for number, epoch in enumerate(solution.epochs)
+        for number, epoch in enumerate(outcome.epochs)
     ]
-    robots = len(team.robots) if team else len({owner.get(name, name) for name in solution.assignment})
+    robots = len(team.robots) if team else len({owner.get(name, name) for name in outcome.assignment})
     parts = (
         heading(
-            f"{solution.team}: {describe_outcome(solution, robots)}",
-            f"{solution.protocols}, {solution.runtime}{', verified' if solution.verified else ''}",
+            f"{outcome.team}: {describe_outcome(outcome, robots)}",
+            f"{outcome.protocols}, {outcome.runtime}{', verified' if outcome.verified else ''}",
         ),
         table(
             ("robot", "variable", "value"),
-            [(owner.get(name, ""), name, shown_values([value])) for name, value in solution.values.items()],
+            [(owner.get(name, ""), name, shown_values([value])) for name, value in values.items()],
         ),
-        table(("withdrawn",), [(name,) for name in solution.withdrawn]),
+        table(("withdrawn",), [(name,) for name in outcome.withdrawn]),
         table(("epoch", "opened by", "robots", "verdict", "cost"), epochs),
         table(tuple(spent), [tuple(spent.values())]),
     )

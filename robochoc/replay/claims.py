@@ -24,9 +24,9 @@ from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search
 from robochoc.run.improvement import Rank
-from robochoc.run.options import CENTRAL
 from robochoc.run.phases import Phase
 from robochoc.run.registry import protocol_by_class
 from robochoc.solver.agent_problem import RunParameters

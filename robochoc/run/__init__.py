@@ -7,7 +7,8 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # that of `typing` would be imported for nothing else
 if TYPE_CHECKING:
-    from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+    from robochoc.run.defaults import CENTRAL
+    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
     from robochoc.run.orchestrator import solve
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Runtime", "ScheduleName", "Withdrawal", "solve"]
@@ -18,6 +19,10 @@ def __getattr__(name: str) -> object:
         from robochoc.run.orchestrator import solve  # noqa: PLC0415 - see above
 
         return solve
+    if name == "CENTRAL":
+        from robochoc.run.defaults import CENTRAL  # noqa: PLC0415 - see above
+
+        return CENTRAL
     if name in __all__:
         from robochoc.run import options  # noqa: PLC0415 - see above
 

@@ -11,8 +11,9 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.choice_rules import RULES
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, max_total, refuse_unfit
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.facts import Facts
-from robochoc.run.options import CENTRAL, Options, Runtime
+from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exact_costs import EXACT, check_exact

@@ -13,8 +13,9 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.context import RunContext
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.evaluation import PhaseAnswer, check_assignment
-from robochoc.run.options import CENTRAL, Options, Withdrawal
+from robochoc.run.options import Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, TeamSolver
 from robochoc.solver.errors import SolverLostError
 from robochoc.verification.absence_reason import absence_reason

@@ -16,11 +16,11 @@ from robochoc.model.orders import Order
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.alternatives import refuse_team
 from robochoc.run.choice_rules import FEW_LOSSES, LOSSY, RULES
+from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.context import RunContext
-from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
+from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.facts import LARGE, Facts, Sizes
-from robochoc.run.options import CENTRAL, Options, Withdrawal
-from robochoc.run.protocol_settings import refuse_settings
+from robochoc.run.options import Options, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_protocols, protocol_named
 from robochoc.solver.compile import CompileError, CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError

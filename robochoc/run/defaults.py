@@ -1,7 +1,9 @@
-"""The protocols that are used unless another one is asked for."""
+"""Names of protocols with a special meaning, and the defaults."""
 
 AUTO = "auto"
 """Requests that a protocol is chosen for the team (`run/choice.py`). No protocol has this name."""
+CENTRAL = "central"
+"""Not a protocol: the central solver decides one model of all files."""
 DEFAULT_PROTOCOL = "abt"
 """For a problem without costs of which nothing else is known."""
 DEFAULT_COST_PROTOCOL = "sfb"

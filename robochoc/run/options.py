@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
-CENTRAL = "central"
-"""The protocol that is none: one model of all files, which ACE decides."""
-
 
 class Runtime(StrEnum):
     """The runtime: a process for each robot, here or on a network; all robots in one thread; or all in arrays."""

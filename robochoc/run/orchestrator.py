@@ -18,12 +18,13 @@ from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.choice import Choice, choose, choose_without_analysis
 from robochoc.run.compatibility.option_rules import refuse_options
+from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, UnfitProtocolError, refuse_unfit
 from robochoc.run.context import RunContext
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.improvement import Audience
-from robochoc.run.options import CENTRAL, Options
-from robochoc.run.protocol_settings import refuse_settings
+from robochoc.run.options import Options
 from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import Environment
 from robochoc.run.this_machine import ThisMachine
@@ -176,7 +177,7 @@ def _solve_distributed(
     except UnfitProtocolError as unfit:
         raise UnsupportedError(f"{unfit}{_alternatives(team, options, complete=unfit.complete)}") from None
     if options.channel is not None:
-        from robochoc.run.radio import refuse_channel  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.run.compatibility.channel_rules import refuse_channel  # noqa: PLC0415 - start-up: seldom asked for
 
         refuse_channel(team, options)
     deployment = ThisMachine(team, context, environment, audience)

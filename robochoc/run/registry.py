@@ -13,8 +13,7 @@ from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
-from robochoc.run.options import CENTRAL
+from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.installed import (
     all_entry_points,

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import Epoch, Session
+from robochoc.journal.events import Began, Observer
+from robochoc.journal.given import TeamWriter
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, told_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
 from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preprocessing, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
+from robochoc.protocols.protocol import Protocol
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files
@@ -22,11 +26,37 @@ from robochoc.run.phases import Phase
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
-from robochoc.run.start_events import StartEvents
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import withdrawal_cost
+
+
+class StartEvents:
+    """Reports to `observer`, if there is one, the start of each search, and of each epoch."""
+
+    def __init__(self, observer: Observer | None) -> None:
+        self._observer = observer
+        self._writer = TeamWriter()
+
+    def report(self, protocol: type[Protocol], start: EpochStart, session: Session | None = None) -> None:
+        """Report that a search begins.
+
+        Args:
+            protocol: the protocol that searches.
+            start: the epoch that begins.
+            session: the session in which it is searched; None if that is opened later.
+        """
+        if self._observer is None:
+            return
+        epoch, number, opened_by = start
+        detail: dict[str, Any] = {"epoch": number, "opened_by": opened_by} if number else {}
+        if protocol.traits.costs:
+            detail["minimises"] = True
+        self._observer(Began(t=0, protocol=protocol.__name__, **detail))
+        fresh = epoch.team.order if session and session.starts_fresh else epoch.restarted
+        lossless = session is None or session.lossless
+        self._observer(self._writer.given(epoch.team, epoch.parameters, epoch.invalidated, fresh=fresh, quiet=lossless))
 
 
 class ThisMachine(Deployment):

@@ -11,7 +11,7 @@ import pytest
 from robochoc.authority.authority import Authority
 from robochoc.authority.certificates import new_key, signing_request
 from robochoc.authority.registry import Right, Role
-from robochoc.communication.network.connection_policy import ConnectionPolicy
+from robochoc.communication.network.master_connection import ConnectionPolicy
 from robochoc.communication.network.router import Router
 from tests.support.authorities import Clock, identity_of
 

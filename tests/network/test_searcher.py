@@ -312,7 +312,7 @@ def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.Monkey
     one.start(0)
     copy = Charge("RC", ("B", "C"), 1, 0)
     assert one.check_constraints({"A": 2, "C": 2}).copies == (copy,)
-    monkeypatch.setattr("robochoc.communication.network.constraint_check.MOST_CHARGES", 1)
+    monkeypatch.setattr("robochoc.communication.network.searcher.MOST_CHARGES", 1)
     assert one.check_constraints({"A": 2, "C": 2}).copies == ()
 
 

@@ -22,8 +22,8 @@ from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.anytime import Anytime, Best, BreadthFirstTree, Paid, Place, Step
 from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run import Options, Runtime, solve
+from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.incumbent import costs_by_cycle
-from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam

@@ -35,7 +35,8 @@ from robochoc.model.constraint import INFINITE, Constraint, Function, Relation, 
 from robochoc.model.expression.bounds import Interval
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Robot, Team
-from robochoc.run.options import CENTRAL, Options
+from robochoc.run.defaults import CENTRAL
+from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.system.orphans import signal_when_orphaned
 

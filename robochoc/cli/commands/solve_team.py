@@ -133,7 +133,7 @@ def _observed(
     """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
     from robochoc.cli.reports.choice import OrderNote
     from robochoc.cli.reports.progress import progress_line, waiting_for_reports
-    from robochoc.run.options import CENTRAL
+    from robochoc.run.defaults import CENTRAL
 
     team, options = run.team, run.choice.options
     is_dynamic = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))

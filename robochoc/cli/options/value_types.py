@@ -62,8 +62,7 @@ class ProtocolName(click.ParamType[str]):
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002 - click's
         """Return the protocols whose names begin with `incomplete`."""
-        from robochoc.run.defaults import AUTO
-        from robochoc.run.options import CENTRAL
+        from robochoc.run.defaults import AUTO, CENTRAL
         from robochoc.run.registry import protocol_names
 
         return _beginning_with(incomplete, (AUTO, *protocol_names(), CENTRAL))

@@ -15,7 +15,7 @@ from robochoc.cli.reports.table import print_table
 from robochoc.formats import on_one_line
 from robochoc.protocols.settings import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.options import CENTRAL
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver import central
 from robochoc.system.compiled_core import docstring

@@ -8,7 +8,7 @@ from robochoc.formats import on_one_line
 from robochoc.model.outcome import Outcome, PseudoTreeNode, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.protocols.shared.dfs import TreeProtocol
-from robochoc.run.options import CENTRAL
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.registry import protocol_named
 
 

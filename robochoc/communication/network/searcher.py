@@ -8,17 +8,18 @@ from __future__ import annotations
 import secrets
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import msgspec
 
 from robochoc.communication.control import RobotMessage, Snapshot
 from robochoc.communication.host import BadMessageError, Host
-from robochoc.communication.network.constraint_check import check_constraints
 from robochoc.communication.network.constraint_records import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.network.control_messages import (
     LATEST,
+    Charge,
     CheckResult,
     Copies,
     DetailedReport,
@@ -30,13 +31,14 @@ from robochoc.communication.network.control_messages import (
     ToPeer,
 )
 from robochoc.communication.network.framing import LARGEST_FRAME, FrameRefusedError
-from robochoc.communication.network.plausibility import fault_of_findings
+from robochoc.communication.network.plausibility import MOST_CHARGES, fault_of_findings
 from robochoc.communication.network.profile import ProfileError, domain_of
 from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
+from robochoc.model.absence import restated
 from robochoc.model.outcome import Metrics
-from robochoc.model.problem import Constraint, ConstraintModel
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
 from robochoc.protocols.findings import NO_FINDINGS, Findings, Trail
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
@@ -46,6 +48,50 @@ from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, constraints_above
+
+
+def check_constraints(
+    epoch: int,
+    robot: Robot,
+    values: Mapping[str, int],
+    learnt: Mapping[str, Sequence[Constraint]],
+) -> CheckResult:
+    """Return the costs of the constraints that `robot` knows.
+
+    Args:
+        epoch: The epoch of the search.
+        robot: The robot.
+        values: The decided values of all variables it knows. Withdrawn robots have none, and constraints over
+            their variables are restated for the others or dropped (`model/absence.py`).
+        learnt: Constraints that it has received from others, by their holders.
+    """
+    parts = [part for child in robot.children for part in child.constraints]
+    known_to_it = (_in_force(one, values) for one in (*robot.private, *robot.shared, *parts))
+    held = [one for one in known_to_it if one is not None]
+    cost = sum(constraint.price(values) for constraint in held)
+    shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model != ConstraintModel.PKC], values))
+    known = [*((child.name, child.copies) for child in robot.children), *learnt.items()]
+    charges = (one for holder, theirs in known for one in _charges(holder, theirs, values))
+    copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have sent any number
+    allowed = cost < INFINITE
+    return CheckResult(epoch, allowed, cost if allowed else 0, len(held), shared, copies)
+
+
+def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:
+    """Yield, by scope, the costs of the `constraints` of `holder` that are in force."""
+    groups: dict[tuple[str, ...], list[Constraint]] = {}
+    for one in constraints:
+        in_force = _in_force(one, values)
+        if in_force is not None:
+            groups.setdefault(tuple(sorted(one.variables)), []).append(in_force)
+    for variables, group in groups.items():
+        yield Charge(holder, variables, len(group), sum(one.price(values) for one in group))
+
+
+def _in_force(constraint: Constraint, values: Mapping[str, int]) -> Constraint | None:
+    """Return `constraint` as restated without the robots that have no values; None if it is dropped."""
+    return restated(constraint, {name for name in constraint.variables if name not in values})
+
 
 _Values = dict[str, int]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from robochoc.run.defaults import MOST_LOSS
-from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.defaults import CENTRAL, MOST_LOSS
+from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 
 LEAST_SEED, LARGEST_SEED = -(2**63), 2**64 - 1

@@ -13,7 +13,8 @@ from robochoc.protocols.requirements import BREAKABLE, unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
-from robochoc.run.options import CENTRAL, Options, Runtime, Withdrawal
+from robochoc.run.defaults import CENTRAL
+from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exclusions import allocation_fault
 from robochoc.system.errors import TransferableError

@@ -27,6 +27,7 @@ from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.choice import choose_for_private_team
 from robochoc.run.compatibility.option_rules import refuse_options
+from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.compatibility.team_rules import refuse_unfit
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.distributed import solve_distributed
@@ -34,7 +35,6 @@ from robochoc.run.improvement import Audience
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
-from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError

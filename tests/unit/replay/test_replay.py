@@ -33,7 +33,7 @@ from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.replay import CannotReplayError, ReplayOptions, replay
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.scenario import ScenarioRun
-from robochoc.run.start_events import StartEvents
+from robochoc.run.this_machine import StartEvents
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.cases import cases

@@ -15,7 +15,7 @@ from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import read_foreign, recognise
 from robochoc.formats.problems import read_problem
 from robochoc.run import Options, Runtime, solve
-from robochoc.run.options import CENTRAL
+from robochoc.run.defaults import CENTRAL
 from tests.support.cases import looped
 from tests.support.task_lists import LIST, imported, mistakes
 
