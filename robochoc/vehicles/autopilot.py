@@ -17,7 +17,7 @@ AWAY = frozenset({"RETURN_TO_LAUNCH", "MISSION", "FOLLOW_ME"})
 
 
 class RefusedError(Exception):
-    """The autopilot has denied a command, or did not answer. The message says which."""
+    """The autopilot has denied a command, or has not answered. The message has the command and the reason."""
 
 
 @dataclass(frozen=True)
@@ -42,29 +42,29 @@ class Telemetry:
     """The time since its last position report, in seconds: a connected vehicle may have lost its position."""
 
     @property
-    def is_heard(self) -> bool:
-        """Return whether heartbeats arrive. Without them, MAVSDK reports stopped motors."""
+    def has_heartbeat(self) -> bool:
+        """Whether heartbeats arrive. Without them, MAVSDK reports stopped motors."""
         return self.silent_s <= SILENCE_S
 
     @property
     def not_ready(self) -> str:
-        """Return the reason why its autopilot refuses to arm; empty if it does not."""
+        """The reason why its autopilot refuses to arm; empty if it does not."""
         return "" if self.healthy else self.problem or "its autopilot is not ready to arm"
 
     @property
     def is_flown_by_others(self) -> bool:
-        """Return whether a person flies the vehicle, or its autopilot by itself."""
+        """Whether a person flies the vehicle, or its autopilot does without us."""
         return self.armed and self.mode in MANUAL | AWAY
 
     @property
-    def mode_and_who(self) -> str:
-        """Return the mode of a vehicle that others fly, and who they may be, in words."""
+    def mode_and_pilot(self) -> str:
+        """The mode of a vehicle that is not flown by us, and who may fly it, in words."""
         who = "a person flies it" if self.mode in MANUAL else "a person flies it, or its own failsafe"
         return f"{self.mode_in_words} ({who})"
 
     @property
     def mode_in_words(self) -> str:
-        """Return the mode in small letters."""
+        """The mode in lower case."""
         return self.mode.lower().replace("_", " ")
 
 
@@ -103,11 +103,11 @@ class Autopilot(ABC):
 
     @abstractmethod
     def hold(self) -> None:
-        """Stay where it is, without us."""
+        """Hold the present place, without further set points."""
 
     @abstractmethod
     def land(self) -> None:
-        """Land where it is, without us."""
+        """Land at the present place, without further commands."""
 
     @abstractmethod
     def close(self) -> None:

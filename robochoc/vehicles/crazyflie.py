@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from robochoc.vehicles.fleet_sink import FleetSink
 from robochoc.vehicles.fleet_source import FleetSource
-from robochoc.vehicles.installed import require
-from robochoc.vehicles.kinds import Kind
+from robochoc.vehicles.kinds import VehicleKind, require_library
 
-require("cflib")
+require_library("cflib")
 
 
 class CrazyflieSink(FleetSink):
     """Flies decisions with Crazyflies."""
 
-    kind = Kind.CRAZYFLIE
+    kind = VehicleKind.CRAZYFLIE
 
 
 class CrazyflieSource(FleetSource):
     """Reports of Crazyflies."""
 
-    kind = Kind.CRAZYFLIE
+    kind = VehicleKind.CRAZYFLIE

@@ -1,7 +1,7 @@
-"""The fleet file: which vehicle each drone is, by which link it is reached, and how it may fly.
+"""The fleet file: the vehicle of each drone, its link, and the limits of its flight.
 
-The place of `mavlink:FILE`, and of `crazyflie:FILE`, is such a file, in YAML (docs/guides/autopilots.md). All of it is
-checked when it is read.
+`mavlink:FILE` and `crazyflie:FILE` name such a file, in YAML (docs/guides/autopilots.md). It is checked completely when
+it is read.
 """
 
 from __future__ import annotations
@@ -17,49 +17,49 @@ from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
 from robochoc.formats.yaml_tree import Node, read_yaml, shown
 from robochoc.vehicles.frames import FAR_M, LATITUDE_MAX, GpsPlace
-from robochoc.vehicles.kinds import Kind, address_of, shared_port
+from robochoc.vehicles.kinds import VehicleKind, address_of, shared_port
 
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
 _PORTS = range(1, 65_536)
-_EXPECTED = "see docs/guides/autopilots.md for what a fleet file has"
+_EXPECTED = "see docs/guides/autopilots.md for the entries of a fleet file"
 _CORNERS, _AXES = 2, 3
 _LARGE = 10**9
 
 
 class FleetError(Exception):
-    """A fleet file that is not as it should be. The message has the file, the line, and what was expected."""
+    """The fleet file is invalid. The message has the file, the line, and the expected content."""
 
 
 class AtEnd(StrEnum):
-    """What vehicles do when a run is over, however it ends."""
+    """The final command to vehicles when a run ends, for any reason."""
 
     LAND = "land"
     HOLD = "hold"
 
 
 class Fence(msgspec.Struct, frozen=True):
-    """A box that no vehicle may leave, in metres: its lowest and its highest corner."""
+    """A box that no vehicle may leave: its lowest and its highest corner, in metres."""
 
     low: Point
     high: Point
 
-    def holds(self, place: Point, margin_m: float = 0.0) -> bool:
-        """Return whether `place` is in the box, or no more than `margin_m` out of it along each axis."""
+    def contains(self, place: Point, margin_m: float = 0.0) -> bool:
+        """Return whether `place` is in the box, or at most `margin_m` outside along each axis."""
         sides = zip(self.low, place, self.high, strict=True)
         return all(low - margin_m <= at <= high + margin_m for low, at, high in sides)
 
-    def holds_above(self, place: Point, margin_m: float = 0.0) -> bool:
-        """Return whether `place` is in the box or right below it, as a place on the ground may be."""
+    def covers(self, place: Point, margin_m: float = 0.0) -> bool:
+        """Return whether `place` is in the box or directly below it, as a place on the ground may be."""
         x, y, z = place
-        return self.holds((x, y, max(z, self.low[2])), margin_m)
+        return self.contains((x, y, max(z, self.low[2])), margin_m)
 
     def __str__(self) -> str:
         return f"{point_text(self.low)} to {point_text(self.high)}"
 
 
-class Link(msgspec.Struct, frozen=True):
-    """The link to a vehicle, as its library names it, and where the vehicle's own origin lies in the team's frame."""
+class VehicleLink(msgspec.Struct, frozen=True):
+    """The link to a vehicle, as its library names it, and the place of the vehicle's origin in the team's frame."""
 
     url: str
     at: Point = (0.0, 0.0, 0.0)
@@ -68,47 +68,47 @@ class Link(msgspec.Struct, frozen=True):
 class Fleet(msgspec.Struct, frozen=True):
     """The content of a fleet file."""
 
-    vehicles: Mapping[str, Link]
+    vehicles: Mapping[str, VehicleLink]
     """By the drones' names."""
     fence: Fence
     origin: GpsPlace | None = None
-    """Where the team's origin lies on the earth. None: places are those of the vehicles' own frames."""
+    """The place of the team's origin on the earth. None: places are in the vehicles' own frames."""
     takeoff_m: float = 2.5
-    """The height of a take-off, above where the vehicle stands."""
+    """The height of a take-off, above the place of the vehicle."""
     near_m: float = 0.5
     """A place is reached within this distance."""
     end: AtEnd = AtEnd.LAND
     patience_s: float = 10.0
-    """A vehicle whose link is silent for so long is lost."""
+    """A vehicle whose link is silent for a longer time counts as lost."""
     time_s: float = 120.0
-    """The longest time that a decision may take to be flown."""
-    kind: Kind = Kind.MAVLINK
+    """The longest time for flying a decision."""
+    kind: VehicleKind = VehicleKind.MAVLINK
     speed_ms: float = 1.0
-    """The highest speed on the way, of a kind that has to be told, in metres a second."""
+    """The highest speed, in m/s, for kinds of vehicles that need it."""
 
     @property
     def connect_s(self) -> float:
-        """Return how long a vehicle that is heard may take until it has told all, in seconds."""
+        """The longest time from the first message of a vehicle until it has reported everything, in seconds."""
         return max(self.patience_s, self.kind.rules.connect_s)
 
     distance_m: float = 1.0
     """The distance that vehicles keep from each other, between their centres."""
     downwash: float = 1.0
-    """So many distances are kept right above each other."""
+    """The vertical distance between vehicles, as a multiple of `distance_m`."""
 
     @property
     def tolerance_m(self) -> float:
-        """Return how far beside its way a vehicle still counts as on it."""
+        """The largest deviation of a vehicle from its line at which it still counts as on it."""
         return min(self.near_m, self.distance_m / 4)
 
 
-def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
+def read_fleet(path: Path, kind: VehicleKind = VehicleKind.MAVLINK) -> Fleet:
     """Return the fleet in the file at `path`. Raises `FleetError`."""
     hint = f"name a fleet file, as in {kind}:fleet.yaml"
     if path == Path():  # --ros mavlink, without a place
-        raise FleetError(f"{kind}: which vehicles is not said; {hint}")
+        raise FleetError(f"{kind}: the fleet file is missing; {hint}")
     try:
-        if path.is_fifo():  # to open it would be to wait for a writer
+        if path.is_fifo():  # opening it would wait for a writer
             content = None
         else:
             with path.open("rb") as file:
@@ -116,7 +116,7 @@ def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
     except OSError as error:
         raise FleetError(on_one_line(f"{path}: {error.strerror}; {hint}")) from None
     if content is None:
-        raise FleetError(on_one_line(f"{path}: is no file; {hint}"))
+        raise FleetError(on_one_line(f"{path}: is not a file; {hint}"))
     if len(content) > BYTES_MAX:
         raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
     try:
@@ -128,7 +128,7 @@ def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
         raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
 
 
-def _fleet(root: Node, kind: Kind) -> Fleet:
+def _fleet(root: Node, kind: VehicleKind) -> Fleet:
     rules = kind.rules
     _check_mapping(root, "a fleet file")
     vehicles, box = (root.needed(key, f"a fleet file of {kind}", _EXPECTED) for key in ("vehicles", "fence"))
@@ -159,8 +159,8 @@ def _fleet(root: Node, kind: Kind) -> Fleet:
     return fleet
 
 
-def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link]:
-    found: dict[str, Link] = {}
+def _vehicles(node: Node, kind: VehicleKind, origin: GpsPlace | None) -> dict[str, VehicleLink]:
+    found: dict[str, VehicleLink] = {}
     names: dict[str, str] = {}
     _check_mapping(node, "'vehicles'")
     for key, entry in node.named():
@@ -169,11 +169,11 @@ def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link
         address = address_of(link.url)
         if address in names:
             problem = f"{shortened(name)} and {shortened(names[address])} have the same link"
-            raise MistakeError(problem, "a vehicle has a link of its own", entry.line)
+            raise MistakeError(problem, "each vehicle needs its own link", entry.line)
         for other, its in found.items():
             if port := shared_port(link.url, its.url):
                 problem = f"{shortened(name)} and {shortened(other)} both receive at port {port} of this machine"
-                raise MistakeError(problem, "only one of them would be heard: give each a port of its own", entry.line)
+                raise MistakeError(problem, "only one of them would get messages: give each its own port", entry.line)
         names[address] = name
         found[name] = link
     if not 0 < len(found) <= VEHICLES_MAX:
@@ -181,25 +181,25 @@ def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link
     return found
 
 
-def _link(node: Node, name: str, kind: Kind, origin: GpsPlace | None) -> Link:
+def _link(node: Node, name: str, kind: VehicleKind, origin: GpsPlace | None) -> VehicleLink:
     if not node.is_mapping:
-        return Link(_url(node, name, kind))
+        return VehicleLink(_url(node, name, kind))
     link = node.needed("link", f"vehicle {shortened(name)}", f"as in link: {kind.rules.example}")
     at = node.get("at")
     if at is None:
-        return Link(_url(link, name, kind))
+        return VehicleLink(_url(link, name, kind))
     if origin:
         raise MistakeError("'at' is for vehicles without GPS", "delete it, or 'origin'", at.line)
-    return Link(_url(link, name, kind), _point(at, "'at'"))
+    return VehicleLink(_url(link, name, kind), _point(at, "'at'"))
 
 
-def _url(node: Node, name: str, kind: Kind) -> str:
+def _url(node: Node, name: str, kind: VehicleKind) -> str:
     text = node.scalar
     found = kind.rules.link.fullmatch(text) if isinstance(text, str) else None
     if isinstance(text, str) and found and (found["port"] is None or int(found["port"]) in _PORTS):
         return text
     raise MistakeError(
-        f"the link of {shortened(name)}, {shortened(shown(text))!r}, is none",
+        f"the link of {shortened(name)}, {shortened(shown(text))!r}, is not valid",
         f"expected {kind.rules.links}",
         node.line,
     )
@@ -223,7 +223,7 @@ def _origin(node: Node) -> GpsPlace:
         )
     if abs(latitude) > LATITUDE_MAX or abs(longitude) > 180 or not -500 <= altitude <= 9_000:  # noqa: PLR2004
         limits = f"latitudes within {LATITUDE_MAX:g}, longitudes within 180 degrees, -500 to 9,000 m"
-        raise MistakeError("'origin' is too far off", f"expected {limits}", node.line)
+        raise MistakeError("'origin' is outside the limits", f"expected {limits}", node.line)
     return GpsPlace(latitude, longitude, altitude)
 
 
@@ -238,7 +238,7 @@ def _point(node: Node, what: str) -> Point:
     values = [_decimal(one) for one in node.items or ()]
     x, y, z = values if len(values) == _AXES else (None, None, None)
     if x is None or y is None or z is None or max(abs(x), abs(y), abs(z)) > FAR_M:
-        raise MistakeError(f"{what} is no place", f"expected [x, y, z] in metres, within {FAR_M:,g}", node.line)
+        raise MistakeError(f"{what} is not a place", f"expected [x, y, z] in metres, within {FAR_M:,g}", node.line)
     return x, y, z
 
 
@@ -266,5 +266,5 @@ def _check_mapping(node: Node, what: str) -> None:
 
 
 def point_text(place: Point) -> str:
-    """Return a place in words, in metres: `3, 1, 2.5`."""
+    """Return a place as text, in metres: `3, 1, 2.5`."""
     return ", ".join(f"{round(at, 2):g}" for at in place)

@@ -1,6 +1,6 @@
-"""The sources `mavlink:FILE` and `crazyflie:FILE`: what the autopilots of a fleet tell becomes reports of the drones.
+"""The sources `mavlink:FILE` and `crazyflie:FILE`: the telemetry of a fleet becomes reports of the drones.
 
-Places and batteries are reported as they come. A vehicle that is out of order, for whatever reason, reports that.
+Poses and battery charges are reported as they arrive. A vehicle that is out of order, for any reason, is reported once.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from robochoc.robots.inbox import MessageInbox
 from robochoc.robots.sink import Fields
 from robochoc.robots.source import REPORTS, ReceivedMessage, Source, SourceError
 from robochoc.vehicles.fleet import FleetError, read_fleet
-from robochoc.vehicles.guard_process import GuardError, shared
-from robochoc.vehicles.kinds import Kind
-from robochoc.vehicles.messages import Phase, State
+from robochoc.vehicles.guard_client import GuardError, shared
+from robochoc.vehicles.kinds import VehicleKind
+from robochoc.vehicles.messages import FlightPhase, VehicleState
 
 _SLICE_S = 0.2
 _CHARGE = 0.01
-"""A charge that differs less from the one that was reported is not reported again."""
+"""Smaller changes of a charge since its last report are not reported."""
 
 
 class FleetSource(Source):
     """Reports of the vehicles in a fleet file. With a sink of the same file it shares their links."""
 
-    kind: ClassVar[Kind]
-    """Of subclasses: whose vehicles these are."""
+    kind: ClassVar[VehicleKind]
+    """The kind of vehicles of a subclass."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -47,11 +47,11 @@ class FleetSource(Source):
 
     @property
     def is_busy(self) -> bool:
-        """Return whether vehicles are on their way to where the newest decision has sent them."""
+        """Whether vehicles are still flying the newest decision."""
         return self._guard.is_flying
 
     def assign(self, namespaces: Mapping[str, str]) -> None:
-        """Take the drones' namespaces. Each vehicle needs one."""
+        """Store the drones' namespaces. Each vehicle needs one."""
         strange = [name for name in self._fleet.vehicles if name not in namespaces]
         if strange:
             known = ", ".join(namespaces)
@@ -62,11 +62,11 @@ class FleetSource(Source):
     def listen(self, topics: Mapping[str, str]) -> None:
         """Report on `topics` from now on."""
         self._topics = topics
-        if self._take not in self._guard.observers:
-            self._guard.observers.append(self._take)
+        if self._report_state not in self._guard.observers:
+            self._guard.observers.append(self._report_state)
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest report that is here, or that comes within `wait_s`."""
+        """Return the oldest report; None if none arrives within `wait_s`."""
         until = time.monotonic() + wait_s
         while True:
             left_s = until - time.monotonic()
@@ -79,15 +79,15 @@ class FleetSource(Source):
                 raise SourceError(str(error)) from error
 
     def close(self) -> None:
-        """Leave the vehicles: the last that leaves brings them to an end."""
+        """Release the vehicles: the last user ends their flights."""
         if not self._is_closed:
             self._is_closed = True
-            if self._take in self._guard.observers:
-                self._guard.observers.remove(self._take)
+            if self._report_state in self._guard.observers:
+                self._guard.observers.remove(self._report_state)
             shared.leave(self._path)
 
-    def _take(self, state: State) -> None:
-        """Report what a state says: in the thread that hears the guard."""
+    def _report_state(self, state: VehicleState) -> None:
+        """Report a state. Called in the thread that reads from the guard."""
         name = state.vehicle
         if state.place is not None:
             x, y, z = state.place
@@ -95,7 +95,7 @@ class FleetSource(Source):
         if state.battery is not None and abs(state.battery - self._charges.get(name, -1.0)) >= _CHARGE:
             self._charges[name] = state.battery
             self._put(name, "battery", {"percentage": state.battery, "present": True})
-        if state.phase == Phase.OUT and name not in self._out:
+        if state.phase == FlightPhase.OUT and name not in self._out:
             self._out.add(name)
             self._put(name, "out_of_order", {"data": state.why})
 

@@ -1,14 +1,14 @@
 """Frames: ours is east, north, up (ENU); an autopilot's is north, east, down (NED), or latitude and longitude.
 
-A place on the earth is developed at the origin, on the ellipsoid WGS 84, with M and N its radii of curvature along
-the meridian and across it, to the second order:
+A place on the earth is expanded around the origin to the second order, on the ellipsoid WGS 84. M and N are its radii
+of curvature along the meridian and across it:
 
     north = (M + h) dlat + east^2 tan(lat0) / (2 (N + h))
     east = (N + h) cos(lat) dlon
 
-That is off by less than 1 mm within 1 km of the origin, and less than 0.2 m within 5 km, for latitudes up to 75
-degrees. Up is the difference of the heights above sea level: it follows the earth, as barometers do, and not the
-plane that touches it (8 cm lower at 1 km).
+The error is less than 1 mm within 1 km of the origin, and less than 0.2 m within 5 km, for latitudes up to 75
+degrees. Up is the difference of the heights above sea level: it follows the curvature of the earth, as barometers do,
+and not the tangent plane (8 cm lower at 1 km).
 
 Source: the radii, J. P. Snyder, "Map Projections: A Working Manual", USGS Professional Paper 1395, 1987, equations
 4-18 to 4-20.
@@ -40,7 +40,7 @@ class GpsPlace(msgspec.Struct, frozen=True):
 
 
 def ned_of(enu: Point) -> Point:
-    """Return north, east, down of a place that is given as east, north, up.
+    """Convert east, north, up to north, east, down.
 
     >>> ned_of((1.0, 2.0, 3.0))
     (2.0, 1.0, -3.0)
@@ -50,12 +50,12 @@ def ned_of(enu: Point) -> Point:
 
 
 def enu_of(ned: Point) -> Point:
-    """Return east, north, up of a place that is given as north, east, down: the same exchange."""
+    """Convert north, east, down to east, north, up."""
     return ned_of(ned)
 
 
 def gps_of(enu: Point, origin: GpsPlace) -> GpsPlace:
-    """Return the place on the earth of a place near `origin`."""
+    """Convert east, north, up of a place near `origin` to a place on the earth."""
     east, north, up = enu
     latitude = radians(origin.latitude)
     meridian_m, normal_m = _radii(origin)
@@ -66,7 +66,7 @@ def gps_of(enu: Point, origin: GpsPlace) -> GpsPlace:
 
 
 def enu_from_gps(place: GpsPlace, origin: GpsPlace) -> Point:
-    """Return east, north, up of a place on the earth near `origin`."""
+    """Convert a place on the earth near `origin` to east, north, up."""
     latitude = radians(origin.latitude)
     meridian_m, normal_m = _radii(origin)
     east = normal_m * cos(radians(place.latitude)) * radians(_in_turn(place.longitude - origin.longitude))

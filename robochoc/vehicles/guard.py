@@ -1,8 +1,8 @@
-"""The guard: a process of its own that owns all links, and brings every vehicle to an end when its parent is gone.
+"""The guard: a separate process that owns all links, and ends all flights when its parent is gone.
 
-Its standard input has orders, its standard output states (`messages.py`). When the input ends, when its parent has
-died, or when it is told to end by SIGTERM, vehicles that were commanded land, or hold, as the fleet file says; then it
-ends. Ctrl-C is left to the parent.
+It reads orders from standard input, and writes states to standard output (`messages.py`). When the input ends, the
+parent has died, or SIGTERM arrives, vehicles that were commanded land, or hold, as set in the fleet file; then the
+guard ends. Ctrl-C is left to the parent.
 
     python -m robochoc.vehicles.guard
 """
@@ -25,21 +25,21 @@ import msgspec
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.vehicles.autopilot import Autopilot
 from robochoc.vehicles.fleet import AtEnd, Fleet
-from robochoc.vehicles.kinds import Kind
+from robochoc.vehicles.kinds import VehicleKind
 from robochoc.vehicles.limits import END_S, TURN_S
 from robochoc.vehicles.messages import (
     LINE_MAX,
     End,
-    Ended,
-    Failed,
     Fly,
     FromGuard,
-    NoWays,
+    GuardEnded,
+    GuardFailed,
+    GuardSetup,
+    NoRoutes,
     Permit,
     Recover,
-    Setup,
-    State,
     ToGuard,
+    VehicleState,
     line_of,
 )
 from robochoc.vehicles.pilot import Pilot
@@ -48,77 +48,77 @@ from robochoc.vehicles.traffic import Traffic
 
 STEP_S = 0.1
 """The time between two steps of a pilot, in seconds."""
-TOLD_S = 0.25
-"""The time between two states of a vehicle that does nothing new, in seconds."""
+REPORT_S = 0.25
+"""The time between two reports of an unchanged state, in seconds."""
 _ORDERS_MAX = 1 << 20
 _SPARE_S = 20.0
-"""Commands of the end may wait some seconds for their answers."""
-Tell = Callable[[FromGuard], None]
+"""The final commands may wait some seconds for their answers."""
+Send = Callable[[FromGuard], None]
 
 
 class _Flight(threading.Thread):
-    """A thread in which one pilot flies."""
+    """The thread of one pilot."""
 
-    def __init__(self, name: str, autopilot: Autopilot, fleet: Fleet, traffic: Traffic, tell: Tell) -> None:
+    def __init__(self, name: str, autopilot: Autopilot, fleet: Fleet, traffic: Traffic, send: Send) -> None:
         super().__init__(name=f"pilot of {name}", daemon=True)
         self.pilot = Pilot(name, autopilot, fleet, traffic)
         self._autopilot = autopilot
-        self._tell = tell
+        self._send = send
 
     def run(self) -> None:
-        """Fly until all is over."""
-        told, told_s = None, 0.0
+        """Fly until the flight has ended."""
+        sent, sent_s = None, 0.0
         try:
             while not self.pilot.ended:
                 state = self.pilot.step()
                 now = time.monotonic()
-                if self._news(state) != told or now - told_s >= TOLD_S or self.pilot.ended:
-                    told, told_s = self._news(state), now
-                    with suppress(Exception):  # what cannot be told is no reason to fly no longer
-                        self._tell(state)
+                if self._reportable(state) != sent or now - sent_s >= REPORT_S or self.pilot.ended:
+                    sent, sent_s = self._reportable(state), now
+                    with suppress(Exception):  # the flight continues without reports
+                        self._send(state)
                 time.sleep(STEP_S)
         finally:
             self._autopilot.close()
 
     @staticmethod
-    def _news(state: State) -> tuple[object, ...]:
+    def _reportable(state: VehicleState) -> tuple[object, ...]:
         return state.phase, state.order, state.why, state.waits_for
 
 
-class Guard:
-    """Owns the vehicles' links. `tell` takes what it has to say; `open_autopilot` opens a link by a vehicle's name."""
+class VehicleGuard:
+    """Owns the vehicles' links. `send` sends a message to the parent; `open_autopilot` opens a link by vehicle name."""
 
-    def __init__(self, fleet: Fleet, open_autopilot: Callable[[str], Autopilot], tell: Tell) -> None:
+    def __init__(self, fleet: Fleet, open_autopilot: Callable[[str], Autopilot], send: Send) -> None:
         self.at_end = fleet.end
         self.end_s = fleet.connect_s + TURN_S + END_S + _SPARE_S
-        """No vehicle takes longer to be brought to an end, unless its pilot hangs."""
-        self._tell = tell
+        """The longest time for ending all flights, unless a pilot hangs."""
+        self._send = send
         self._permitted = False
         self._traffic = Traffic(fleet)
         self._flights = {
-            name: _Flight(name, open_autopilot(name), fleet, self._traffic, tell) for name in fleet.vehicles
+            name: _Flight(name, open_autopilot(name), fleet, self._traffic, send) for name in fleet.vehicles
         }
         for flight in self._flights.values():
             flight.start()
 
-    def take(self, order: ToGuard) -> None:
-        """Obey an order. If that fails, all vehicles are brought to an end."""
+    def obey(self, order: ToGuard) -> None:
+        """Obey an order. If that fails, end all flights."""
         try:
-            self._take(order)
-        except Exception as error:  # noqa: BLE001 - the parent says it; nobody may be left in the air
+            self._obey(order)
+        except Exception as error:  # noqa: BLE001 - the parent reports it; no vehicle may be left in the air
             self.fail(error)
 
     def fail(self, error: Exception) -> None:
-        """Say what has failed, and bring all vehicles to an end."""
-        self._tell(Failed(f"{type(error).__name__}: {shortened(on_one_line(str(error)))}"))
+        """Report a failure, and end all flights."""
+        self._send(GuardFailed(f"{type(error).__name__}: {shortened(on_one_line(str(error)))}"))
         self.end(self.at_end, waits=False)
 
-    def _take(self, order: ToGuard) -> None:
+    def _obey(self, order: ToGuard) -> None:
         match order:
             case Permit():
                 self._permitted = True
             case Fly() if not self._permitted:
-                self._tell(Failed("nothing may be armed: an order to fly came without a permit"))
+                self._send(GuardFailed("arming is not permitted, but an order to fly was received"))
             case Fly():
                 self._fly(order)
             case End():
@@ -133,32 +133,32 @@ class Guard:
         try:
             self._traffic.fly(order.targets)
         except RouteError as error:
-            self._tell(NoWays(str(error)))
+            self._send(NoRoutes(str(error)))
             return
         for name, target in order.targets.items():
             self._flights[name].pilot.fly(order.order, target)
 
     def end(self, how: AtEnd, *, waits: bool) -> None:
-        """Bring all vehicles to an end."""
+        """End all flights."""
         if how == AtEnd.LAND:
-            with suppress(Exception):  # without a plan each lands where it is, after a while
+            with suppress(Exception):  # without a plan each vehicle lands where it is, after some time
                 self._traffic.bring_down()
         for flight in self._flights.values():
             flight.pilot.end(how, waits=waits)
 
     @property
     def ended(self) -> bool:
-        """Return whether all vehicles have been brought to an end."""
+        """Whether all flights have ended."""
         return not self.hanging
 
     @property
     def hanging(self) -> list[str]:
-        """Return the names of vehicles that have not been brought to an end yet."""
+        """The names of vehicles whose flights have not ended."""
         return [name for name, flight in self._flights.items() if flight.is_alive()]
 
 
 class Orders:
-    """Orders from standard input. `over` is True when it has ended, or the parent has died."""
+    """Orders from standard input."""
 
     def __init__(self) -> None:
         self._parent = os.getppid()
@@ -167,12 +167,12 @@ class Orders:
         self._is_closed = False
 
     @property
-    def over(self) -> bool:
-        """Robots' processes, too, may hold the other end of the pipe: so the parent itself counts."""
+    def ended(self) -> bool:
+        """Whether the input has ended, or the parent has died: robots' processes, too, may keep the pipe open."""
         return self._is_closed or os.getppid() != self._parent
 
     def next(self, wait_s: float) -> ToGuard | None:
-        """Return the next order; None if none comes within `wait_s`. Raises `msgspec.DecodeError`."""
+        """Return the next order; None if none arrives within `wait_s`. Raises `msgspec.DecodeError`."""
         if not self._lines and self._is_closed:
             time.sleep(wait_s)
         elif not self._lines and select.select([0], [], [], wait_s)[0]:
@@ -183,10 +183,10 @@ class Orders:
         return msgspec.json.decode(self._lines.popleft(), type=ToGuard) if self._lines else None
 
 
-class _Outlet:
-    """Writes lines to what was standard output; MAVSDK writes a log there, which nobody reads, and cflib its warnings.
+class _LineWriter:
+    """Writes lines to the original standard output. The new one discards the log of MAVSDK and the warnings of cflib.
 
-    It never waits for a parent that does not read: states are dropped then.
+    Writing never waits for a parent that does not read: states are dropped instead.
     """
 
     def __init__(self) -> None:
@@ -196,59 +196,62 @@ class _Outlet:
         os.dup2(nowhere, 1)
         os.close(nowhere)
 
-    def tell(self, message: FromGuard) -> None:
+    def send(self, message: FromGuard) -> None:
         line = line_of(message)
         if len(line) > LINE_MAX:
-            line = line_of(Failed("a message of the guard was too long"))
+            line = line_of(GuardFailed("a message of the guard was too long"))
         try:
             os.write(self._descriptor, line)
-        except OSError:  # full, or nobody is there any more
+        except OSError:  # the pipe is full, or closed
             return
 
 
 def main() -> None:
-    """Guard the vehicles of the fleet that standard input names."""
-    told_to_end = threading.Event()
-    signal.signal(signal.SIGTERM, lambda _number, _frame: told_to_end.set())
+    """Guard the vehicles of the fleet given on standard input."""
+    terminated = threading.Event()
+    signal.signal(signal.SIGTERM, lambda _number, _frame: terminated.set())
     for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGPIPE):
         signal.signal(ignored, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    outlet, orders = _Outlet(), Orders()
+    outlet, orders = _LineWriter(), Orders()
     try:
-        guard = _begun(orders, outlet.tell)
+        guard = _wait_for_setup(orders, outlet.send)
         if guard:
-            watch(guard, orders, told_to_end)
-            outlet.tell(Ended())
-    except Exception as error:  # noqa: BLE001 - the parent says it
-        outlet.tell(Failed(f"{type(error).__name__}: {error}"))
+            serve_orders(guard, orders, terminated)
+            outlet.send(GuardEnded())
+    except Exception as error:  # noqa: BLE001 - the parent reports it
+        outlet.send(GuardFailed(f"{type(error).__name__}: {error}"))
 
 
-def _begun(orders: Orders, tell: Tell) -> Guard | None:
-    """Return the guard of the fleet that is named first; None if the parent is gone before."""
-    while not orders.over:
+def _wait_for_setup(orders: Orders, send: Send) -> VehicleGuard | None:
+    """Return the guard of the fleet in the first `GuardSetup`; None if the parent ends before."""
+    while not orders.ended:
         order = orders.next(STEP_S)
-        if isinstance(order, Setup):
-            return _guard_of(order.fleet, tell)
+        if isinstance(order, GuardSetup):
+            return _guard_of(order.fleet, send)
     return None
 
 
-def _guard_of(fleet: Fleet, tell: Tell) -> Guard:
-    # Imported here: a library may be broken, and the parent says so.
+def _guard_of(fleet: Fleet, send: Send) -> VehicleGuard:
+    # Imported here: a broken library is reported by the parent.
     match fleet.kind:
-        case Kind.MAVLINK:
+        case VehicleKind.MAVLINK:
             from robochoc.vehicles.mavsdk_autopilot import MavsdkAutopilot  # noqa: PLC0415
 
-            return Guard(fleet, lambda name: MavsdkAutopilot(fleet.vehicles[name], fleet.origin), tell)
-        case Kind.CRAZYFLIE:
+            return VehicleGuard(fleet, lambda name: MavsdkAutopilot(fleet.vehicles[name], fleet.origin), send)
+        case VehicleKind.CRAZYFLIE:
             from robochoc.vehicles.cflib_autopilot import CflibAutopilot  # noqa: PLC0415
 
-            return Guard(fleet, lambda name: CflibAutopilot(fleet.vehicles[name], fleet.speed_ms), tell)
+            return VehicleGuard(fleet, lambda name: CflibAutopilot(fleet.vehicles[name], fleet.speed_ms), send)
 
 
-def watch(guard: Guard, orders: Orders, told_to_end: threading.Event) -> None:
-    """Obey orders until all is over; then bring all vehicles to an end. Raises `TimeoutError` if a pilot hangs.
+def serve_orders(guard: VehicleGuard, orders: Orders, terminated: threading.Event) -> None:
+    """Obey orders until all flights have ended, or end them if the parent is gone.
 
-    If the parent dies meanwhile, it is not waited for landings.
+    When the parent dies, landings are not waited for.
+
+    Raises:
+        TimeoutError: A pilot hangs.
     """
     until = math.inf
     while not guard.ended:
@@ -258,15 +261,15 @@ def watch(guard: Guard, orders: Orders, told_to_end: threading.Event) -> None:
             guard.fail(error)
             continue
         if order is not None:
-            guard.take(order)
-        if until == math.inf and (orders.over or told_to_end.is_set()):
+            guard.obey(order)
+        if until == math.inf and (orders.ended or terminated.is_set()):
             until = time.monotonic() + guard.end_s
             guard.end(guard.at_end, waits=False)
         if time.monotonic() > until:
-            raise TimeoutError(f"{', '.join(guard.hanging)}: not brought to an end within {guard.end_s:g} s")
+            raise TimeoutError(f"{', '.join(guard.hanging)}: the flight has not ended within {guard.end_s:g} s")
 
 
 if __name__ == "__main__":
     main()
     sys.stdout.flush()
-    os._exit(0)  # the threads of a library that hangs must not keep it
+    os._exit(0)  # hanging threads of a library must not keep the process alive

@@ -1,7 +1,8 @@
-"""The kinds of vehicles that a fleet may have: how their links are written, and what fits their size."""
+"""The kinds of vehicles in a fleet: the syntax of their links, and defaults that fit their size."""
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,12 +11,12 @@ _HOST = r"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
 
 
 @dataclass(frozen=True)
-class _Rules:
-    """The fields of a fleet file of one kind, and their values where it says nothing."""
+class VehicleRules:
+    """The fields of a fleet file of one kind, and their default values."""
 
     link: re.Pattern[str]
     links: str
-    """The form of a link, told where a text is none."""
+    """The syntax of a link, for error messages."""
     example: str
     entries: tuple[str, ...]
     """Names of entries that other kinds do not have."""
@@ -24,27 +25,27 @@ class _Rules:
     near_m: float
     distance_m: float
     renews_m: float
-    """A vehicle gets a new set point on its line when it is so near to the one before."""
+    """A vehicle gets the next set point on its line when it is within this distance of the last one."""
     connect_s: float
-    """A vehicle that is heard may take so long until it has told all; 0: not longer than a silent one."""
+    """The longest time from the first message of a vehicle until it has reported everything. 0: as a silent one."""
     alone: str
-    """A sentence that says how vehicles behave when the guard is gone, for error messages."""
+    """The behaviour of vehicles without a guard, for error messages."""
 
 
-class Kind(StrEnum):
+class VehicleKind(StrEnum):
     """A kind of vehicle, by the name of its sink."""
 
     MAVLINK = "mavlink"
     CRAZYFLIE = "crazyflie"
 
     @property
-    def rules(self) -> _Rules:
+    def rules(self) -> VehicleRules:
         """Return the rules for fleets of this kind."""
         return _RULES[self]
 
 
 _RULES = {
-    Kind.MAVLINK: _Rules(
+    VehicleKind.MAVLINK: VehicleRules(
         link=re.compile(
             rf"(?:udpin|udpout|tcpin|tcpout)://{_HOST}|serial:///dev/(?!.*\.\.)[A-Za-z0-9._/-]{{1,200}}:\d{{2,8}}",
             re.ASCII,
@@ -58,10 +59,10 @@ _RULES = {
         distance_m=1.0,
         renews_m=2.0,  # ArduCopter brakes for each new one
         connect_s=0.0,
-        alone="vehicles do what their own failsafe says",
+        alone="vehicles follow their own failsafe",
     ),
     # A channel is 0 to 125, that is 2,400 to 2,525 MHz.
-    Kind.CRAZYFLIE: _Rules(
+    VehicleKind.CRAZYFLIE: VehicleRules(
         link=re.compile(
             r"radio://(?:\d{1,2}|[0-9A-Fa-f]{10})/(?:\d{1,2}|1[01]\d|12[0-5])/(?:250K|1M|2M)/[0-9A-Fa-f]{10}"
             r"|udp://[A-Za-z0-9._-]{1,253}:(?P<port>\d{1,5})",
@@ -76,7 +77,7 @@ _RULES = {
         distance_m=0.4,
         renews_m=0.3,  # each is a command by radio, and a new trajectory
         connect_s=60.0,
-        alone="vehicles fly to where they were sent, and hover there",
+        alone="vehicles fly to their targets, and hover there",
     ),
 }
 
@@ -102,7 +103,7 @@ def shared_port(url: str, other: str) -> str:
 
 
 def address_of(url: str) -> str:
-    """Return what a link says of the vehicle alone: a Crazyflie is the same one by every dongle.
+    """Return the part of a link that identifies the vehicle: without the dongle of a Crazyflie.
 
     >>> address_of("radio://1/80/2M/e7e7e7e701")
     'radio 80 2M E7E7E7E701'
@@ -112,3 +113,9 @@ def address_of(url: str) -> str:
         return url
     _, channel, rate, address = rest.split("/")
     return f"radio {int(channel)} {rate} {address.upper()}"
+
+
+def require_library(library: str) -> None:
+    """Raise `ModuleNotFoundError` if `library` is not installed. Only the guard process imports it."""
+    if importlib.util.find_spec(library) is None:
+        raise ModuleNotFoundError(f"No module named {library!r}", name=library)

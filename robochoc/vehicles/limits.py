@@ -1,4 +1,4 @@
-"""The times that a pilot waits, and the distances that a vehicle may stray: the same for all vehicles."""
+"""The waiting times of a pilot, and the tolerances of positions: the same for all vehicles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ CLIMB_S = 30.0
 MODE_S = 3.0
 """The time within which a vehicle reports a new mode, in seconds: heartbeats come once a second."""
 OUTSIDE_M = 1.0
-"""A vehicle in the air may be that far out of the fence before it is made to land."""
+"""A vehicle in the air that is farther outside of the fence is made to land."""
 RETRY_S = 0.5
 """The interval between refused commands at the end, in seconds."""
 END_S = 10.0
@@ -19,7 +19,6 @@ TURN_S = 60.0
 GIVE_WAY_S = 20.0
 """The longest wait of a vehicle out of order until no vehicle is right below it, in seconds."""
 SILENCE_S = 2.0
-"""After a longer silence a vehicle that has left our mode did so for want of set points: a heartbeat a second is usual.
-"""
+"""A vehicle that leaves our mode after a longer silence may have lacked set points. Heartbeats come once a second."""
 CLIMBED = 0.9
-"""The part of a take-off's height from which on the vehicle is sent elsewhere."""
+"""The share of the take-off height at which the take-off is complete."""

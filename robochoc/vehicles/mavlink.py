@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from robochoc.vehicles.fleet_sink import FleetSink
 from robochoc.vehicles.fleet_source import FleetSource
-from robochoc.vehicles.installed import require
-from robochoc.vehicles.kinds import Kind
+from robochoc.vehicles.kinds import VehicleKind, require_library
 
-require("mavsdk")
+require_library("mavsdk")
 
 
 class MavlinkSink(FleetSink):
     """Flies decisions with vehicles that speak MAVLink."""
 
-    kind = Kind.MAVLINK
+    kind = VehicleKind.MAVLINK
 
 
 class MavlinkSource(FleetSource):
     """Reports of vehicles that speak MAVLink."""
 
-    kind = Kind.MAVLINK
+    kind = VehicleKind.MAVLINK

@@ -11,7 +11,7 @@ from robochoc.flight.layout import Point
 from robochoc.vehicles.fleet import AtEnd, Fleet
 
 
-class Phase(StrEnum):
+class FlightPhase(StrEnum):
     """The phase of a vehicle's flight."""
 
     CONNECTING = "connecting"
@@ -22,55 +22,55 @@ class Phase(StrEnum):
     LANDING = "landing"
     LANDED = "landed"
     OUT = "out"
-    """Out of order: `why` says for what reason. It is brought to the ground if that is possible."""
+    """Out of order, for the reason in `why`. The vehicle is brought to the ground if that is possible."""
 
 
-class Target(msgspec.Struct, frozen=True):
+class VehicleTarget(msgspec.Struct, frozen=True):
     """The target of a vehicle, in the team's frame; it `lands` there, or stays in the air."""
 
     at: Point
     lands: bool = False
 
 
-class Setup(msgspec.Struct, frozen=True, tag=True):
-    """To the guard, first of all."""
+class GuardSetup(msgspec.Struct, frozen=True, tag=True):
+    """To the guard, as the first message."""
 
     fleet: Fleet
 
 
 class Permit(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: vehicles may be armed. Without it no vehicle is commanded."""
+    """To the guard: vehicles may be armed. Before this message no vehicle is commanded."""
 
 
 class Fly(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: fly to these places. Orders are numbered; a later one takes the place of an earlier one."""
+    """To the guard: fly to these places. Orders are numbered; a later order replaces an earlier one."""
 
     order: int
-    targets: Mapping[str, Target]
+    targets: Mapping[str, VehicleTarget]
 
 
 class End(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: bring all to an end. With `waits` it stays until those that land are on the ground."""
+    """To the guard: end all flights. With `waits` it continues until landing vehicles are on the ground."""
 
     how: AtEnd
     waits: bool
 
 
 class Recover(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: bring to an end what another guard, which was lost, has left armed."""
+    """To the guard: end the flights of vehicles that a lost guard has left armed."""
 
     how: AtEnd
 
 
-class State(msgspec.Struct, frozen=True, tag=True):
+class VehicleState(msgspec.Struct, frozen=True, tag=True):
     """From the guard: the state of a vehicle, several times a second."""
 
     vehicle: str
-    phase: Phase
+    phase: FlightPhase
     order: int = 0
-    """The newest order that it has taken up."""
+    """The newest order that it has accepted."""
     place: Point | None = None
-    """In the team's frame; None: not known yet."""
+    """In the team's frame; None: not reported yet."""
     battery: float | None = None
     """1 is full; None: not measured."""
     healthy: bool = False
@@ -80,29 +80,29 @@ class State(msgspec.Struct, frozen=True, tag=True):
     """Whether it was ever commanded."""
     why: str = ""
     waits_for: str = ""
-    """Another vehicle, which has to be out of the way first."""
+    """Another vehicle, which has to move out of the way first."""
 
 
-class Ended(msgspec.Struct, frozen=True, tag=True):
-    """From the guard, last of all: every vehicle has been brought to an end."""
+class GuardEnded(msgspec.Struct, frozen=True, tag=True):
+    """From the guard, as the last message: all flights have ended."""
 
 
-class NoWays(msgspec.Struct, frozen=True, tag=True):
-    """From the guard: an order is not flown, as no ways were found that keep vehicles apart."""
-
-    why: str
-
-
-class Failed(msgspec.Struct, frozen=True, tag=True):
-    """From the guard: it cannot do its work."""
+class NoRoutes(msgspec.Struct, frozen=True, tag=True):
+    """From the guard: an order is not flown, since no routes were found that keep vehicles apart."""
 
     why: str
 
 
-ToGuard = Setup | Permit | Fly | End | Recover
-FromGuard = State | NoWays | Ended | Failed
+class GuardFailed(msgspec.Struct, frozen=True, tag=True):
+    """From the guard: it has failed."""
+
+    why: str
+
+
+ToGuard = GuardSetup | Permit | Fly | End | Recover
+FromGuard = VehicleState | NoRoutes | GuardEnded | GuardFailed
 LINE_MAX = 4096
-"""Longer lines are not sent by the guard: a pipe takes shorter ones whole, or not at all (PIPE_BUF)."""
+"""The guard sends no longer lines: a pipe accepts shorter ones completely, or not at all (PIPE_BUF)."""
 
 
 def line_of(message: ToGuard | FromGuard) -> bytes:

@@ -20,7 +20,6 @@ from typing import ClassVar, NamedTuple
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.vehicles.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
-from robochoc.vehicles.craft import Clearance
 from robochoc.vehicles.fleet import AtEnd, Fleet, point_text
 from robochoc.vehicles.limits import (
     CLIMB_S,
@@ -33,9 +32,9 @@ from robochoc.vehicles.limits import (
     RETRY_S,
     TURN_S,
 )
-from robochoc.vehicles.messages import Phase, State, Target
+from robochoc.vehicles.messages import FlightPhase, VehicleState, VehicleTarget
 from robochoc.vehicles.takeover import Takeover
-from robochoc.vehicles.traffic import Traffic
+from robochoc.vehicles.traffic import Clearance, Traffic
 
 _NOT_OURS = "it no longer follows set points: its mode is"
 
@@ -45,11 +44,11 @@ Action = Callable[["Pilot", Telemetry, str], object]
 """An action; its last argument is the reason. The state changes unless it returns False."""
 
 
-def _always(_pilot: Pilot, _seen: Telemetry) -> bool:
+def _always(_pilot: Pilot, _telemetry: Telemetry) -> bool:
     return True
 
 
-def _nothing(_pilot: Pilot, _seen: Telemetry, _reason: str) -> None:
+def _nothing(_pilot: Pilot, _telemetry: Telemetry, _reason: str) -> None:
     pass
 
 
@@ -57,20 +56,24 @@ class Transition(NamedTuple):
     """A row of a table."""
 
     name: str
-    states: frozenset[Phase]
+    states: frozenset[FlightPhase]
     event: Condition
     guard: Condition = _always
     action: Action = _nothing
-    next: Phase | None = None
+    next: FlightPhase | None = None
     """The next state; None: the same."""
     ends: bool = False
-    """True if nothing more follows."""
+    """True if the flight has ended."""
 
 
-_ALL = frozenset(Phase)
-_CONNECTING, _READY, _CLIMBING = (frozenset({phase}) for phase in (Phase.CONNECTING, Phase.READY, Phase.CLIMBING))
-_FLYING, _ARRIVED, _LANDING = (frozenset({phase}) for phase in (Phase.FLYING, Phase.ARRIVED, Phase.LANDING))
-_LANDED, _OUT = (frozenset({phase}) for phase in (Phase.LANDED, Phase.OUT))
+_ALL = frozenset(FlightPhase)
+_CONNECTING, _READY, _CLIMBING = (
+    frozenset({phase}) for phase in (FlightPhase.CONNECTING, FlightPhase.READY, FlightPhase.CLIMBING)
+)
+_FLYING, _ARRIVED, _LANDING = (
+    frozenset({phase}) for phase in (FlightPhase.FLYING, FlightPhase.ARRIVED, FlightPhase.LANDING)
+)
+_LANDED, _OUT = (frozenset({phase}) for phase in (FlightPhase.LANDED, FlightPhase.OUT))
 _GROUND = _READY | _LANDED
 _WAY = _FLYING | _ARRIVED
 _AIR = _CLIMBING | _WAY
@@ -83,7 +86,7 @@ class Pilot:
     """
 
     ended: bool = False
-    """True once the flight of the vehicle has ended: nothing more follows."""
+    """True once the flight of the vehicle has ended."""
 
     def __init__(
         self,
@@ -99,11 +102,11 @@ class Pilot:
         self._traffic = traffic
         self._clock = clock
         self._begun_s, self._since_s = math.inf, clock()
-        self._phase = Phase.CONNECTING
+        self._phase = FlightPhase.CONNECTING
         self._why = ""
-        self._wanted: tuple[int, Target] | None = None
+        self._requested: tuple[int, VehicleTarget] | None = None
         self._order = 0
-        self._target: Target | None = None
+        self._target: VehicleTarget | None = None
         self._climb_to = -math.inf
         self._commanded = False
         self._takeover = Takeover(clock)
@@ -111,16 +114,16 @@ class Pilot:
         self._how, self._waits = AtEnd.LAND, False
         self._end_begun_s = self._turn_s = self._retry_s = -math.inf
         self._obeyed = self._was_armed = self._recovers = self._is_due = False
-        self._seen = Telemetry()
+        self._telemetry = Telemetry()
         self._clearance = Clearance()
         self._sent: Clearance | None = None
 
-    def fly(self, order: int, target: Target) -> None:
-        """Replace the order by another."""
-        self._wanted = order, target
+    def fly(self, order: int, target: VehicleTarget) -> None:
+        """Replace the order."""
+        self._requested = order, target
 
     def end(self, how: AtEnd, *, waits: bool) -> None:
-        """Request the end of the flight. A second call may no longer wait."""
+        """Request the end of the flight. A second call may drop the wait."""
         self._ending = how, waits
 
     def recover(self, how: AtEnd) -> None:
@@ -128,67 +131,69 @@ class Pilot:
         self._recovers = True
         self._ending = how, False
 
-    def step(self) -> State:
+    def step(self) -> VehicleState:
         """Execute the next transition, and return the state of the vehicle."""
         try:
-            self._seen = self._autopilot.telemetry()
-            self._react(self._seen)
-        except Exception as error:  # noqa: BLE001 - whatever it was, no vehicle may be left in the air
+            self._telemetry = self._autopilot.telemetry()
+            self._react(self._telemetry)
+        except Exception as error:  # noqa: BLE001 - for any error: no vehicle may be left in the air
             self._fail(f"its pilot failed: {type(error).__name__}: {shortened(on_one_line(str(error)))}")
         if self._commanded:
             self._takeover.command()
-        seen = self._seen
-        told = seen.place, seen.battery, seen.healthy, seen.in_air
-        return State(self.name, self._phase, self._order, *told, self._commanded, self._why, self._clearance.waits_for)
+        telemetry = self._telemetry
+        reported = telemetry.place, telemetry.battery, telemetry.healthy, telemetry.in_air
+        return VehicleState(
+            self.name, self._phase, self._order, *reported, self._commanded, self._why, self._clearance.waits_for
+        )
 
-    def _react(self, seen: Telemetry) -> None:
+    def _react(self, telemetry: Telemetry) -> None:
         """Record the telemetry, and execute the next transition."""
-        self._was_armed = self._was_armed or (self._commanded and seen.armed)
+        self._was_armed = self._was_armed or (self._commanded and telemetry.armed)
         if self._commanded:
-            self._takeover.note(seen)
-        self._traffic.see(self.name, seen.place, in_air=seen.in_air)
+            self._takeover.record(telemetry)
+        self._traffic.update_place(self.name, telemetry.place, in_air=telemetry.in_air)
         try:
             if self._recovers:
-                self._run(self.RECOVERY, seen)
+                self._run(self.RECOVERY, telemetry)
             elif self._ending:
                 self._how, self._waits = self._ending
                 if not math.isfinite(self._end_begun_s):
                     self._end_begun_s = self._turn_s = self._clock()
-                self._run(self.END, seen)
+                self._run(self.END, telemetry)
             else:
-                self._run(self.FLIGHT, seen)
+                self._run(self.FLIGHT, telemetry)
         except RefusedError as refused:
-            self._drop_out(seen, str(refused))
+            self._drop_out(telemetry, str(refused))
 
-    def _run(self, table: tuple[Transition, ...], seen: Telemetry) -> None:
+    def _run(self, table: tuple[Transition, ...], telemetry: Telemetry) -> None:
         """Execute the first row of `table` that applies. The event of adjacent rows is evaluated once."""
         event, found = None, None
         for row in table:
             if self._phase not in row.states:
                 continue
             if row.event is not event:
-                event, found = row.event, row.event(self, seen)
-            if found and (reason := row.guard(self, seen)):
+                event, found = row.event, row.event(self, telemetry)
+            if found and (reason := row.guard(self, telemetry)):
                 text = next((text for text in (reason, found) if isinstance(text, str)), "")
-                self._execute(row, seen, text)
+                self._execute(row, telemetry, text)
                 return
 
-    def _execute(self, row: Transition, seen: Telemetry, reason: str) -> None:
-        if row.action(self, seen, reason) is not False and row.next is not None:
+    def _execute(self, row: Transition, telemetry: Telemetry, reason: str) -> None:
+        if row.action(self, telemetry, reason) is not False and row.next is not None:
             self._enter(row.next)
         self.ended = self.ended or row.ends
 
-    def _enter(self, phase: Phase) -> None:
+    def _enter(self, phase: FlightPhase) -> None:
         self._phase, self._since_s = phase, self._clock()
 
     def _fail(self, why: str) -> None:
-        """Make a vehicle land whose step has failed, by its last telemetry. Traffic may be the cause of the failure."""
+        """Land a vehicle whose step has failed, using its last telemetry. `Traffic` may be the cause of the failure."""
         with suppress(Exception):
-            if self._phase != Phase.OUT:
-                self._drop_out(self._seen, why)
+            if self._phase != FlightPhase.OUT:
+                self._drop_out(self._telemetry, why)
         with suppress(Exception):
             if self._commanded and not self._obeyed:
-                self._obeyed = self._is_brought_down(self._seen, AtEnd.LAND)
+                self._obeyed = self._is_brought_down(self._telemetry, AtEnd.LAND)
         if self._ending:
             self._end_begun_s = max(self._end_begun_s, self._since_s)
             is_due = self._commanded or self._recovers
@@ -196,178 +201,178 @@ class Pilot:
 
     # Events of the link
 
-    def _opens(self, _seen: Telemetry) -> bool:
+    def _opens(self, _telemetry: Telemetry) -> bool:
         return self._autopilot.connect()
 
-    def _connects(self, seen: Telemetry) -> bool:
-        return self._autopilot.connect() and seen.place is not None
+    def _connects(self, telemetry: Telemetry) -> bool:
+        return self._autopilot.connect() and telemetry.place is not None
 
-    def _connects_too_late(self, seen: Telemetry) -> str:
-        self._begun_s = min(self._begun_s, self._clock())  # opening the link takes time, too
-        limit_s = self._connect_limit_s(seen)
+    def _connects_too_late(self, telemetry: Telemetry) -> str:
+        self._begun_s = min(self._begun_s, self._clock())  # opening the link takes time as well
+        limit_s = self._connect_limit_s(telemetry)
         if self._clock() - self._begun_s <= limit_s:
             return ""
-        missing = "has told no place" if seen.mode or seen.connecting else "is not heard"
-        return f"it {missing} on {self._autopilot.url} within {limit_s:g} s"
+        missing = "place reported" if telemetry.mode or telemetry.connecting else "message received"
+        return f"no {missing} on {self._autopilot.url} within {limit_s:g} s"
 
-    def _opens_too_late(self, seen: Telemetry) -> bool:
-        return self._clock() - self._since_s > self._connect_limit_s(seen)
+    def _opens_too_late(self, telemetry: Telemetry) -> bool:
+        return self._clock() - self._since_s > self._connect_limit_s(telemetry)
 
-    def _connect_limit_s(self, seen: Telemetry) -> float:
-        return self._fleet.connect_s if seen.connecting else self._fleet.patience_s
+    def _connect_limit_s(self, telemetry: Telemetry) -> float:
+        return self._fleet.connect_s if telemetry.connecting else self._fleet.patience_s
 
-    def _is_silent(self, seen: Telemetry) -> str:
+    def _is_silent(self, telemetry: Telemetry) -> str:
         limit_s = self._fleet.patience_s
-        return f"its link has been silent for {limit_s:g} s" if seen.silent_s > limit_s else ""
+        return f"its link has been silent for {limit_s:g} s" if telemetry.silent_s > limit_s else ""
 
-    def _place_is_old(self, seen: Telemetry) -> str:
+    def _place_is_outdated(self, telemetry: Telemetry) -> str:
         limit_s = self._fleet.patience_s
-        return f"it has not told its place for {limit_s:g} s" if seen.place_age_s > limit_s else ""
+        return f"no place reported for {limit_s:g} s" if telemetry.place_age_s > limit_s else ""
 
     # Events of the vehicle in the air
 
-    def _is_taken_over(self, seen: Telemetry) -> str:
-        return f"{_NOT_OURS} {seen.mode_and_who}" if self._takeover.has_come(seen) else ""
+    def _is_taken_over(self, telemetry: Telemetry) -> str:
+        return f"{_NOT_OURS} {telemetry.mode_and_pilot}" if self._takeover.detect(telemetry) else ""
 
-    def _takeover_lasts(self, seen: Telemetry) -> str:
+    def _takeover_lasts(self, telemetry: Telemetry) -> str:
         """A landing vehicle may report another mode for a moment."""
-        return self._is_taken_over(seen) if self._takeover.lasts else ""
+        return self._is_taken_over(telemetry) if self._takeover.lasts else ""
 
-    def _alarm(self, seen: Telemetry) -> str:
-        return seen.alarm
+    def _alarm(self, telemetry: Telemetry) -> str:
+        return telemetry.alarm
 
-    def _leaves_fence(self, seen: Telemetry) -> str:
-        if seen.place and seen.in_air and not self._fleet.fence.holds_above(seen.place, OUTSIDE_M):
-            return f"it has left the fence, at {point_text(seen.place)}"
+    def _leaves_fence(self, telemetry: Telemetry) -> str:
+        if telemetry.place and telemetry.in_air and not self._fleet.fence.covers(telemetry.place, OUTSIDE_M):
+            return f"it has left the fence, at {point_text(telemetry.place)}"
         return ""
 
-    def _motors_stop(self, seen: Telemetry) -> str:
+    def _motors_stop(self, telemetry: Telemetry) -> str:
         """Without telemetry, MAVSDK reports that motors have stopped."""
-        stopped = self._passed_s > MODE_S and not seen.armed and seen.is_heard
+        stopped = self._elapsed_s > MODE_S and not telemetry.armed and telemetry.has_heartbeat
         return "its motors have stopped" if stopped else ""
 
-    def _leaves_mode(self, seen: Telemetry) -> str:
-        if self._passed_s <= MODE_S or not seen.armed or seen.mode == OFFBOARD:
+    def _leaves_mode(self, telemetry: Telemetry) -> str:
+        if self._elapsed_s <= MODE_S or not telemetry.armed or telemetry.mode == OFFBOARD:
             return ""
-        return f"{_NOT_OURS} {seen.mode_and_who if self._takeover.has_left_us() else seen.mode_in_words}"
+        return f"{_NOT_OURS} {telemetry.mode_and_pilot if self._takeover.is_deliberate() else telemetry.mode_in_words}"
 
-    def _reaches_height(self, seen: Telemetry) -> bool:
-        if seen.place is None or seen.place[2] < self._climb_to:
+    def _reaches_height(self, telemetry: Telemetry) -> bool:
+        if telemetry.place is None or telemetry.place[2] < self._climb_to:
             return False
-        self._order, self._target = self._wanted or (self._order, self._target)
+        self._order, self._target = self._requested or (self._order, self._target)
         self._traffic.climbed(self.name)
         return True
 
-    def _climbs_too_long(self, _seen: Telemetry) -> str:
-        late = self._passed_s > CLIMB_S
+    def _climbs_too_long(self, _telemetry: Telemetry) -> str:
+        late = self._elapsed_s > CLIMB_S
         return f"it has not reached the height of its take-off within {CLIMB_S:g} s" if late else ""
 
-    def _touches_down(self, seen: Telemetry) -> bool:
+    def _touches_down(self, telemetry: Telemetry) -> bool:
         """A vehicle that was armed a moment ago may not have reported it yet."""
-        known = self._was_armed or self._passed_s > MODE_S
-        return known and seen.is_heard and not seen.armed and not seen.in_air
+        known = self._was_armed or self._elapsed_s > MODE_S
+        return known and telemetry.has_heartbeat and not telemetry.armed and not telemetry.in_air
 
     @property
-    def _passed_s(self) -> float:
-        """Return the time in the present state, in seconds."""
+    def _elapsed_s(self) -> float:
+        """The time in the present state, in seconds."""
         return self._clock() - self._since_s
 
     # Events of orders
 
-    def _gets_order(self, seen: Telemetry) -> bool:
-        if self._wanted is None or self._wanted[0] == self._order:
+    def _gets_order(self, telemetry: Telemetry) -> bool:
+        if self._requested is None or self._requested[0] == self._order:
             return False
-        self._order, self._target = self._wanted
-        self._commanded = self._commanded or (seen.in_air and not seen.is_flown_by_others)
+        self._order, self._target = self._requested
+        self._commanded = self._commanded or (telemetry.in_air and not telemetry.is_flown_by_others)
         return True
 
-    def _waits_for_take_off(self, _seen: Telemetry) -> bool:
+    def _waits_for_take_off(self, _telemetry: Telemetry) -> bool:
         return self._is_due
 
-    def _must_come_down(self, _seen: Telemetry) -> bool:
-        if self._wanted:
-            self._order = self._wanted[0]
+    def _must_come_down(self, _telemetry: Telemetry) -> bool:
+        if self._requested:
+            self._order = self._requested[0]
         return self._commanded and not self._obeyed
 
     # Guards
 
-    def _flown_by_others(self, seen: Telemetry) -> str:
-        return f"its mode is {seen.mode_and_who}" if seen.is_flown_by_others else ""
+    def _flown_by_others(self, telemetry: Telemetry) -> str:
+        return f"its mode is {telemetry.mode_and_pilot}" if telemetry.is_flown_by_others else ""
 
-    def _may_land(self, seen: Telemetry) -> bool:
+    def _may_land(self, telemetry: Telemetry) -> bool:
         """A clearance to land is also given outside of the fence, where the vehicle is."""
-        if not seen.in_air and self._phase in _GROUND:
+        if not telemetry.in_air and self._phase in _GROUND:
             return False
         self._clearance = self._traffic.clearance(self.name)
         return self._clearance.lands
 
-    def _in_air(self, seen: Telemetry) -> bool:
-        return seen.in_air
+    def _in_air(self, telemetry: Telemetry) -> bool:
+        return telemetry.in_air
 
-    def _target_is_ground(self, _seen: Telemetry) -> bool:
+    def _target_is_ground(self, _telemetry: Telemetry) -> bool:
         return self._target is not None and self._target.lands
 
-    def _cannot_take_off(self, seen: Telemetry) -> str:
-        if seen.not_ready:
-            return seen.not_ready
-        if seen.place is not None and self._fleet.fence.holds_above(seen.place):
+    def _cannot_take_off(self, telemetry: Telemetry) -> str:
+        if telemetry.not_ready:
+            return telemetry.not_ready
+        if telemetry.place is not None and self._fleet.fence.covers(telemetry.place):
             return ""
-        where = point_text(seen.place) if seen.place else "nowhere"
+        where = point_text(telemetry.place) if telemetry.place else "an unknown place"
         return f"it stands at {where}, outside of the fence ({self._fleet.fence})"
 
-    def _may_climb(self, seen: Telemetry) -> bool:
+    def _may_climb(self, telemetry: Telemetry) -> bool:
         self._clearance = self._traffic.clearance(self.name)
-        return self._clearance.climbs and seen.place is not None
+        return self._clearance.climbs and telemetry.place is not None
 
-    def _makes_room(self, _seen: Telemetry) -> bool:
+    def _makes_room(self, _telemetry: Telemetry) -> bool:
         return not self._clearance.rests
 
-    def _is_there(self, seen: Telemetry) -> bool:
-        if not self._clearance.rests or seen.place is None or self._target is None or self._target.lands:
+    def _is_there(self, telemetry: Telemetry) -> bool:
+        if not self._clearance.rests or telemetry.place is None or self._target is None or self._target.lands:
             return False
-        return math.dist(self._target.at, seen.place) <= self._fleet.near_m
+        return math.dist(self._target.at, telemetry.place) <= self._fleet.near_m
 
-    def _may_fall(self, _seen: Telemetry) -> bool:
-        """No vehicle is right below, or this vehicle has waited long enough."""
-        return self._passed_s > GIVE_WAY_S or self._traffic.is_clear_below(self.name)
+    def _may_fall(self, _telemetry: Telemetry) -> bool:
+        """No vehicle is directly below, or this vehicle has waited long enough."""
+        return self._elapsed_s > GIVE_WAY_S or self._traffic.is_clear_below(self.name)
 
     # Actions
 
-    def _drop_out(self, _seen: Telemetry, reason: str) -> None:
+    def _drop_out(self, _telemetry: Telemetry, reason: str) -> None:
         self._why = reason
-        if self._wanted:
-            self._order = self._wanted[0]
+        if self._requested:
+            self._order = self._requested[0]
         self._clearance = Clearance()
-        self._enter(Phase.OUT)  # before traffic, which may fail
+        self._enter(FlightPhase.OUT)  # before the call of `Traffic`, which may fail
         self._traffic.lose(self.name)
 
-    def _land(self, _seen: Telemetry, _reason: str) -> None:
+    def _land(self, _telemetry: Telemetry, _reason: str) -> None:
         self._commanded = True
         self._traffic.landing(self.name)
         self._autopilot.land()
 
-    def _send_set_point(self, _seen: Telemetry, _reason: str) -> None:
+    def _send_set_point(self, _telemetry: Telemetry, _reason: str) -> None:
         self._commanded = True
         to = self._clearance.to
         if to and (self._sent is None or to != self._sent.to):
             self._autopilot.go_to(to)
             self._sent = self._clearance
 
-    def _leave_climb(self, seen: Telemetry, reason: str) -> bool:
+    def _leave_climb(self, telemetry: Telemetry, reason: str) -> bool:
         """Some autopilots refuse commands until the take-off is complete."""
         try:
-            (self._land if self._clearance.lands else self._send_set_point)(seen, reason)
+            (self._land if self._clearance.lands else self._send_set_point)(telemetry, reason)
         except RefusedError:
-            if self._passed_s > CLIMB_S:
+            if self._elapsed_s > CLIMB_S:
                 raise
             return False
         return True
 
-    def _take_off(self, seen: Telemetry, _reason: str) -> bool:
-        self._wait_for_take_off(seen, "")
+    def _take_off(self, telemetry: Telemetry, _reason: str) -> bool:
+        self._wait_for_take_off(telemetry, "")
         self._commanded, self._is_due = True, False
-        if seen.place is not None:
-            self._climb_to = seen.place[2] + CLIMBED * self._fleet.takeoff_m
+        if telemetry.place is not None:
+            self._climb_to = telemetry.place[2] + CLIMBED * self._fleet.takeoff_m
         self._traffic.climbing(self.name)
         self._autopilot.arm()
         if self._ending is not None:  # another thread may have requested the end while the motors started
@@ -375,106 +380,106 @@ class Pilot:
         self._autopilot.take_off(self._fleet.takeoff_m)
         return True
 
-    def _wait_for_take_off(self, _seen: Telemetry, _reason: str) -> None:
+    def _wait_for_take_off(self, _telemetry: Telemetry, _reason: str) -> None:
         self._is_due = True
-        if self._phase != Phase.READY:
-            self._enter(Phase.READY)
+        if self._phase != FlightPhase.READY:
+            self._enter(FlightPhase.READY)
 
-    def _report_landing(self, _seen: Telemetry, _reason: str) -> None:
+    def _report_landing(self, _telemetry: Telemetry, _reason: str) -> None:
         self._traffic.landed(self.name)
 
-    def _come_down(self, seen: Telemetry, _reason: str) -> None:
-        self._obeyed = self._is_brought_down(seen, AtEnd.LAND)
+    def _come_down(self, telemetry: Telemetry, _reason: str) -> None:
+        self._obeyed = self._is_brought_down(telemetry, AtEnd.LAND)
 
     # The end
 
-    def _is_left_armed(self, seen: Telemetry) -> bool:
-        return seen.armed and not seen.is_flown_by_others
+    def _is_left_armed(self, telemetry: Telemetry) -> bool:
+        return telemetry.armed and not telemetry.is_flown_by_others
 
-    def _mode_is_known(self, _seen: Telemetry) -> bool:
-        return self._passed_s > MODE_S
+    def _mode_is_known(self, _telemetry: Telemetry) -> bool:
+        return self._elapsed_s > MODE_S
 
-    def _begin_end(self, _seen: Telemetry, _reason: str) -> None:
+    def _begin_end(self, _telemetry: Telemetry, _reason: str) -> None:
         self._commanded, self._recovers = True, False
 
-    def _has_obeyed(self, _seen: Telemetry) -> bool:
-        return self._obeyed and not self._takeover.is_known
+    def _has_obeyed(self, _telemetry: Telemetry) -> bool:
+        return self._obeyed and not self._takeover.was_detected
 
-    def _need_not_wait(self, _seen: Telemetry) -> bool:
+    def _need_not_wait(self, _telemetry: Telemetry) -> bool:
         return not self._waits or self._how != AtEnd.LAND
 
-    def _lands_too_long(self, _seen: Telemetry) -> str:
+    def _lands_too_long(self, _telemetry: Telemetry) -> str:
         late = self._clock() - self._end_begun_s > LANDING_S
         return f"it has not landed within {LANDING_S:g} s" if late else ""
 
-    def _was_never_commanded(self, _seen: Telemetry) -> bool:
+    def _was_never_commanded(self, _telemetry: Telemetry) -> bool:
         return not self._commanded
 
-    def _is_flown_by_others(self, seen: Telemetry) -> bool:
-        return self._takeover.has_come(seen)
+    def _is_flown_by_others(self, telemetry: Telemetry) -> bool:
+        return self._takeover.detect(telemetry)
 
-    def _is_on_ground(self, seen: Telemetry) -> bool:
-        return not seen.in_air
+    def _is_on_ground(self, telemetry: Telemetry) -> bool:
+        return not telemetry.in_air
 
-    def _must_wait_its_turn(self, seen: Telemetry) -> bool:
-        return self._how == AtEnd.LAND and not self._is_my_turn(seen)
+    def _must_wait_its_turn(self, telemetry: Telemetry) -> bool:
+        return self._how == AtEnd.LAND and not self._is_my_turn(telemetry)
 
-    def _obeys(self, seen: Telemetry) -> bool:
+    def _obeys(self, telemetry: Telemetry) -> bool:
         """The command is sent here: a refused command is repeated."""
-        self._obeyed = self._is_brought_down(seen, self._how)
+        self._obeyed = self._is_brought_down(telemetry, self._how)
         return self._obeyed
 
-    def _lands_at_end(self, _seen: Telemetry) -> bool:
+    def _lands_at_end(self, _telemetry: Telemetry) -> bool:
         return self._how == AtEnd.LAND
 
-    def _refuses_too_long(self, _seen: Telemetry) -> str:
+    def _refuses_too_long(self, _telemetry: Telemetry) -> str:
         late = self._clock() - self._end_begun_s > END_S
-        return f"it has not answered at the end, for {END_S:g} s" if late else ""
+        return f"it has not accepted the final command within {END_S:g} s" if late else ""
 
-    def _extend_end(self, _seen: Telemetry, _reason: str) -> None:
+    def _extend_end(self, _telemetry: Telemetry, _reason: str) -> None:
         self._end_begun_s = self._clock()
 
-    def _report_descent(self, _seen: Telemetry, _reason: str) -> None:
+    def _report_descent(self, _telemetry: Telemetry, _reason: str) -> None:
         self._traffic.landing(self.name)
 
-    def _give_up(self, _seen: Telemetry, reason: str) -> None:
+    def _give_up(self, _telemetry: Telemetry, reason: str) -> None:
         self._why = self._why or reason
 
-    def _is_my_turn(self, seen: Telemetry) -> bool:
-        """Return whether a vehicle may land now at the end; if not, send it to the place where it may."""
-        if not seen.in_air or self._phase == Phase.LANDING or self._clock() - self._turn_s > TURN_S:
+    def _is_my_turn(self, telemetry: Telemetry) -> bool:
+        """Return whether a vehicle may land now at the end; if not, send it to its landing place."""
+        if not telemetry.in_air or self._phase == FlightPhase.LANDING or self._clock() - self._turn_s > TURN_S:
             return True
-        if self._phase == Phase.OUT:
-            return self._may_fall(seen)
+        if self._phase == FlightPhase.OUT:
+            return self._may_fall(telemetry)
         self._clearance = self._traffic.clearance(self.name)
         if self._clearance.lands or self._clearance.to is None:
             return True
         try:
-            self._send_set_point(seen, "")
+            self._send_set_point(telemetry, "")
         except RefusedError:
             return True
         return False
 
-    def _is_brought_down(self, seen: Telemetry, how: AtEnd) -> bool:
-        """Return whether the vehicle lands, holds or is disarmed, after a command. A refused command is repeated."""
+    def _is_brought_down(self, telemetry: Telemetry, how: AtEnd) -> bool:
+        """Send the final command again until it is accepted; return whether the vehicle lands, holds or is disarmed."""
         now = self._clock()
-        if self._takeover.has_come(seen):
+        if self._takeover.detect(telemetry):
             return True
         if now - self._retry_s < RETRY_S:
             return False
         self._retry_s = now
         try:
-            if how == AtEnd.HOLD and seen.in_air:
+            if how == AtEnd.HOLD and telemetry.in_air:
                 self._autopilot.hold()
             else:
                 self._autopilot.land()
         except RefusedError:
-            return self._is_disarmed(seen)
+            return self._is_disarmed(telemetry)
         return True
 
-    def _is_disarmed(self, seen: Telemetry) -> bool:
+    def _is_disarmed(self, telemetry: Telemetry) -> bool:
         """Return whether a vehicle on the ground was disarmed; a vehicle in the air refuses."""
-        if seen.in_air:
+        if telemetry.in_air:
             return False
         try:
             self._autopilot.disarm()
@@ -482,58 +487,62 @@ class Pilot:
             return False
         return True
 
-    # The tables. Columns: name, states, event, guard, action, next state, whether nothing more follows.
+    # The tables. Columns: name, states, event, guard, action, next state, whether the flight has ended.
     # fmt: off
     FLIGHT: ClassVar[tuple[Transition, ...]] = (
-        Transition("connected", _CONNECTING, _connects, next=Phase.READY),
-        Transition("not connected", _CONNECTING, _connects_too_late, action=_drop_out, next=Phase.OUT),
-        Transition("silent", _GROUND | _AIR | _LANDING, _is_silent, action=_drop_out, next=Phase.OUT),
-        Transition("old place", _GROUND | _AIR | _LANDING, _place_is_old, action=_drop_out, next=Phase.OUT),
-        Transition("taken over", _AIR, _is_taken_over, action=_drop_out, next=Phase.OUT),
-        Transition("landing taken over", _LANDING, _takeover_lasts, action=_drop_out, next=Phase.OUT),
-        Transition("alarm", _AIR, _alarm, action=_drop_out, next=Phase.OUT),
-        Transition("fence left", _AIR, _leaves_fence, action=_drop_out, next=Phase.OUT),
-        Transition("motors stopped", _AIR, _motors_stop, action=_drop_out, next=Phase.OUT),
-        Transition("mode left", _WAY, _leaves_mode, action=_drop_out, next=Phase.OUT),
-        Transition("order, but flown by others", _GROUND, _gets_order, _flown_by_others, _drop_out, Phase.OUT),
-        Transition("order to land at once, in the air", _GROUND, _gets_order, _may_land, _land, Phase.LANDING),
-        Transition("order in the air", _GROUND, _gets_order, _in_air, _send_set_point, Phase.FLYING),
-        Transition("order to land, on the ground", _GROUND, _gets_order, _target_is_ground, next=Phase.LANDED),
-        Transition("order, but not ready", _GROUND, _gets_order, _cannot_take_off, _drop_out, Phase.OUT),
-        Transition("order to take off", _GROUND, _gets_order, _may_climb, _take_off, Phase.CLIMBING),
-        Transition("order to wait", _GROUND, _gets_order, action=_wait_for_take_off, next=Phase.READY),
-        Transition("take-off after a wait", _READY, _waits_for_take_off, _may_climb, _take_off, Phase.CLIMBING),
-        Transition("order to land at once", _WAY, _gets_order, _may_land, _land, Phase.LANDING),
-        Transition("order on the way", _WAY, _gets_order, action=_send_set_point, next=Phase.FLYING),
-        Transition("climbed, lands", _CLIMBING, _reaches_height, _may_land, _leave_climb, Phase.LANDING),
-        Transition("climbed", _CLIMBING, _reaches_height, action=_leave_climb, next=Phase.FLYING),
-        Transition("climb too long", _CLIMBING, _climbs_too_long, action=_drop_out, next=Phase.OUT),
-        Transition("landing", _WAY, _always, _may_land, _land, Phase.LANDING),
-        Transition("making room", _ARRIVED, _always, _makes_room, _send_set_point, Phase.FLYING),
-        Transition("arrived", _FLYING, _always, _is_there, _send_set_point, Phase.ARRIVED),
+        Transition("connected", _CONNECTING, _connects, next=FlightPhase.READY),
+        Transition("not connected", _CONNECTING, _connects_too_late, action=_drop_out, next=FlightPhase.OUT),
+        Transition("silent", _GROUND | _AIR | _LANDING, _is_silent, action=_drop_out, next=FlightPhase.OUT),
+        Transition("old place", _GROUND | _AIR | _LANDING, _place_is_outdated, action=_drop_out, next=FlightPhase.OUT),
+        Transition("taken over", _AIR, _is_taken_over, action=_drop_out, next=FlightPhase.OUT),
+        Transition("landing taken over", _LANDING, _takeover_lasts, action=_drop_out, next=FlightPhase.OUT),
+        Transition("alarm", _AIR, _alarm, action=_drop_out, next=FlightPhase.OUT),
+        Transition("fence left", _AIR, _leaves_fence, action=_drop_out, next=FlightPhase.OUT),
+        Transition("motors stopped", _AIR, _motors_stop, action=_drop_out, next=FlightPhase.OUT),
+        Transition("mode left", _WAY, _leaves_mode, action=_drop_out, next=FlightPhase.OUT),
+        Transition("order, but flown by others", _GROUND, _gets_order, _flown_by_others, _drop_out, FlightPhase.OUT),
+        Transition("order to land at once, in the air", _GROUND, _gets_order, _may_land, _land, FlightPhase.LANDING),
+        Transition("order in the air", _GROUND, _gets_order, _in_air, _send_set_point, FlightPhase.FLYING),
+        Transition("order to land, on the ground", _GROUND, _gets_order, _target_is_ground, next=FlightPhase.LANDED),
+        Transition("order, but not ready", _GROUND, _gets_order, _cannot_take_off, _drop_out, FlightPhase.OUT),
+        Transition("order to take off", _GROUND, _gets_order, _may_climb, _take_off, FlightPhase.CLIMBING),
+        Transition("order to wait", _GROUND, _gets_order, action=_wait_for_take_off, next=FlightPhase.READY),
+        Transition("take-off after a wait", _READY, _waits_for_take_off, _may_climb, _take_off, FlightPhase.CLIMBING),
+        Transition("order to land at once", _WAY, _gets_order, _may_land, _land, FlightPhase.LANDING),
+        Transition("order on the way", _WAY, _gets_order, action=_send_set_point, next=FlightPhase.FLYING),
+        Transition("climbed, lands", _CLIMBING, _reaches_height, _may_land, _leave_climb, FlightPhase.LANDING),
+        Transition("climbed", _CLIMBING, _reaches_height, action=_leave_climb, next=FlightPhase.FLYING),
+        Transition("climb too long", _CLIMBING, _climbs_too_long, action=_drop_out, next=FlightPhase.OUT),
+        Transition("landing", _WAY, _always, _may_land, _land, FlightPhase.LANDING),
+        Transition("making room", _ARRIVED, _always, _makes_room, _send_set_point, FlightPhase.FLYING),
+        Transition("arrived", _FLYING, _always, _is_there, _send_set_point, FlightPhase.ARRIVED),
         Transition("on the way", _WAY, _always, action=_send_set_point),
-        Transition("landed", _LANDING, _touches_down, action=_report_landing, next=Phase.LANDED),
+        Transition("landed", _LANDING, _touches_down, action=_report_landing, next=FlightPhase.LANDED),
         Transition("out of order", _OUT, _must_come_down, _may_fall, _come_down),
     )
     RECOVERY: ClassVar[tuple[Transition, ...]] = (
-        Transition("recovery: link open", _CONNECTING, _opens, next=Phase.READY),
+        Transition("recovery: link open", _CONNECTING, _opens, next=FlightPhase.READY),
         Transition("recovery: no link", _CONNECTING, _opens_too_late, ends=True),
         Transition("recovery: left armed", _ALL - _CONNECTING, _is_left_armed, action=_begin_end),
         Transition("recovery: not armed", _ALL - _CONNECTING, _mode_is_known, ends=True),
     )
     END: ClassVar[tuple[Transition, ...]] = (
         Transition("end: no wait", _ALL, _has_obeyed, _need_not_wait, ends=True),
-        Transition("end: landed", _ALL - _OUT, _has_obeyed, _touches_down, _report_landing, Phase.LANDED, ends=True),
+        Transition(
+            "end: landed", _ALL - _OUT, _has_obeyed, _touches_down, _report_landing, FlightPhase.LANDED, ends=True
+        ),
         Transition("end: landed out of order", _OUT, _has_obeyed, _touches_down, ends=True),
-        Transition("end: landing too long", _ALL, _has_obeyed, _lands_too_long, _give_up, Phase.OUT, ends=True),
+        Transition("end: landing too long", _ALL, _has_obeyed, _lands_too_long, _give_up, FlightPhase.OUT, ends=True),
         Transition("end: landing", _ALL, _has_obeyed),
         Transition("end: never commanded", _ALL, _was_never_commanded, ends=True),
         Transition("end: flown by others", _ALL, _is_flown_by_others, ends=True),
         Transition("end: on the ground", _LANDED, _is_on_ground, ends=True),
         Transition("end: waiting its turn", _ALL, _must_wait_its_turn, action=_extend_end),
-        Transition("end: told to land", _ALL - _OUT, _obeys, _lands_at_end, _report_descent, Phase.LANDING),
-        Transition("end: told to land out of order", _OUT, _obeys, _lands_at_end, _report_descent, Phase.OUT),
-        Transition("end: told to hold", _ALL, _obeys),
-        Transition("end: refused too long", _ALL, _refuses_too_long, action=_give_up, next=Phase.OUT, ends=True),
+        Transition("end: commanded to land", _ALL - _OUT, _obeys, _lands_at_end, _report_descent, FlightPhase.LANDING),
+        Transition(
+            "end: commanded to land out of order", _OUT, _obeys, _lands_at_end, _report_descent, FlightPhase.OUT
+        ),
+        Transition("end: commanded to hold", _ALL, _obeys),
+        Transition("end: refused too long", _ALL, _refuses_too_long, action=_give_up, next=FlightPhase.OUT, ends=True),
     )
     # fmt: on

@@ -1,11 +1,11 @@
-"""Ways of vehicles from where they are to where they should be, none nearer to another's than the fleet's distance.
+"""Plans routes of vehicles to their targets that keep the fleet's distance.
 
-The planner is that of the simulated flight (`robochoc.flight.coordination`): it gives moves that are safe one after the
-other, and here that order is all that is taken from it. When each may begin is decided on the way, by what the
-vehicles tell (`traffic.py`): no clock is in it, so a vehicle may be as late as it likes.
+The planner is that of the simulated flight (`robochoc.flight.coordination`). It gives moves that are safe one after the
+other; only their order is used here. `traffic.py` decides by telemetry when each move may begin: a plan contains no
+times, so vehicles may be late.
 
-Vehicles on the ground first rise straight up, as their autopilots do. Where the place above one is not free, those in
-the air go to their places before that.
+Vehicles on the ground first rise straight up, as their autopilots do. If the place above one is not free, vehicles in
+the air fly to their targets before that.
 """
 
 from __future__ import annotations
@@ -25,28 +25,31 @@ from robochoc.maps.routes.distances import SLACK_M, Array, norms, squashed
 from robochoc.vehicles.fleet import Fleet, point_text
 
 _ORDERS = 6
-"""So many orders of the vehicles are tried until all ways are within the fence."""
+"""The number of orders of the vehicles that are tried until all routes are within the fence."""
 _ROUNDING_M = 1e-6
 _SPOTS = 2_000
 _RING = 8
 
 
 class RouteError(Exception):
-    """There are no ways that keep vehicles apart. The message says between whom, or what is in the way."""
+    """There are no routes that keep vehicles apart. The message names the vehicles, or the obstacle."""
 
 
 @dataclass(frozen=True)
 class PlannedLeg:
-    """A vehicle's way (K + 1, 3), in metres: from rest to rest."""
+    """A vehicle's path (K + 1, 3) from rest to rest, in metres."""
 
     name: str
     path: Array
 
 
 class RoutePlanner:
-    """Plans ways within the fence of `fleet`, `distance_m` from each other; more or less than the fleet file says.
+    """Plans routes within the fence of `fleet`.
 
-    `standing` are the places of vehicles that stay, by name.
+    Args:
+        fleet: The fleet.
+        standing: The places of vehicles that stay, by name.
+        distance_m: The distance between vehicles, which may differ from that of the fleet file.
     """
 
     def __init__(self, fleet: Fleet, standing: Mapping[str, Point], distance_m: float) -> None:
@@ -60,9 +63,9 @@ class RoutePlanner:
     def legs(
         self, starts: Mapping[str, Point], goals: Mapping[str, Point], climbing: Mapping[str, float]
     ) -> list[PlannedLeg]:
-        """Return the legs that bring all from `starts` to `goals`, in an order in which each is safe.
+        """Return the legs of all vehicles from `starts` to `goals`, in an order in which each is safe.
 
-        `climbing` has the heights to which vehicles rise before all, by name. Raises `RouteError`.
+        `climbing` has the take-off heights of vehicles on the ground, by name. Raises `RouteError`.
         """
         problem = ""
         for first in range(min(_ORDERS, max(len(starts), 1))):
@@ -80,33 +83,37 @@ class RoutePlanner:
         raise RouteError(problem)
 
     def check(self, goals: Mapping[str, Point]) -> None:
-        """Raise `RouteError` if two goals, or a goal and who stands, are nearer than the distance."""
-        called = [*goals, *self._standing]
+        """Raise `RouteError` if two goals, or a goal and a standing vehicle, are nearer than the distance."""
+        names_in_order = [*goals, *self._standing]
         try:
             ends, still = self._flat([*goals.values()]), self._flat([*self._standing.values()])
             check_spacing(ends, still, self._distance_m, "goal")
         except TooCloseError as error:
-            raise RouteError(self._too_close(error, called)) from None
+            raise RouteError(self._too_close(error, names_in_order)) from None
 
     def descents(self, rests: Mapping[str, Point], grounds: Mapping[str, float]) -> list[PlannedLeg]:
-        """Return the legs by which all land from where they rest, the lowest first. Raises `RouteError`.
+        """Return the legs for landing all vehicles in place, the lowest first. Raises `RouteError`.
 
-        They land where they are. One that would land on another one's place lands beside it. `grounds` are heights.
+        A vehicle above the landing place of another lands beside it.
+
+        Args:
+            rests: The places of the vehicles, by name.
+            grounds: The heights of the ground below them.
         """
         taken, goals = [*self._standing.values()], dict[str, Point]()
         rests = dict(sorted(rests.items(), key=lambda one: one[1][2]))
         for name, at in rests.items():
-            spot = self.spot(at, taken)
-            if spot is None:
+            free_spot = self.free_spot(at, taken)
+            if free_spot is None:
                 raise RouteError(f"there is no place for {name} to land")
-            goals[name] = (*spot[:2], grounds[name])
-            taken.append(spot)
+            goals[name] = (*free_spot[:2], grounds[name])
+            taken.append(free_spot)
         legs: list[PlannedLeg] = []
         now = {**rests}
         for name, at in rests.items():
             path = np.array([at, goals[name]])
             others = [other for one, other in now.items() if one != name]
-            if at[:2] == goals[name][:2] and self.clear(path, [*others, *self._standing.values()]):
+            if at[:2] == goals[name][:2] and self.is_clear(path, [*others, *self._standing.values()]):
                 legs.append(PlannedLeg(name, path))
                 now[name] = goals[name]
         down = {name: at for name, at in now.items() if at == goals[name]}
@@ -116,12 +123,12 @@ class RoutePlanner:
             legs += rest.legs(late, {name: goals[name] for name in late}, {})
         return legs
 
-    def clear(self, path: Array, others: Sequence[Point]) -> bool:
+    def is_clear(self, path: Array, others: Sequence[Point]) -> bool:
         """Return whether a path keeps the distance from `others`."""
         return self._space([*map(tuple, path.tolist()), *others]).is_clear(self._flat(path), self._flat(others))
 
-    def spot(self, at: Point, taken: Sequence[Point]) -> Point | None:
-        """Return the point nearest to `at` whose column is the fleet's distance from those of `taken`, in the fence."""
+    def free_spot(self, at: Point, taken: Sequence[Point]) -> Point | None:
+        """Return the point in the fence nearest to `at` with the fleet's distance, seen from above, from `taken`."""
         low, high, distance_m = self._fence.low, self._fence.high, self._fleet.distance_m
         for x, y in _rings(at[0], at[1], distance_m):
             if (x, y) != at[:2] and not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
@@ -149,14 +156,14 @@ class RoutePlanner:
         return legs + self._moves(rests, goals, [*names])
 
     def _lifts(self, rests: dict[str, Point], climbing: Mapping[str, float]) -> list[PlannedLeg]:
-        """Return how vehicles rise, and update where they rest."""
+        """Return the legs of rising vehicles, and update the places in `rests`."""
         legs: list[PlannedLeg] = []
         left = [*climbing]
         while left:
             for name in left:
                 path = np.array([rests[name], (*rests[name][:2], climbing[name])])
                 others = {other: at for other, at in (rests | self._standing).items() if other != name}
-                if self.clear(path, [*others.values()]):
+                if self.is_clear(path, [*others.values()]):
                     legs.append(PlannedLeg(name, path))
                     rests[name] = (*rests[name][:2], climbing[name])
                     left.remove(name)
@@ -167,11 +174,11 @@ class RoutePlanner:
         return legs
 
     def _moves(self, rests: dict[str, Point], goals: Mapping[str, Point], names: Sequence[str]) -> list[PlannedLeg]:
-        """Return how `names` get to their goals, and update where they rest."""
+        """Return the legs of `names` to their goals, and update the places in `rests`."""
         if not names:
             return []
         standing = {other: at for other, at in (rests | self._standing).items() if other not in names}
-        called = [*names, *standing]
+        names_in_order = [*names, *standing]
         begins, ends = self._flat([rests[name] for name in names]), self._flat([goals[name] for name in names])
         still = self._flat([*standing.values()])
         space = self._space([*(rests[name] for name in names), *(goals[name] for name in names), *standing.values()])
@@ -180,27 +187,27 @@ class RoutePlanner:
             check_spacing(ends, still, self._distance_m, "goal")
             moves = moves_between(begins, ends, still, space, np.zeros(len(names)))
         except TooCloseError as error:
-            raise RouteError(self._too_close(error, called)) from None
+            raise RouteError(self._too_close(error, names_in_order)) from None
         except NoRouteError as error:
-            stuck = ", ".join(called[number] for number in error.drones)
-            raise RouteError(f"no way was found for {stuck}: other vehicles enclose it") from None
+            stuck = ", ".join(names_in_order[number] for number in error.drones)
+            raise RouteError(f"no route was found for {stuck}: other vehicles enclose it") from None
         for name in names:
             rests[name] = goals[name]
         return [PlannedLeg(names[move.drone], squashed(move.path, 1 / self._downwash)) for move in moves]
 
-    def _too_close(self, error: TooCloseError, called: Sequence[str]) -> str:
+    def _too_close(self, error: TooCloseError, names_in_order: Sequence[str]) -> str:
         where = "are" if error.where == "start" else "would be"
-        first, second = called[error.first], called[error.second]
+        first, second = names_in_order[error.first], names_in_order[error.second]
         unit = "" if self._downwash == 1 else f", heights divided by {self._downwash:g}"
         apart = f"{first} and {second} {where} {error.distance_m:.2f} m apart{unit}"
         return f"{apart}: less than 'distance', {self._distance_m:g} m"
 
     def _outside(self, legs: Sequence[PlannedLeg]) -> Iterator[str]:
-        """Yield the ways that lead out of the fence, in words. They may begin outside, and rise there."""
+        """Yield an error text for each route that leaves the fence. Routes may begin outside, and rise there."""
         for leg in legs:
             for x, y, z in leg.path[1:].tolist():
                 rises = [x, y] == leg.path[0, :2].tolist() and z <= self._fence.high[2]
-                if not rises and not self._fence.holds_above((x, y, z), _ROUNDING_M):
+                if not rises and not self._fence.covers((x, y, z), _ROUNDING_M):
                     yield f"{_BY} {point_text((x, y, z))} for {leg.name}, outside of the fence ({self._fence})"
 
     def _flat(self, points: Sequence[Point] | Array) -> Array:
@@ -214,11 +221,11 @@ class RoutePlanner:
         return Space(self._distance_m, ground, max(heights) + 2 * self._distance_m, rises=True)
 
 
-_BY = "the only way found leads by"
+_BY = "the only route found passes"
 
 
 def _rings(x: float, y: float, distance_m: float) -> Iterator[tuple[float, float]]:
-    """Yield points of the plane around a point, farther and farther out, half a distance from ring to ring."""
+    """Yield points of the plane in rings around a point, half a distance apart, the nearest first."""
     yield x, y
     for number in range(_RING, _SPOTS):
         ring, step = divmod(number, _RING)

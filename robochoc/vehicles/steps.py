@@ -1,10 +1,10 @@
-"""Ways, cut into steps, and which steps of others each step has to wait for.
+"""Routes cut into steps, and the dependencies of each step on steps of other vehicles.
 
-The legs of `ways.py` are safe one after the other. So a step may begin as soon as each step of an earlier leg that
-comes nearer to it than the distance has been flown: by then its vehicle is somewhere else. Steps wait for earlier legs
-only, so nobody waits in a circle, and however late somebody is, the distance is kept. This is the dependency graph of
-plans that are executed with delays (W. Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in
-Warehouses", IEEE Robotics and Automation Letters 4(2), 2019, section IV), with legs for its order of events.
+The legs of `route_planner.py` are safe one after the other. So a step may begin as soon as all steps of earlier legs
+that are nearer to it than the distance have been flown. Steps wait for earlier legs only: there is no cycle of waiting,
+and the distance is kept even if a vehicle is late. This is the dependency graph of plans that are executed with delays
+(W. Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in Warehouses", IEEE Robotics and Automation
+Letters 4(2), 2019, section IV), where legs determine the order of events.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from robochoc.maps.routes.distances import SLACK_M, Array, line_distances, squas
 from robochoc.vehicles.route_planner import PlannedLeg
 
 _PARTS = 32
-"""A straight piece has at most so many steps."""
+"""The largest number of steps of a straight piece."""
 
 
 class StepKind(Enum):
-    """The kind of a step: the first and the last are done by the vehicle's autopilot alone."""
+    """The kind of a step. The vehicle's autopilot executes climbs and landings by itself."""
 
     CLIMB = auto()
     FLY = auto()
@@ -33,16 +33,16 @@ class StepKind(Enum):
 
 
 @dataclass
-class Step:
-    """A straight step of a vehicle's way, in metres."""
+class RouteStep:
+    """A straight step of a vehicle's route, in metres."""
 
     kind: StepKind
     begin: Point
     end: Point
     is_corner: bool
-    """Whether its straight piece ends with it."""
+    """Whether it is the last step of its straight piece."""
     needs: dict[str, int] = field(default_factory=dict)
-    """It waits until of these vehicles so many steps are done."""
+    """The number of steps of other vehicles, by name, that have to be complete before this step."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +60,17 @@ class _Piece:
 
 def steps_of(
     legs: Sequence[PlannedLeg], climbing: Collection[str], landing: Collection[str], distance_m: float, downwash: float
-) -> dict[str, list[Step]]:
+) -> dict[str, list[RouteStep]]:
     """Return the steps of each vehicle that has legs.
 
     Args:
-        legs: In an order in which each is safe.
+        legs: Legs in an order in which each is safe.
         climbing: Vehicles whose first leg is flown by the autopilot.
         landing: Vehicles that land at the end of their last leg.
-        distance_m: No two vehicles come nearer.
-        downwash: Heights are divided by it before.
+        distance_m: The smallest distance between two vehicles.
+        downwash: The number by which heights are divided for distances.
     """
-    steps: dict[str, list[Step]] = {}
+    steps: dict[str, list[RouteStep]] = {}
     pieces: list[_Piece] = []
     last = {leg.name: number for number, leg in enumerate(legs)}
     for number, leg in enumerate(legs):
@@ -84,30 +84,33 @@ def steps_of(
     for later, piece in enumerate(pieces):
         for earlier in pieces[:later]:
             if earlier.name != piece.name and earlier.leg != piece.leg:
-                _wait(steps[piece.name], piece, earlier, distance_m, downwash)
+                _add_waits(steps[piece.name], piece, earlier, distance_m, downwash)
     return steps
 
 
 def _closed(path: Array) -> Array:
-    """Return a path whose last piece leads straight down, if only by nothing: it is flown by the autopilot."""
+    """Return a path whose last piece leads straight down, maybe with length 0: the autopilot flies it."""
     down = (path[-1, :2] == path[-2, :2]).all() and path[-1, 2] <= path[-2, 2]
     return path if down else np.vstack((path, path[-1]))
 
 
-def _piece(name: str, leg: int, steps: list[Step], what: tuple[StepKind, Array, Array], distance_m: float) -> _Piece:
+def _piece(
+    name: str, leg: int, steps: list[RouteStep], what: tuple[StepKind, Array, Array], distance_m: float
+) -> _Piece:
     kind, begin, end = what
     length = math.dist(begin, end)
     parts = max(1, min(_PARTS, math.ceil(2 * length / distance_m))) if kind is StepKind.FLY else 1
     points = begin + (end - begin) * (np.arange(parts + 1) / parts)[:, None]
     first = len(steps)
     steps += [
-        Step(kind, _point(points[number]), _point(points[number + 1]), number == parts - 1) for number in range(parts)
+        RouteStep(kind, _point(points[number]), _point(points[number + 1]), number == parts - 1)
+        for number in range(parts)
     ]
     return _Piece(name, leg, first, points[:-1], points[1:])
 
 
-def _wait(steps: list[Step], piece: _Piece, earlier: _Piece, distance_m: float, downwash: float) -> None:
-    """Note in `steps` which of a piece's steps wait for which of an earlier one's."""
+def _add_waits(steps: list[RouteStep], piece: _Piece, earlier: _Piece, distance_m: float, downwash: float) -> None:
+    """Add to the steps of a piece their dependencies on the steps of an earlier piece."""
     least = distance_m - SLACK_M
     mine, theirs = _flat(piece.line, downwash), _flat(earlier.line, downwash)
     if line_distances(mine, theirs) >= least:
@@ -131,7 +134,7 @@ def _point(row: Array) -> Point:
 
 
 def length_along(begin: Point, end: Point, place: Point) -> float:
-    """Return how far along a line a place is, in metres from where it begins."""
+    """Return the length along a line, from its beginning, of the projection of a place, in metres."""
     length = math.dist(begin, end)
     if not length:
         return 0.0
@@ -139,7 +142,7 @@ def length_along(begin: Point, end: Point, place: Point) -> float:
 
 
 def on_line(begin: Point, end: Point, length: float) -> Point:
-    """Return the point of a line that is so many metres from where it begins."""
+    """Return the point of a line at a distance from its beginning, in metres."""
     share = length / (math.dist(begin, end) or 1.0)
     x, y, z = (b + share * (e - b) for b, e in zip(begin, end, strict=True))
     return x, y, z

@@ -1,6 +1,6 @@
-"""The state that the supervisor of a Crazyflie's firmware tells: the bits of its log variable `supervisor.info`.
+"""The state reported by the supervisor of a Crazyflie's firmware: the bits of its log variable `supervisor.info`.
 
-Source: the firmware's supervisor.c.
+Source: the firmware's supervisor.c. Apart from `cflib_autopilot.py`, which needs cflib.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ COMMANDS, FINISHED, DECK_FAULT = 1 << 8, 1 << 9, 1 << 11
 MANUAL = "MANUAL"
 _PROBLEMS = {
     LOCKED: "it is locked: restart it",
-    CRASHED: "it has crashed: put it on its feet and restart it",
+    CRASHED: "it has crashed: set it upright and restart it",
     TUMBLED: "it does not stand upright",
-    DECK_FAULT: "a deck of it has a fault",
+    DECK_FAULT: "one of its decks has a fault",
 }
 
 
 @dataclass(frozen=True)
 class Supervisor:
-    """The state of a Crazyflie, by the bits that it tells."""
+    """The state of a Crazyflie, decoded from its bits."""
 
     bits: int
 
@@ -31,39 +31,39 @@ class Supervisor:
 
     @property
     def arms_itself(self) -> bool:
-        """Return whether motors are armed all the time, as those with brushes are."""
+        """Whether motors are always armed, as brushed motors are."""
         return self._has(ARMS_ITSELF)
 
     @property
     def can_fly(self) -> bool:
-        """Return whether commands to fly are taken up."""
+        """Whether commands to fly are accepted."""
         return self._has(CAN_FLY)
 
     @property
     def flies(self) -> bool:
-        """Return whether motors have had thrust, within the last 2 s."""
+        """Whether motors have had thrust within the last 2 s."""
         return self._has(FLIES)
 
     @property
     def commands(self) -> bool:
-        """Return whether the high-level commander flies it."""
+        """Whether the high-level commander flies it."""
         return self._has(COMMANDS)
 
     @property
     def finished(self) -> bool:
-        """Return whether the high-level commander has come to the end of its path."""
+        """Whether the high-level commander has reached the end of its path."""
         return self._has(FINISHED)
 
     @property
     def armed(self) -> bool:
-        """Return whether motors run, or may be made to run by us alone."""
+        """Whether motors run, or a command of ours can start them."""
         return self.flies or self.commands or (self._has(IS_ARMED) and not self.arms_itself)
 
     @property
     def mode(self) -> str:
-        """Return who flies, in a word of autopilots.
+        """The flight mode, named as autopilots name theirs.
 
-        In the air without the high-level commander, somebody else sends set points: without any, it would fall.
+        A Crazyflie in the air without the high-level commander gets set points from elsewhere: otherwise it would fall.
         """
         if self.commands:
             return OFFBOARD
@@ -71,7 +71,7 @@ class Supervisor:
 
     @property
     def problem(self) -> str:
-        """Return why it cannot be armed; empty if it can be, or is."""
+        """The reason why it cannot be armed; empty if it can be, or is armed."""
         for bit, problem in _PROBLEMS.items():
             if self._has(bit):
                 return problem

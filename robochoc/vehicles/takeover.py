@@ -22,35 +22,35 @@ class Takeover:
         """Record that the vehicle has been commanded."""
         self._commanded_s = min(self._commanded_s, self._clock())
 
-    def note(self, seen: Telemetry) -> None:
+    def record(self, telemetry: Telemetry) -> None:
         """Record the telemetry of a commanded vehicle."""
-        self._was_ours = self._was_ours or (seen.armed and not seen.is_flown_by_others)
-        self._foreign_s = min(self._foreign_s, self._clock()) if seen.is_flown_by_others else math.inf
-        self._silence_s = max(self._silence_s, seen.silent_s)
+        self._was_ours = self._was_ours or (telemetry.armed and not telemetry.is_flown_by_others)
+        self._foreign_s = min(self._foreign_s, self._clock()) if telemetry.is_flown_by_others else math.inf
+        self._silence_s = max(self._silence_s, telemetry.silent_s)
 
     @property
-    def is_known(self) -> bool:
+    def was_detected(self) -> bool:
         """Return whether a take-over was detected before."""
         return self._is_taken
 
     @property
     def lasts(self) -> bool:
-        """Return whether another mode lasts longer than the moment for which some report it after a landing."""
+        """Whether the other mode has lasted for some time: some autopilots report one briefly after a landing."""
         return self._clock() - self._foreign_s > MODE_S
 
-    def has_come(self, seen: Telemetry) -> bool:
-        """Return whether the vehicle was taken over, by its telemetry until now.
+    def detect(self, telemetry: Telemetry) -> bool:
+        """Return whether the vehicle has been taken over, judged by all its telemetry.
 
-        Before it has obeyed once its mode may be that of before its first command.
+        Before the vehicle has obeyed once, its mode may be that from before its first command.
         """
-        told = self._was_ours or self._clock() - self._commanded_s > MODE_S
-        self._is_taken = self._is_taken or (told and seen.is_flown_by_others)
+        known = self._was_ours or self._clock() - self._commanded_s > MODE_S
+        self._is_taken = self._is_taken or (known and telemetry.is_flown_by_others)
         return self._is_taken
 
-    def has_left_us(self) -> bool:
-        """Return whether a vehicle that has left our mode was told to, by a person or by its own failsafe.
+    def is_deliberate(self) -> bool:
+        """Return whether a vehicle has left our mode by the command of a person or its own failsafe.
 
-        It was if its link was good all the time. After a silence it may have done so for want of set points.
+        That is assumed if its link had no long silence. After a silence it may have lacked set points.
         """
         self._is_taken = self._is_taken or self._silence_s <= SILENCE_S
         return self._is_taken

@@ -1,11 +1,11 @@
-"""Traffic: clearances of vehicles for their next steps. The plan gives only their order; telemetry gives their places.
+"""Traffic: clearances of vehicles for their next steps. The order comes from the plan, the places from telemetry.
 
-`RoutePlanner` plans, `steps_of` derives which steps wait for which. A vehicle gets a set point on its straight line, a
-short way ahead of its place, and never beyond the last step that need not wait. So if a vehicle is late or stops, those
-that need its place wait, and the others fly on.
+`RoutePlanner` plans routes, `steps_of` derives the dependencies of their steps. A vehicle gets a set point on its
+straight line, a short distance ahead, and never beyond the last step that need not wait. So if a vehicle is late or
+stops, vehicles that need its place wait, and the others continue.
 
 A vehicle that is blown off its line may come near to others, also on its way back. The others then do not fly towards
-it (`_in_the_way`). When no vehicle can move, all routes are planned again from the present places.
+it (`_vehicle_in_the_way`). When no vehicle can move, all routes are planned again from the present places.
 
 The distance between two vehicles is therefore `distance`, less the deviation of each from its line: a vehicle within
 `tolerance_m` of its line (`Fleet`) counts as on it, and others stop for a vehicle farther off.
@@ -17,23 +17,23 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import SLACK_M, line_distances, squashed
-from robochoc.vehicles.craft import Clearance, Craft
 from robochoc.vehicles.fleet import Fleet
-from robochoc.vehicles.messages import Target
+from robochoc.vehicles.messages import VehicleTarget
 from robochoc.vehicles.route_planner import PlannedLeg, RouteError, RoutePlanner, spacing
-from robochoc.vehicles.steps import Step, StepKind, length_along, on_line, steps_of
+from robochoc.vehicles.steps import RouteStep, StepKind, length_along, on_line, steps_of
 
 STILL_S = 3.0
-"""The time for which vehicles may block each other before ways are planned anew, in seconds."""
+"""The time for which vehicles may block each other before routes are planned again, in seconds."""
 _AHEAD_M = 4.0
-"""A set point is so far ahead, or twice the distance, if that is more."""
+"""The distance from a vehicle to its set point; or twice the distance between vehicles, if that is more."""
 _NEARER_M = 0.02
-"""A way leads nearer to another vehicle if it does by more than this."""
+"""Smaller approaches to another vehicle are ignored."""
 _ALL_BUT = 0.999
 Line = tuple[Point, Point]
 
@@ -45,145 +45,151 @@ class Traffic:
         self._fleet = fleet
         self._clock = clock
         self._lock = threading.RLock()
-        self._crafts = {name: Craft(name, rank) for rank, name in enumerate(fleet.vehicles)}
+        self._vehicles = {name: TrackedVehicle(name, rank) for rank, name in enumerate(fleet.vehicles)}
         self._planned_s = -math.inf
         self._ahead_m = max(_AHEAD_M, 2 * fleet.distance_m)
         self._keep_m = fleet.distance_m - 2 * fleet.tolerance_m - SLACK_M
         self._ends = False
 
-    # What happens
+    # Events
 
-    def see(self, name: str, place: Point | None, *, in_air: bool) -> None:
+    def update_place(self, name: str, place: Point | None, *, in_air: bool) -> None:
         """Record the place of a vehicle."""
         with self._lock:
-            craft = self._crafts[name]
-            craft.place = place or craft.place
-            if place and not in_air and not craft.flies:
-                craft.ground_m = place[2]
-            came_down = craft.gone and craft.in_air and not in_air
-            craft.in_air = in_air
+            vehicle = self._vehicles[name]
+            vehicle.place = place or vehicle.place
+            if place and not in_air and not vehicle.flies:
+                vehicle.ground_m = place[2]
+            came_down = vehicle.gone and vehicle.in_air and not in_air
+            vehicle.in_air = in_air
             if came_down:
                 self._replan()
 
-    def fly(self, targets: Mapping[str, Target]) -> None:
-        """Plan ways to `targets`. Raises `RouteError`, and all stay where they were bound for."""
+    def fly(self, targets: Mapping[str, VehicleTarget]) -> None:
+        """Plan routes to `targets`.
+
+        Raises:
+            RouteError: There are no such routes; all keep their earlier targets.
+        """
         with self._lock:
-            before = {name: self._crafts[name].target for name in targets}
+            before = {name: self._vehicles[name].target for name in targets}
             for name, target in targets.items():
-                self._crafts[name].target = target
+                self._vehicles[name].target = target
             try:
                 self._plan()
             except RouteError:
                 for name, earlier in before.items():
-                    self._crafts[name].target = earlier
+                    self._vehicles[name].target = earlier
                 raise
 
     def climbing(self, name: str) -> None:
         """Record that a vehicle takes off."""
         with self._lock:
-            craft = self._crafts[name]
-            craft.flies = True
-            if craft.step:
-                craft.setpoint, craft.released = craft.step.end, craft.done + 1
+            vehicle = self._vehicles[name]
+            vehicle.flies = True
+            if vehicle.step:
+                vehicle.setpoint, vehicle.released = vehicle.step.end, vehicle.done + 1
 
     def climbed(self, name: str) -> None:
         """Record that a vehicle has taken off."""
         with self._lock:
-            craft = self._crafts[name]
-            if craft.step and craft.step.kind is StepKind.CLIMB:
-                craft.done += 1
+            vehicle = self._vehicles[name]
+            if vehicle.step and vehicle.step.kind is StepKind.CLIMB:
+                vehicle.done += 1
 
     def landing(self, name: str) -> None:
         """Record that a vehicle lands where it is."""
         with self._lock:
-            craft = self._crafts[name]
-            craft.lands = True
-            if craft.place:
-                craft.setpoint = craft.ground(craft.place)
+            vehicle = self._vehicles[name]
+            vehicle.lands = True
+            if vehicle.place:
+                vehicle.setpoint = vehicle.ground(vehicle.place)
 
     def landed(self, name: str) -> None:
         """Record that a vehicle is on the ground."""
         with self._lock:
-            craft = self._crafts[name]
-            craft.flies = craft.lands = False
-            craft.setpoint, craft.done = craft.place, len(craft.steps)
-            if craft.target and not craft.target.lands and not self._ends:
-                self._replan()  # it was sent elsewhere while it landed
+            vehicle = self._vehicles[name]
+            vehicle.flies = vehicle.lands = False
+            vehicle.setpoint, vehicle.done = vehicle.place, len(vehicle.steps)
+            if vehicle.target and not vehicle.target.lands and not self._ends:
+                self._replan()  # it got a new target while landing
             else:
-                craft.target = None
+                vehicle.target = None
 
     def lose(self, name: str) -> None:
         """Record that a vehicle is out of control: the others keep clear of it and of the space below it."""
         with self._lock:
-            craft = self._crafts[name]
-            if not craft.gone:
-                craft.gone, craft.target = True, None
+            vehicle = self._vehicles[name]
+            if not vehicle.gone:
+                vehicle.gone, vehicle.target = True, None
                 self._replan()
 
-    # What may be done
+    # Clearances
 
     def clearance(self, name: str) -> Clearance:
         """Return the clearance of a vehicle for its next step."""
         with self._lock:
-            craft = self._crafts[name]
-            self._advance(craft)
-            step = craft.step
-            if step is None or craft.place is None:
-                return Clearance(craft.setpoint, rests=True)
-            wanted = step.end if step.kind is not StepKind.FLY else self._ahead(craft)
+            vehicle = self._vehicles[name]
+            self._advance(vehicle)
+            step = vehicle.step
+            if step is None or vehicle.place is None:
+                return Clearance(vehicle.setpoint, rests=True)
+            next_place = step.end if step.kind is not StepKind.FLY else self._ahead(vehicle)
             waits_for = self._waits_for(step)
-            blocked = "" if waits_for else self._in_the_way(craft, wanted)
+            blocked = "" if waits_for else self._vehicle_in_the_way(vehicle, next_place)
             if blocked:
-                return self._stopped(craft, blocked)
-            craft.blocked_s = None
+                return self._stopped(vehicle, blocked)
+            vehicle.blocked_s = None
             if waits_for:
-                return Clearance(craft.setpoint, waits_for=waits_for)
-            if step.kind is StepKind.FLY and self._is_due(craft, step):
-                craft.setpoint = wanted
-            return Clearance(craft.setpoint, climbs=step.kind is StepKind.CLIMB, lands=step.kind is StepKind.LAND)
+                return Clearance(vehicle.setpoint, waits_for=waits_for)
+            if step.kind is StepKind.FLY and self._is_due(vehicle, step):
+                vehicle.setpoint = next_place
+            return Clearance(vehicle.setpoint, climbs=step.kind is StepKind.CLIMB, lands=step.kind is StepKind.LAND)
 
-    def _is_due(self, craft: Craft, step: Step) -> bool:
-        """Return whether a vehicle is to get a new set point: the one before is near, or not on its line."""
-        before, place = craft.setpoint, craft.place
+    def _is_due(self, vehicle: TrackedVehicle, step: RouteStep) -> bool:
+        """Return whether a vehicle needs a new set point: the last one is near, or not on its line."""
+        before, place = vehicle.setpoint, vehicle.place
         if before is None or place is None or math.dist(place, before) <= self._fleet.kind.rules.renews_m:
             return True
-        end = craft.steps[max(craft.released - 1, craft.done)].end
+        end = vehicle.steps[max(vehicle.released - 1, vehicle.done)].end
         reached = length_along(step.begin, end, before)
         is_on = 0 <= reached <= math.dist(step.begin, end)
         return not is_on or math.dist(before, on_line(step.begin, end, reached)) > _NEARER_M
 
     def is_clear_below(self, name: str) -> bool:
-        """Return whether no vehicle that flies by our command is right below a vehicle."""
+        """Return whether no vehicle that flies by our command is directly below a vehicle."""
         with self._lock:
-            craft = self._crafts[name]
-            if craft.place is None:
+            vehicle = self._vehicles[name]
+            if vehicle.place is None:
                 return True
-            column = craft.place, craft.ground(craft.place)
-            others = (one for one in self._crafts.values() if one is not craft and one.flies and one.place)
+            column = vehicle.place, vehicle.ground(vehicle.place)
+            others = (one for one in self._vehicles.values() if one is not vehicle and one.flies and one.place)
             return all(self._apart(column, (one.place or one.rest,) * 2) >= self._keep_m for one in others)
 
-    def _advance(self, craft: Craft) -> None:
-        """Count the steps that a vehicle has done, and those that it may do."""
-        while (step := craft.step) and step.kind is StepKind.FLY:
-            if craft.done == craft.released:
+    def _advance(self, vehicle: TrackedVehicle) -> None:
+        """Count the steps that a vehicle has done, and release the steps that need not wait."""
+        while (step := vehicle.step) and step.kind is StepKind.FLY:
+            if vehicle.done == vehicle.released:
                 if self._waits_for(step):
                     return
-                craft.released += 1
-            if craft.place is None or not self._is_through(step, craft.place):
+                vehicle.released += 1
+            if vehicle.place is None or not self._is_through(step, vehicle.place):
                 break
-            craft.done += 1
-            if craft.done == len(craft.steps):  # near may be where it stops for another reason, as above its take-off
-                craft.setpoint = step.end
-        following = craft.steps[craft.done : craft.released]
+            vehicle.done += 1
+            if vehicle.done == len(
+                vehicle.steps
+            ):  # near may be where it stops for another reason, as above its take-off
+                vehicle.setpoint = step.end
+        following = vehicle.steps[vehicle.done : vehicle.released]
         is_corner = bool(following) and following[-1].is_corner
-        while craft.released < len(craft.steps) and not is_corner:
-            step = craft.steps[craft.released]
+        while vehicle.released < len(vehicle.steps) and not is_corner:
+            step = vehicle.steps[vehicle.released]
             if step.kind is not StepKind.FLY or self._waits_for(step):
                 return
-            craft.released += 1
+            vehicle.released += 1
             is_corner = step.is_corner
 
-    def _is_through(self, step: Step, place: Point) -> bool:
+    def _is_through(self, step: RouteStep, place: Point) -> bool:
         near = self._fleet.tolerance_m
         length = math.dist(step.begin, step.end)
         if step.is_corner or not length:
@@ -191,69 +197,71 @@ class Traffic:
         reached = length_along(step.begin, step.end, place)
         return reached >= length and math.dist(place, on_line(step.begin, step.end, reached)) <= near
 
-    def _ahead(self, craft: Craft) -> Point:
-        """Return the point on its line that a vehicle may head for."""
-        step, place = craft.step, craft.place
-        if step is None or place is None or craft.released <= craft.done:
-            return craft.rest
-        end = craft.steps[craft.released - 1].end
+    def _ahead(self, vehicle: TrackedVehicle) -> Point:
+        """Return the point on its line to which a vehicle may fly."""
+        step, place = vehicle.step, vehicle.place
+        if step is None or place is None or vehicle.released <= vehicle.done:
+            return vehicle.rest
+        end = vehicle.steps[vehicle.released - 1].end
         length = math.dist(step.begin, end)
         if not length:
             return end
         reached = max(length_along(step.begin, end, place), 0.0) + self._ahead_m
         return end if reached >= length else on_line(step.begin, end, reached)
 
-    def _waits_for(self, step: Step) -> str:
+    def _waits_for(self, step: RouteStep) -> str:
         for name, count in step.needs.items():
-            other = self._crafts[name]
+            other = self._vehicles[name]
             if other.done < count and not other.gone:
                 return name
         return ""
 
-    def _stopped(self, craft: Craft, blocked: str) -> Clearance:
-        """Return that a vehicle stays where it is. If that lasts, plan anew."""
+    def _stopped(self, vehicle: TrackedVehicle, blocked: str) -> Clearance:
+        """Return the clearance to stay in place. If the vehicle is blocked for some time, plan all routes again."""
         now = self._clock()
-        if craft.blocked_s is None:
-            craft.blocked_s = now
-            if craft.flies and craft.step and craft.step.kind is not StepKind.CLIMB:
-                craft.setpoint = craft.place
-        elif now - max(craft.blocked_s, self._planned_s) > STILL_S:
+        if vehicle.blocked_s is None:
+            vehicle.blocked_s = now
+            if vehicle.flies and vehicle.step and vehicle.step.kind is not StepKind.CLIMB:
+                vehicle.setpoint = vehicle.place
+        elif now - max(vehicle.blocked_s, self._planned_s) > STILL_S:
             self._replan()
-        return Clearance(craft.setpoint, waits_for=blocked)
+        return Clearance(vehicle.setpoint, waits_for=blocked)
 
-    def _in_the_way(self, craft: Craft, to: Point) -> str:
-        """Return the name of a vehicle to which the way would lead too near, from where both are; empty if none."""
-        if craft.place is None:
+    def _vehicle_in_the_way(self, vehicle: TrackedVehicle, to: Point) -> str:
+        """Return the name of a vehicle that is too near to the straight line `to` a point; empty if there is none."""
+        if vehicle.place is None:
             return ""
-        mine = craft.place, to
+        mine = vehicle.place, to
         reach = math.dist(*mine) + self._keep_m * self._fleet.downwash + _NEARER_M
-        for other in self._crafts.values():
-            if other is craft or other.place is None:
+        for other in self._vehicles.values():
+            if other is vehicle or other.place is None:
                 continue
-            for line, counts in self._lines(other, craft):
-                if counts and math.dist(craft.place, line[0]) <= reach + math.dist(*line):
-                    now_m = self._apart((craft.place, craft.place), line)
+            for line, counts in self._lines(other, vehicle):
+                if counts and math.dist(vehicle.place, line[0]) <= reach + math.dist(*line):
+                    now_m = self._apart((vehicle.place, vehicle.place), line)
                     if self._apart(mine, line) < min(self._keep_m, now_m - _NEARER_M):
                         return other.name
         return ""
 
-    def _lines(self, other: Craft, craft: Craft) -> Iterator[tuple[Line, bool]]:
-        """Yield where another vehicle may be, and whether `craft` has to mind it."""
+    def _lines(self, other: TrackedVehicle, vehicle: TrackedVehicle) -> Iterator[tuple[Line, bool]]:
+        """Yield the lines on which another vehicle may be, and whether `vehicle` has to keep away from them."""
         place = other.place or other.rest
         yield (place, place), True
         if other.in_air and (other.gone or other.lands):
             yield (place, other.ground(place)), True
         elif other.flies and other.blocked_s is None and other.setpoint:
-            strays = self._strays(other) or self._strays(craft)
-            yield (place, other.setpoint), strays and other.rank < craft.rank
+            strays = self._strays(other) or self._strays(vehicle)
+            yield (place, other.setpoint), strays and other.rank < vehicle.rank
 
-    def _strays(self, craft: Craft) -> bool:
-        """Return whether a vehicle is off its way."""
-        if craft.place is None or craft.setpoint is None:
+    def _strays(self, vehicle: TrackedVehicle) -> bool:
+        """Return whether a vehicle is off its line."""
+        if vehicle.place is None or vehicle.setpoint is None:
             return False
-        begin = craft.step.begin if craft.step else craft.setpoint
-        reached = max(0.0, min(length_along(begin, craft.setpoint, craft.place), math.dist(begin, craft.setpoint)))
-        return math.dist(craft.place, on_line(begin, craft.setpoint, reached)) > self._fleet.tolerance_m
+        begin = vehicle.step.begin if vehicle.step else vehicle.setpoint
+        reached = max(
+            0.0, min(length_along(begin, vehicle.setpoint, vehicle.place), math.dist(begin, vehicle.setpoint))
+        )
+        return math.dist(vehicle.place, on_line(begin, vehicle.setpoint, reached)) > self._fleet.tolerance_m
 
     def _apart(self, first: Line, second: Line) -> float:
         flat = [squashed(np.array(line), self._fleet.downwash) for line in (first, second)]
@@ -262,7 +270,7 @@ class Traffic:
     # Plans
 
     def _replan(self) -> None:
-        """Plan anew from where all are. Where that is not possible, those who fly stay where they are."""
+        """Plan all routes again from the present places. If that is not possible, flying vehicles stay in place."""
         self._planned_s = self._clock()
         try:
             if self._ends:
@@ -273,11 +281,11 @@ class Traffic:
             return
 
     def _plan(self) -> None:
-        """Plan ways from where all are bound for. Raises `RouteError`."""
+        """Plan routes from the present destinations. Raises `RouteError`."""
         self._planned_s = self._clock()
-        crafts = [one for one in self._crafts.values() if one.place]
-        standing = {one.name: self._standing(one) for one in crafts if not self._moves(one)}
-        moving = [one for one in crafts if one.name not in standing]
+        vehicles = [one for one in self._vehicles.values() if one.place]
+        standing = {one.name: self._standing(one) for one in vehicles if not self._moves(one)}
+        moving = [one for one in vehicles if one.name not in standing]
         first = [PlannedLeg(one.name, np.array([one.place, one.rest])) for one in moving if one.flies]
         starts = {one.name: one.rest for one in moving}
         goals = self._goals(moving)
@@ -290,76 +298,127 @@ class Traffic:
         lifted = {one.name for one in moving if one.flies and one.step and one.step.kind is StepKind.CLIMB}
         first.sort(key=lambda leg: leg.name not in lifted)
         landing = {one.name for one in moving if one.target and one.target.lands}
-        self._take(steps_of([*first, *legs], lifted | {*climbing}, landing, distance_m, self._fleet.downwash))
+        self._assign_steps(steps_of([*first, *legs], lifted | {*climbing}, landing, distance_m, self._fleet.downwash))
         for name in lifted:
-            self._crafts[name].released = 1
+            self._vehicles[name].released = 1
 
-    def _take(self, steps: Mapping[str, list[Step]]) -> None:
-        for craft in self._crafts.values():
-            if craft.gone or not craft.lands:
-                craft.steps, craft.done, craft.released = steps.get(craft.name, []), 0, 0
-                craft.blocked_s = None
+    def _assign_steps(self, steps: Mapping[str, list[RouteStep]]) -> None:
+        for vehicle in self._vehicles.values():
+            if vehicle.gone or not vehicle.lands:
+                vehicle.steps, vehicle.done, vehicle.released = steps.get(vehicle.name, []), 0, 0
+                vehicle.blocked_s = None
 
-    def _moves(self, craft: Craft) -> bool:
-        """Return whether a vehicle has a part in a plan. Others stay, or land by themselves."""
-        if craft.gone or craft.lands:
+    def _moves(self, vehicle: TrackedVehicle) -> bool:
+        """Return whether a vehicle is planned for. Others stay, or land by themselves."""
+        if vehicle.gone or vehicle.lands:
             return False
-        if craft.flies:
+        if vehicle.flies:
             return True
-        return craft.target is not None and (craft.in_air or not craft.target.lands)
+        return vehicle.target is not None and (vehicle.in_air or not vehicle.target.lands)
 
-    def _standing(self, craft: Craft) -> Point:
-        at = craft.place or craft.rest
-        return craft.ground(at) if craft.in_air and (craft.gone or craft.lands) else at
+    def _standing(self, vehicle: TrackedVehicle) -> Point:
+        at = vehicle.place or vehicle.rest
+        return vehicle.ground(at) if vehicle.in_air and (vehicle.gone or vehicle.lands) else at
 
-    def _goals(self, moving: list[Craft]) -> dict[str, Point]:
-        """Return where vehicles are to go: not below one that comes down by itself, as long as it does."""
+    def _goals(self, moving: list[TrackedVehicle]) -> dict[str, Point]:
+        """Return the goals of vehicles: not below a vehicle that is out of control and still in the air."""
         found = {one.name: self._goal(one) for one in moving}
-        falling = [one.place for one in self._crafts.values() if one.gone and one.in_air and one.place]
+        falling = [one.place for one in self._vehicles.values() if one.gone and one.in_air and one.place]
         for name, goal in found.items():
             above = [at for at in falling if math.dist(at[:2], goal[:2]) < self._fleet.distance_m and at[2] >= goal[2]]
             if above:
                 others = [at for other, at in found.items() if other != name]
                 found[name] = (
-                    RoutePlanner(self._fleet, {}, self._fleet.distance_m).spot(goal, [*falling, *others]) or goal
+                    RoutePlanner(self._fleet, {}, self._fleet.distance_m).free_spot(goal, [*falling, *others]) or goal
                 )
         return found
 
-    def _goal(self, craft: Craft) -> Point:
-        target = craft.target
+    def _goal(self, vehicle: TrackedVehicle) -> Point:
+        target = vehicle.target
         if target is None:
-            return craft.rest
-        if target.lands and not self._fleet.fence.holds_above(target.at):
-            return craft.ground(craft.rest)
+            return vehicle.rest
+        if target.lands and not self._fleet.fence.covers(target.at):
+            return vehicle.ground(vehicle.rest)
         return target.at
 
     def _present_distance(self, points: Iterable[Point]) -> float:
-        """Return the distance to plan with: less than in the fleet file where vehicles are nearer already."""
+        """Return the distance for planning: less than in the fleet file if vehicles are already nearer."""
         least = spacing([*points], self._fleet.downwash)
-        wanted = self._fleet.distance_m
-        return wanted if least >= wanted else max(least * _ALL_BUT, wanted / 2)
+        next_place = self._fleet.distance_m
+        return next_place if least >= next_place else max(least * _ALL_BUT, next_place / 2)
 
     def bring_down(self) -> None:
-        """Plan how all that fly land: where they are, the lowest first. One that is above another's place gives way."""
+        """Plan the landing of all flying vehicles in place, the lowest first; beside a place that is not free."""
         with self._lock:
             self._ends = True
             flying = [
-                one for one in self._crafts.values() if one.flies and not one.gone and not one.lands and one.place
+                one for one in self._vehicles.values() if one.flies and not one.gone and not one.lands and one.place
             ]
             flying.sort(key=lambda one: one.rest[2])
             for one in flying:
                 one.target, one.setpoint = None, one.place
             standing = {
-                one.name: self._standing(one) for one in self._crafts.values() if one.place and one not in flying
+                one.name: self._standing(one) for one in self._vehicles.values() if one.place and one not in flying
             }
             rests = {one.name: one.rest for one in flying}
             grounds = {one.name: one.ground(one.rest)[2] for one in flying}
             distance_m = self._present_distance([*rests.values(), *standing.values()])
-            ways = RoutePlanner(self._fleet, standing, distance_m)
+            planner = RoutePlanner(self._fleet, standing, distance_m)
             try:
-                legs = ways.descents(rests, grounds)
+                legs = planner.descents(rests, grounds)
                 steps = steps_of(legs, (), {one.name for one in flying}, distance_m, self._fleet.downwash)
             except RouteError:
-                steps = {one.name: [Step(StepKind.LAND, one.rest, one.ground(one.rest), True)] for one in flying}
-            self._take(steps)
+                steps = {one.name: [RouteStep(StepKind.LAND, one.rest, one.ground(one.rest), True)] for one in flying}
+            self._assign_steps(steps)
             self._planned_s = self._clock()
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """The permission of a vehicle for its next step."""
+
+    to: Point | None = None
+    """Its set point; None before it has one."""
+    climbs: bool = False
+    lands: bool = False
+    rests: bool = False
+    """True once the vehicle has arrived at the end of its route."""
+    waits_for: str = ""
+    """The name of another vehicle; empty if it need not wait."""
+
+
+@dataclass
+class TrackedVehicle:
+    """The state of a vehicle in traffic."""
+
+    name: str
+    rank: int
+    place: Point | None = None
+    in_air: bool = False
+    ground_m: float = 0.0
+    """The height of the ground at its last place on the ground."""
+    flies: bool = False
+    """True while the vehicle is in the air by our command."""
+    lands: bool = False
+    """True while the vehicle's autopilot lands it."""
+    gone: bool = False
+    target: VehicleTarget | None = None
+    setpoint: Point | None = None
+    steps: list[RouteStep] = field(default_factory=list)
+    done: int = 0
+    released: int = 0
+    blocked_s: float | None = None
+
+    @property
+    def step(self) -> RouteStep | None:
+        """The current step; None after the last."""
+        return self.steps[self.done] if self.done < len(self.steps) else None
+
+    @property
+    def rest(self) -> Point:
+        """The destination by the newest set point."""
+        return self.setpoint or self.place or (math.nan,) * 3
+
+    def ground(self, at: Point) -> Point:
+        """Return the point on the ground below `at`."""
+        return (*at[:2], min(self.ground_m, at[2]))

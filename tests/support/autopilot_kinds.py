@@ -88,7 +88,7 @@ class Crazyflie(AutopilotKind):
         "landing": lambda vehicle: vehicle.planner == "landing",
     }
     quick: Mapping[str, object] = {"takeoff": 0.5}
-    without_a_guard = "the guard process has ended; vehicles fly to where they were sent, and hover there"
+    without_a_guard = "the guard process has ended; vehicles fly to their targets, and hover there"
 
     def field(self, folder: Path, **settings: object) -> AbstractContextManager[tuple[PlayedFleet[Any], Path]]:
         from tests.support.crazyflie_teams import crazyflie_field  # noqa: PLC0415 - as for the other kind

@@ -1,4 +1,4 @@
-"""A guard in a thread of this process, with played autopilots, in place of the process that `GuardProcess` starts."""
+"""A guard in a thread of this process, with played autopilots, in place of the process that `GuardClient` starts."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from io import FileIO
 import msgspec
 
 from robochoc.flight.layout import Point
-from robochoc.vehicles.guard import Guard, Orders, watch
-from robochoc.vehicles.messages import Ended, FromGuard, Setup, ToGuard, line_of
+from robochoc.vehicles.guard import Orders, VehicleGuard, serve_orders
+from robochoc.vehicles.messages import FromGuard, GuardEnded, GuardSetup, ToGuard, line_of
 from tests.support.limits import HANG_S
 from tests.support.played_autopilot import GROUND, Played
 
@@ -42,7 +42,7 @@ class Flyer(Played):
 
 
 class GuardThread:
-    """The side of `subprocess.Popen` that `GuardProcess` uses. The thread ends when its orders end."""
+    """The side of `subprocess.Popen` that `GuardClient` uses. The thread ends when its orders end."""
 
     pid = 0
 
@@ -67,10 +67,10 @@ class GuardThread:
                     told.write(line_of(message))
 
             setup = msgspec.json.decode(lines.readline(), type=ToGuard)
-            assert isinstance(setup, Setup)
-            guard = Guard(setup.fleet, self._flyers.__getitem__, tell)
-            watch(guard, OrdersFrom(lines), threading.Event())
-            tell(Ended())
+            assert isinstance(setup, GuardSetup)
+            guard = VehicleGuard(setup.fleet, self._flyers.__getitem__, tell)
+            serve_orders(guard, OrdersFrom(lines), threading.Event())
+            tell(GuardEnded())
 
 
 class OrdersFrom(Orders):
@@ -81,7 +81,7 @@ class OrdersFrom(Orders):
         self._has_ended = False
 
     @property
-    def over(self) -> bool:
+    def ended(self) -> bool:
         return self._has_ended
 
     def next(self, wait_s: float) -> ToGuard | None:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from robochoc.flight.layout import Point
 from robochoc.vehicles.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
-from robochoc.vehicles.fleet import AtEnd, Fence, Fleet, Link, point_text
-from robochoc.vehicles.messages import State, Target
+from robochoc.vehicles.fleet import AtEnd, Fence, Fleet, VehicleLink, point_text
+from robochoc.vehicles.messages import VehicleState, VehicleTarget
 from robochoc.vehicles.pilot import Pilot
 from robochoc.vehicles.traffic import Traffic
 
@@ -63,9 +63,9 @@ class Played(Autopilot):
         pass
 
 
-FLEET = Fleet({"A": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)), distance_m=2)
+FLEET = Fleet({"A": VehicleLink("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)), distance_m=2)
 """With such a distance set points are far ahead: at the places themselves."""
-THERE = Target((3, 1, 2))
+THERE = VehicleTarget((3, 1, 2))
 
 
 class Ordered(Pilot):
@@ -75,7 +75,7 @@ class Ordered(Pilot):
         self.traffic = Traffic(FLEET, lambda: played.now)
         super().__init__("A", played, FLEET, self.traffic, lambda: played.now)
 
-    def fly(self, order: int, target: Target) -> None:
+    def fly(self, order: int, target: VehicleTarget) -> None:
         self.traffic.fly({"A": target})
         super().fly(order, target)
 
@@ -85,14 +85,14 @@ class Ordered(Pilot):
         super().end(how, waits=waits)
 
 
-def steps(pilot: Pilot, played: Played, count: int = 1, each_s: float = 0.1) -> State:
+def steps(pilot: Pilot, played: Played, count: int = 1, each_s: float = 0.1) -> VehicleState:
     for _ in range(count):
         played.now += each_s
         state = pilot.step()
     return state
 
 
-def flying(pilot: Pilot, target: Target = THERE) -> None:
+def flying(pilot: Pilot, target: VehicleTarget = THERE) -> None:
     pilot.step()
     pilot.fly(1, target)
 

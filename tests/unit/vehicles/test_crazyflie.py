@@ -10,9 +10,9 @@ pytest.importorskip("cflib")
 
 from robochoc.vehicles.cflib_autopilot import PEAK
 from robochoc.vehicles.fleet import read_fleet
-from robochoc.vehicles.guard_process import GuardProcess
-from robochoc.vehicles.kinds import Kind
-from robochoc.vehicles.messages import Phase, Target
+from robochoc.vehicles.guard_client import GuardClient
+from robochoc.vehicles.kinds import VehicleKind
+from robochoc.vehicles.messages import FlightPhase, VehicleTarget
 from tests.support.crazyflie_firmware import Crazyfly
 from tests.support.crazyflie_teams import crazyflie_field, solve
 from tests.support.limits import HANG_S, wait_until
@@ -23,8 +23,8 @@ def reached(vehicle: Crazyfly) -> list[str]:
     return [line.removeprefix("goto ") for line in vehicle.log if line.startswith("goto")]
 
 
-def all_ready(guard: GuardProcess) -> bool:
-    return [state.phase for state in guard.states.values()] == [Phase.READY] * len(NAMES)
+def all_ready(guard: GuardClient) -> bool:
+    return [state.phase for state in guard.states.values()] == [FlightPhase.READY] * len(NAMES)
 
 
 @pytest.mark.more
@@ -98,7 +98,9 @@ def test_a_crazyflie_that_is_not_there_ends_with_one_message(tmp_path: Path) -> 
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
-        assert f"RC cannot be flown: it is not heard on udp://127.0.0.1:{vehicles[2].port} within 5 s" in done.stderr
+        assert (
+            f"RC cannot be flown: no message received on udp://127.0.0.1:{vehicles[2].port} within 5 s" in done.stderr
+        )
         assert done.stderr.count("\n") == 1
         assert done.returncode == 1
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
@@ -108,8 +110,8 @@ def test_a_crazyflie_that_is_not_there_ends_with_one_message(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("trouble", "why"),
     [
-        ({"version": 10}, "its firmware speaks version 10 of the protocol: update it, to version 12"),
-        ({"lacks": {"supervisor.info"}}, "its firmware does not tell all that is needed (Variable supervisor.info not"),
+        ({"version": 10}, "its firmware has version 10 of the protocol: update it to version 12"),
+        ({"lacks": {"supervisor.info"}}, "its firmware lacks a required log variable (Variable supervisor.info not"),
     ],
 )
 def test_firmware_that_is_too_old(tmp_path: Path, trouble: dict[str, object], why: str) -> None:
@@ -143,7 +145,7 @@ def test_a_port_at_which_nobody_is(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         fleet.write_text(fleet.read_text().replace(str(vehicles[0].port), "9"))
         done = solve(tmp_path, fleet)
-        assert "RA cannot be flown: it is not heard on udp://127.0.0.1:9 within 5 s" in done.stderr
+        assert "RA cannot be flown: no message received on udp://127.0.0.1:9 within 5 s" in done.stderr
 
 
 # What goes wrong on the way
@@ -193,11 +195,11 @@ def test_who_loses_its_link_hovers_and_the_others_land(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_whose_battery_is_low_on_the_way_lands(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
-        guard = GuardProcess(read_fleet(fleet, Kind.CRAZYFLIE))
+        guard = GuardClient(read_fleet(fleet, VehicleKind.CRAZYFLIE))
         try:
             guard.permit()
             assert guard.wait_for(lambda: all_ready(guard), HANG_S)
-            guard.fly({"RB": Target((2, 0, 2))})
+            guard.fly({"RB": VehicleTarget((2, 0, 2))})
             wait_until(lambda: vehicles[1].at[2] > 1.9, vehicles.state)
             vehicles[1].low_power = True
             vehicles.wait_until_landed()
@@ -210,14 +212,14 @@ def test_whose_battery_is_low_on_the_way_lands(tmp_path: Path) -> None:
 @pytest.mark.parametrize("lost", ["silent", "gone"])
 def test_who_is_heard_again_lands(tmp_path: Path, lost: str) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
-        guard = GuardProcess(read_fleet(fleet, Kind.CRAZYFLIE))
+        guard = GuardClient(read_fleet(fleet, VehicleKind.CRAZYFLIE))
         try:
             guard.permit()
             assert guard.wait_for(lambda: all_ready(guard), HANG_S)
-            guard.fly({"RB": Target((2, 0, 2))})
+            guard.fly({"RB": VehicleTarget((2, 0, 2))})
             wait_until(lambda: vehicles[1].flies, vehicles.state)
             setattr(vehicles[1], lost, True)
-            assert guard.wait_for(lambda: "RB" in guard.states and guard.states["RB"].phase is Phase.OUT, HANG_S)
+            assert guard.wait_for(lambda: "RB" in guard.states and guard.states["RB"].phase is FlightPhase.OUT, HANG_S)
             assert vehicles[1].flies
             setattr(vehicles[1], lost, False)
             vehicles.wait_until_landed()

@@ -15,7 +15,7 @@ from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 from robochoc.vehicles import cflib_autopilot
 from robochoc.vehicles.autopilot import OFFBOARD, RefusedError, Telemetry
 from robochoc.vehicles.cflib_autopilot import PEAK, CflibAutopilot
-from robochoc.vehicles.fleet import Link
+from robochoc.vehicles.fleet import VehicleLink
 from robochoc.vehicles.supervisor import (
     ARMS_ITSELF,
     CAN_ARM,
@@ -55,7 +55,7 @@ def linked(at: Place = (0.0, 0.0, 0.0), **what: object) -> Iterator[tuple[Crazyf
         setattr(vehicle, name, value)
     before = {*threading.enumerate()}
     with Crazyflies([vehicle]) as vehicles:
-        autopilot = CflibAutopilot(Link(f"udp://127.0.0.1:{port}", at), SPEED_MS)
+        autopilot = CflibAutopilot(VehicleLink(f"udp://127.0.0.1:{port}", at), SPEED_MS)
         try:
             wait_until(autopilot.connect, "it is not heard")
             yield vehicle, autopilot
@@ -204,17 +204,17 @@ def test_who_is_not_heard_gets_no_command(monkeypatch: pytest.MonkeyPatch) -> No
     with linked() as (vehicle, autopilot):
         vehicle.silent = True
         seen(autopilot, lambda told: told.silent_s > 1)
-        with pytest.raises(RefusedError, match="it cannot arm: it is not heard"):
+        with pytest.raises(RefusedError, match="it cannot arm: no recent message from it"):
             autopilot.arm()
 
 
 def test_blocks_of_the_log_are_no_answer_to_a_new_link() -> None:
     autopilot = object.__new__(CflibAutopilot)
-    autopilot._heard_at = 0.0
-    autopilot._heard(CRTPPacket(CRTPPort.LOGGING << 4 | 2))
-    assert autopilot._heard_at == 0
-    autopilot._heard(CRTPPacket(CRTPPort.LOGGING << 4 | 1))
-    assert autopilot._heard_at > 0
+    autopilot._received_at = 0.0
+    autopilot._packet_received(CRTPPacket(CRTPPort.LOGGING << 4 | 2))
+    assert autopilot._received_at == 0
+    autopilot._packet_received(CRTPPacket(CRTPPort.LOGGING << 4 | 1))
+    assert autopilot._received_at > 0
 
 
 @pytest.mark.more
@@ -254,9 +254,9 @@ def test_a_landing_that_is_under_way_is_no_refusal() -> None:
         (IS_ARMED | CAN_FLY | FLIES | COMMANDS, True, OFFBOARD, ""),
         (IS_ARMED | CAN_FLY | FLIES, True, "MANUAL", ""),
         (CAN_ARM | LOCKED, False, "STANDBY", "it is locked: restart it"),
-        (CRASHED, False, "STANDBY", "it has crashed: put it on its feet and restart it"),
+        (CRASHED, False, "STANDBY", "it has crashed: set it upright and restart it"),
         (TUMBLED, False, "STANDBY", "it does not stand upright"),
-        (CAN_ARM | DECK_FAULT, False, "STANDBY", "a deck of it has a fault"),
+        (CAN_ARM | DECK_FAULT, False, "STANDBY", "one of its decks has a fault"),
         (0, False, "STANDBY", "its autopilot is not ready to arm"),
     ],
 )

@@ -20,7 +20,7 @@ PORTS = dict(zip(NAMES, range(14540, 14544), strict=True))
 def test_they_stand_in_the_fence_and_keep_their_distance(tmp_path: Path) -> None:
     fleet = read_fleet(fleet_file(tmp_path, PORTS))
     stand = [one.at for one in players(fleet).values()]
-    assert all(fleet.fence.holds(at) for at in stand)
+    assert all(fleet.fence.contains(at) for at in stand)
     assert min(dist(*two) for two in combinations(stand, 2)) > fleet.distance_m
 
 

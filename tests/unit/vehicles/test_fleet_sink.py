@@ -17,9 +17,9 @@ from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.vehicles import guard
 from robochoc.vehicles.autopilot import Telemetry
 from robochoc.vehicles.fleet import read_fleet
-from robochoc.vehicles.guard_process import GuardError, GuardProcess, shared
+from robochoc.vehicles.guard_client import GuardClient, GuardError, shared
 from robochoc.vehicles.mavlink import MavlinkSource
-from robochoc.vehicles.messages import Target
+from robochoc.vehicles.messages import VehicleTarget
 from tests.support.cases import looped
 from tests.support.guard_thread import Flyer, GuardThread
 from tests.support.limits import HANG_S
@@ -63,7 +63,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Field]:
     """A field whose guard is a thread."""
     here = Field(tmp_path)
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: GuardThread(here.flyers))
-    for name in ("STEP_S", "TOLD_S"):
+    for name in ("STEP_S", "REPORT_S"):
         monkeypatch.setattr(guard, name, 0.002)
     yield here
     assert not shared._open  # noqa: SLF001 - no guard is left
@@ -92,10 +92,10 @@ def test_at_the_end_vehicles_do_as_the_fleet_file_says(here: Field, end: str) ->
 
 
 def test_an_order_without_a_permit_is_refused(here: Field) -> None:
-    process = GuardProcess(read_fleet(here.fleet()))
+    process = GuardClient(read_fleet(here.fleet()))
     try:
-        process.fly({"RA": Target((0.0, 0.0, 2.0))})
-        with pytest.raises(GuardError, match="nothing may be armed: an order to fly came without a permit"):
+        process.fly({"RA": VehicleTarget((0.0, 0.0, 2.0))})
+        with pytest.raises(GuardError, match="arming is not permitted, but an order to fly was received"):
             process.wait_for(lambda: False, HANG_S)
     finally:
         process.close()
@@ -133,7 +133,7 @@ def test_all_vehicles_that_are_not_heard_are_named_at_once(here: Field) -> None:
     for name in ("RB", "RC", "RD"):
         here.flyers[name].connects, here.flyers[name].seen = False, Telemetry()
     done = here.solve(here.fleet(patience=1), "--arm")
-    assert "RB cannot be flown: it is not heard on udpin://" in done.stderr
+    assert "RB cannot be flown: no message received on udpin://" in done.stderr
     assert "within 1 s; nor can RC, RD; nothing was armed" in done.stderr
     assert done.stderr.count("\n") == 1
     assert here.done == [[]] * 4

@@ -15,11 +15,11 @@ pytest.importorskip("mavsdk")
 from robochoc.robots.closed_loop import drones_of
 from robochoc.robots.sink import SinkError
 from robochoc.robots.waypoint import Waypoint
-from robochoc.vehicles import guard_process
+from robochoc.vehicles import guard_client
 from robochoc.vehicles.fleet import read_fleet
-from robochoc.vehicles.guard_process import GuardError, GuardProcess
+from robochoc.vehicles.guard_client import GuardClient, GuardError
 from robochoc.vehicles.mavlink import MavlinkSink
-from robochoc.vehicles.messages import Phase, Target
+from robochoc.vehicles.messages import FlightPhase, VehicleTarget
 from tests.support.cases import looped
 from tests.support.limits import HANG_S
 from tests.support.mavlink_field import ON_EARTH, STANDS, mavlink_field, solve
@@ -82,7 +82,7 @@ def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
     with mavlink_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
-        assert "RC cannot be flown: it is not heard on udpin://127.0.0.1:" in done.stderr
+        assert "RC cannot be flown: no message received on udpin://127.0.0.1:" in done.stderr
         assert "within 5 s; nothing was armed" in done.stderr
         assert done.stderr.count("\n") == 1
         assert done.returncode == 1
@@ -105,7 +105,7 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
             ["--arm", "--ros", "mcap:run.mcap"],
             "--arm requires --ros mavlink:FILE or --ros crazyflie:FILE; mcap:run.mcap cannot arm vehicles",
         ),
-        (["--ros", "mavlink"], "mavlink: which vehicles is not said; name a fleet file, as in mavlink:fleet.yaml"),
+        (["--ros", "mavlink"], "mavlink: the fleet file is missing; name a fleet file, as in mavlink:fleet.yaml"),
         (["--ros", "mavlink:nowhere.yaml"], "nowhere.yaml: No such file or directory; name a fleet file"),
     ],
 )
@@ -152,7 +152,7 @@ def test_who_no_longer_knows_its_place_ends_the_flight_and_lands(tmp_path: Path,
     with mavlink_field(tmp_path, patience=3, **origin) as (vehicles, fleet):
         vehicles[1].lost_from = "offboard"
         done = solve(tmp_path, fleet, "--arm")
-        assert "RB is out of order: it has not told its place for 3 s; the others are brought down" in done.stderr
+        assert "RB is out of order: no place reported for 3 s; the others are brought down" in done.stderr
         vehicles.wait_until_landed()
         assert "offboard lost" not in vehicles[1].log
 
@@ -168,20 +168,20 @@ def waypoints_of_four() -> list[Waypoint]:
     ]
 
 
-def drones_targets() -> Mapping[str, Target]:
-    return {name: Target((x, y, 2.0)) for name, (x, y, _) in zip(NAMES, STANDS, strict=True)}
+def drones_targets() -> Mapping[str, VehicleTarget]:
+    return {name: VehicleTarget((x, y, 2.0)) for name, (x, y, _) in zip(NAMES, STANDS, strict=True)}
 
 
 @contextmanager
-def guarded(fleet: Path) -> Iterator[GuardProcess]:
-    guard = GuardProcess(read_fleet(fleet))
+def guarded(fleet: Path) -> Iterator[GuardClient]:
+    guard = GuardClient(read_fleet(fleet))
     try:
         yield guard
     finally:
         guard.close()
 
 
-def all_in(guard: GuardProcess, phase: Phase) -> Callable[[], bool]:
+def all_in(guard: GuardClient, phase: FlightPhase) -> Callable[[], bool]:
     return lambda: [state.phase for state in guard.states.values()] == [phase] * len(NAMES)
 
 
@@ -190,11 +190,11 @@ def test_a_guard_may_say_nothing_for_longer_at_first(tmp_path: Path, monkeypatch
     mute.write_text("#!/bin/sh\ncat >/dev/null\nexit 0\n", encoding="utf-8")
     mute.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(mute))
-    monkeypatch.setattr(guard_process, "SILENT_S", -1.0)
+    monkeypatch.setattr(guard_client, "SILENT_S", -1.0)
     with guarded(fleet_file(tmp_path, {"RA": udp_ports(1)[0]})) as guard:
         guard.check()
-        monkeypatch.setattr(guard_process, "START_S", -1.0)
-        with pytest.raises(GuardError, match="the guard process has said nothing for -1 s"):
+        monkeypatch.setattr(guard_client, "START_S", -1.0)
+        with pytest.raises(GuardError, match="no message from the guard process for -1 s"):
             guard.check()
 
 
@@ -203,20 +203,20 @@ def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
     with mavlink_field(tmp_path) as (vehicles, fleet):
         with guarded(fleet) as guard:
             guard.permit()
-            assert guard.wait_for(all_in(guard, Phase.READY), HANG_S)
+            assert guard.wait_for(all_in(guard, FlightPhase.READY), HANG_S)
             guard.fly(drones_targets())
-            assert guard.wait_for(all_in(guard, Phase.ARRIVED), HANG_S)
+            assert guard.wait_for(all_in(guard, FlightPhase.ARRIVED), HANG_S)
         vehicles.wait_until_landed()
         assert not any("offboard lost" in vehicle.log for vehicle in vehicles)
 
 
 def test_an_order_to_an_ended_guard_reports_what_vehicles_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also before the reader of its messages has seen the end."""
-    monkeypatch.setattr(GuardProcess, "_read", lambda _: None)
+    monkeypatch.setattr(GuardClient, "_read", lambda _: None)
     with mavlink_field(tmp_path) as (_, fleet), guarded(fleet) as guard:
         guard._process.kill()  # noqa: SLF001 - as the system might
         guard._process.wait()  # noqa: SLF001
-        with pytest.raises(GuardError, match="has ended; vehicles do what their own failsafe says"):
+        with pytest.raises(GuardError, match="has ended; vehicles follow their own failsafe"):
             guard.permit()
 
 
@@ -228,9 +228,7 @@ def test_a_sink_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
             sink.assign(drones_of(four_drones()))
             sink.allow_arming()
             sink._guard._process.kill()  # noqa: SLF001 - as the system might
-            with pytest.raises(
-                SinkError, match="the guard process has ended; vehicles do what their own failsafe says"
-            ):
+            with pytest.raises(SinkError, match="the guard process has ended; vehicles follow their own failsafe"):
                 sink.decide(waypoints_of_four())
         finally:
             sink.discard()

@@ -13,8 +13,8 @@ pytest.importorskip("mavsdk")
 
 from robochoc.flight.layout import Point
 from robochoc.vehicles.fleet import read_fleet
-from robochoc.vehicles.guard_process import GuardError, GuardProcess
-from robochoc.vehicles.messages import Phase, Target
+from robochoc.vehicles.guard_client import GuardClient, GuardError
+from robochoc.vehicles.messages import FlightPhase, VehicleTarget
 from tests.support.limits import HANG_S, wait_until
 from tests.support.mavlink_teams import NAMES, fleet_file, udp_ports
 from tests.support.mavlink_vehicles import GUST_S, Vehicle, Vehicles
@@ -27,16 +27,16 @@ PLACES: Sequence[Point] = tuple((x, y, 2.0) for x, y in STANDS)
 
 
 @contextmanager
-def field(folder: Path, count: int = 4, **settings: object) -> Iterator[tuple[Vehicles, GuardProcess]]:
+def field(folder: Path, count: int = 4, **settings: object) -> Iterator[tuple[Vehicles, GuardClient]]:
     """Vehicles that stand in a square, and a guard that has heard them and may arm them."""
     ports, names = udp_ports(count), NAMES[:count]
     vehicles = [Vehicle(port, at=(*at, 0.0), speed=6.0) for port, at in zip(ports, STANDS, strict=False)]
     settings = {"near": NEAR_M, "distance": DISTANCE_M, **settings}
     fleet = read_fleet(fleet_file(folder, dict(zip(names, ports, strict=True)), **settings))
     with Vehicles(vehicles) as played:
-        guard = GuardProcess(fleet)
+        guard = GuardClient(fleet)
         try:
-            assert guard.wait_for(lambda: is_all(guard, names, Phase.READY), HANG_S), played.state()
+            assert guard.wait_for(lambda: is_all(guard, names, FlightPhase.READY), HANG_S), played.state()
             guard.permit()
             yield played, guard
         finally:
@@ -44,19 +44,19 @@ def field(folder: Path, count: int = 4, **settings: object) -> Iterator[tuple[Ve
         played.wait_until_landed()
 
 
-def is_all(guard: GuardProcess, names: Sequence[str], phase: Phase) -> bool:
+def is_all(guard: GuardClient, names: Sequence[str], phase: FlightPhase) -> bool:
     return [guard.states[name].phase for name in names if name in guard.states] == [phase] * len(names)
 
 
-def fly(guard: GuardProcess, places: Sequence[Point]) -> None:
+def fly(guard: GuardClient, places: Sequence[Point]) -> None:
     """Send vehicles to places, and wait until they are there."""
     targets = targets_of(places)
     guard.fly(targets)
     assert guard.wait_for(lambda: all(map(guard.is_done, targets)), HANG_S), guard.states
 
 
-def targets_of(places: Sequence[Point]) -> Mapping[str, Target]:
-    return {name: Target(at) for name, at in zip(NAMES, places, strict=False)}
+def targets_of(places: Sequence[Point]) -> Mapping[str, VehicleTarget]:
+    return {name: VehicleTarget(at) for name, at in zip(NAMES, places, strict=False)}
 
 
 @pytest.mark.more
@@ -124,8 +124,8 @@ def test_who_is_lost_above_another_comes_down_when_that_one_has_made_room(tmp_pa
         fly(guard, [(0, 0, 1.5), (0, 0, 3.5)])
         vehicles[1].armed = True
         vehicles[1].refuses = {"land"}
-        guard.fly({NAMES[1]: Target((0, 0, 0), lands=True)})
-        assert guard.wait_for(lambda: guard.states[NAMES[1]].phase is Phase.OUT, HANG_S)
+        guard.fly({NAMES[1]: VehicleTarget((0, 0, 0), lands=True)})
+        assert guard.wait_for(lambda: guard.states[NAMES[1]].phase is FlightPhase.OUT, HANG_S)
         vehicles[1].refuses = set()
         wait_until(lambda: not vehicles[1].flies, vehicles.state)
         assert vehicles[0].flies
@@ -147,6 +147,6 @@ def test_when_no_ways_are_found_in_the_air_all_land(tmp_path: Path) -> None:
     with field(tmp_path, 2, fence="[[-0.1, -0.1, 0], [2.1, 0.1, 2.1]]") as (vehicles, guard):
         fly(guard, PLACES[:2])
         guard.fly(targets_of(PLACES[1::-1]))
-        with pytest.raises(GuardError, match="the decision is not flown: the only way found leads by"):
+        with pytest.raises(GuardError, match="the decision is not flown: the only route found passes"):
             guard.wait_for(lambda: False, HANG_S)
     assert vehicles.nearest_m >= LEAST_M

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.vehicles.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, Link, read_fleet
+from robochoc.vehicles.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, VehicleLink, read_fleet
 from robochoc.vehicles.frames import GpsPlace
-from robochoc.vehicles.kinds import Kind
+from robochoc.vehicles.kinds import VehicleKind
 from tests.support.cases import looped
 from tests.support.program import ROOT
 
@@ -26,7 +26,7 @@ def read(folder: Path, text: str) -> Fleet:
 
 def test_a_fleet_file_and_what_it_leaves_out(tmp_path: Path) -> None:
     found = read(tmp_path, f"vehicles:\n  Nose: {LINK}\n{FENCE}\n")
-    assert found == Fleet({"Nose": Link(LINK)}, BOX)
+    assert found == Fleet({"Nose": VehicleLink(LINK)}, BOX)
     assert (found.takeoff_m, found.near_m, found.end, found.patience_s, found.time_s) == (
         (2.5, 0.5, AtEnd.LAND, 10, 120)
     )
@@ -41,9 +41,9 @@ def test_a_fleet_file_that_says_all(tmp_path: Path) -> None:
         "distance: 1.5\ndownwash: 2\n"
     )
     links = {
-        "Nose": Link("udpout://10.0.0.7:14550", (1, -2.5, 0)),
-        "3": Link("serial:///dev/ttyUSB0:57600"),
-        "Fin": Link("tcpout://[::1]:5760"),
+        "Nose": VehicleLink("udpout://10.0.0.7:14550", (1, -2.5, 0)),
+        "3": VehicleLink("serial:///dev/ttyUSB0:57600"),
+        "Fin": VehicleLink("tcpout://[::1]:5760"),
     }
     expected = Fleet(
         links, Fence((0, 0, -1), (6, 6.5, 9)), None, 3, 0.25, AtEnd.HOLD, 4, 60, distance_m=1.5, downwash=2
@@ -68,7 +68,7 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
 @looped(
     ("text", "told"),
     [
-        ("", "is empty; see docs/guides/autopilots.md for what a fleet file has"),
+        ("", "is empty; see docs/guides/autopilots.md for the entries of a fleet file"),
         ("[1]", "fleet.yaml:1: a fleet file is not a mapping"),
         ("a: {", "is not YAML"),
         ("a: !!python/object:os.system x", "the tag .* is not allowed"),
@@ -82,28 +82,28 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
         ),
         (f"vehicles: [Nose]\n{FENCE}", "'vehicles' is not a mapping"),
         (f"vehicles: {{}}\n{FENCE}", "0 vehicles; a fleet has 1 to 64"),
-        (f"vehicles: {{Nose: 3}}\n{FENCE}", r"the link of Nose, '3', is none; expected udpin://0.0.0.0:14540"),
-        (f"vehicles: {{Nose: 'udpin://0.0.0.0:70000'}}\n{FENCE}", "is none"),
-        (f"vehicles: {{Nose: 'udpin://0.0.0.0:1 x'}}\n{FENCE}", "is none"),
-        (f"vehicles: {{Nose: 'serial:///etc/passwd:57600'}}\n{FENCE}", "is none"),
-        (f"vehicles: {{Nose: 'serial:///dev/../etc/passwd:57600'}}\n{FENCE}", "is none"),
+        (f"vehicles: {{Nose: 3}}\n{FENCE}", r"the link of Nose, '3', is not valid; expected udpin://0.0.0.0:14540"),
+        (f"vehicles: {{Nose: 'udpin://0.0.0.0:70000'}}\n{FENCE}", "is not valid"),
+        (f"vehicles: {{Nose: 'udpin://0.0.0.0:1 x'}}\n{FENCE}", "is not valid"),
+        (f"vehicles: {{Nose: 'serial:///etc/passwd:57600'}}\n{FENCE}", "is not valid"),
+        (f"vehicles: {{Nose: 'serial:///dev/../etc/passwd:57600'}}\n{FENCE}", "is not valid"),
         (f"vehicles:\n  A: {LINK}\n  B: {LINK}\n{FENCE}", "fleet.yaml:3: B and A have the same link"),
         (f"vehicles: {{A: {{at: [0, 0, 0]}}}}\n{FENCE}", "vehicle A has no link"),
-        (f"vehicles: {{A: {{link: '{LINK}', at: [0, 0]}}}}\n{FENCE}", r"'at' is no place; expected \[x, y, z\]"),
+        (f"vehicles: {{A: {{link: '{LINK}', at: [0, 0]}}}}\n{FENCE}", r"'at' is not a place; expected \[x, y, z\]"),
         (f"vehicles: {{A: {{link: '{LINK}', by: 1}}}}\n{FENCE}", "unknown key 'by' in vehicles.A"),
         (
             f"vehicles: {{A: {{link: '{LINK}', at: [0, 0, 0]}}}}\n{FENCE}\norigin: [1, 2, 3]",
             "'at' is for vehicles with",
         ),
         (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0]]", "'fence' is not a box; expected two corners"),
-        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, 9e99]]", "a corner of the fence is no place"),
-        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, true]]", "a corner of the fence is no place"),
+        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, 9e99]]", "a corner of the fence is not a place"),
+        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, true]]", "a corner of the fence is not a place"),
         (
             f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [9, 9, 2]]",
             "a take-off to 2.5 m leaves a fence that is 2 m high",
         ),
         (f"{GOOD}origin: [47, 8]", "'origin' is not a place"),
-        (f"{GOOD}origin: [80, 8, 0]", "'origin' is too far off; expected latitudes within 75"),
+        (f"{GOOD}origin: [80, 8, 0]", "'origin' is outside the limits; expected latitudes within 75"),
         (f"{GOOD}takeoff: 0", "'takeoff' is '0'; expected 0.5 to 100"),
         (f"{GOOD}takeoff: high", "'takeoff' is 'high'"),
         (f"{GOOD}distance: 0", "'distance' is '0'; expected 0.1 to 100"),
@@ -134,7 +134,7 @@ def test_the_fleet_file_of_the_guide_for_crazyflies(tmp_path: Path) -> None:
     ],
 )
 def test_two_links_that_receive_at_one_port(tmp_path: Path, first: str, second: str) -> None:
-    told = r"fleet\.yaml:3: Fin and Nose both receive at port \d+ of this machine; only one of them would be heard"
+    told = r"fleet\.yaml:3: Fin and Nose both receive at port \d+ of this machine; only one of them would get messages"
     with pytest.raises(FleetError, match=told):
         read(tmp_path, f"vehicles:\n  Nose: {first}\n  Fin: {second}\n{FENCE}\n")
 
@@ -158,19 +158,21 @@ URI = "radio://0/80/2M/E7E7E7E701"
 def read_crazyflies(folder: Path, text: str) -> Fleet:
     file = folder / "fleet.yaml"
     file.write_text(text)
-    return read_fleet(file, Kind.CRAZYFLIE)
+    return read_fleet(file, VehicleKind.CRAZYFLIE)
 
 
 def test_a_fleet_of_crazyflies_and_what_its_file_leaves_out(tmp_path: Path) -> None:
     found = read_crazyflies(tmp_path, f"vehicles:\n  Nose: {URI}\n{FENCE}\n")
-    assert found == Fleet({"Nose": Link(URI)}, BOX, takeoff_m=0.5, near_m=0.1, kind=Kind.CRAZYFLIE, distance_m=0.4)
+    assert found == Fleet(
+        {"Nose": VehicleLink(URI)}, BOX, takeoff_m=0.5, near_m=0.1, kind=VehicleKind.CRAZYFLIE, distance_m=0.4
+    )
     assert (found.speed_ms, found.patience_s, found.connect_s) == (1, 10, 60)
 
 
 @looped("uri", [URI, "radio://12/125/250K/e7e7e7e7e7", "radio://0123456789/0/1M/0000000000", "udp://127.0.0.1:19850"])
 def test_links_to_crazyflies(tmp_path: Path, uri: str) -> None:
     found = read_crazyflies(tmp_path, f"vehicles: {{Nose: {{link: '{uri}', at: [1, 2, 0]}}}}\n{FENCE}\nspeed: 0.5\n")
-    assert found.vehicles == {"Nose": Link(uri, (1, 2, 0))}
+    assert found.vehicles == {"Nose": VehicleLink(uri, (1, 2, 0))}
     assert found.speed_ms == 0.5
 
 
@@ -178,7 +180,7 @@ def test_links_to_crazyflies(tmp_path: Path, uri: str) -> None:
     ("text", "told"),
     [
         *(
-            (f"vehicles: {{Nose: '{uri}'}}\n{FENCE}", "is none; expected radio://0/80/2M/E7E7E7E701")
+            (f"vehicles: {{Nose: '{uri}'}}\n{FENCE}", "is not valid; expected radio://0/80/2M/E7E7E7E701")
             for uri in (
                 *("radio://0/126/2M/E7E7E7E701", "radio://0/80/3M/E7E7E7E701", "radio://0/80/2M/E7E7E7E7"),
                 *("radio://0/80/2M", "udp://127.0.0.1:0", "tcp://127.0.0.1:5000", "usb://0", LINK),
@@ -219,16 +221,16 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
 def test_the_fence_holds_what_is_in_it_and_the_ground_below() -> None:
     fence = Fence((0, 0, 1), (6, 6, 6))
-    assert fence.holds((0, 6, 1))
-    assert not fence.holds((3, 3, 0.5))
-    assert fence.holds_above((3, 3, 0.5))
-    assert not fence.holds_above((3, 3, 6.5))
-    assert not fence.holds_above((-0.1, 3, 0))
-    assert fence.holds((-0.5, 6.5, 6.5), margin_m=0.5)
+    assert fence.contains((0, 6, 1))
+    assert not fence.contains((3, 3, 0.5))
+    assert fence.covers((3, 3, 0.5))
+    assert not fence.covers((3, 3, 6.5))
+    assert not fence.covers((-0.1, 3, 0))
+    assert fence.contains((-0.5, 6.5, 6.5), margin_m=0.5)
 
 
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     """To open it would be to wait for a writer."""
     os.mkfifo(tmp_path / "fleet.yaml")
-    with pytest.raises(FleetError, match=r"fleet\.yaml: is no file; name a fleet file"):
+    with pytest.raises(FleetError, match=r"fleet\.yaml: is not a file; name a fleet file"):
         read_fleet(tmp_path / "fleet.yaml")

@@ -12,8 +12,8 @@ import pytest
 
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import line_distances
-from robochoc.vehicles.fleet import Fence, Fleet, Link
-from robochoc.vehicles.messages import Target
+from robochoc.vehicles.fleet import Fence, Fleet, VehicleLink
+from robochoc.vehicles.messages import VehicleTarget
 from robochoc.vehicles.route_planner import RouteError, RoutePlanner, spacing
 from robochoc.vehicles.steps import length_along, on_line
 from robochoc.vehicles.traffic import STILL_S, Traffic
@@ -56,7 +56,7 @@ class Sky:
     def __post_init__(self) -> None:
         names = [f"v{number}" for number in range(self.count)]
         self.fleet = Fleet(
-            {name: Link("udpin://0.0.0.0:1") for name in names},
+            {name: VehicleLink("udpin://0.0.0.0:1") for name in names},
             Fence((-6, -6, 0), (16, 16, 60)),
             near_m=NEAR_M,
             distance_m=DISTANCE_M,
@@ -77,11 +77,11 @@ class Sky:
         return found
 
     def fly(self) -> None:
-        self.traffic.fly({name: Target(at) for name, at in zip(self.flyers, self.places(1, 6), strict=True)})
+        self.traffic.fly({name: VehicleTarget(at) for name, at in zip(self.flyers, self.places(1, 6), strict=True)})
 
     def tell(self) -> None:
         for name, one in self.flyers.items():
-            self.traffic.see(name, one.at, in_air=one.at[2] > LOW_M and one.does != "lie")
+            self.traffic.update_place(name, one.at, in_air=one.at[2] > LOW_M and one.does != "lie")
 
     def tick(self) -> None:
         """Let a moment pass: vehicles tell where they are, take up what they may do, and move."""
@@ -188,8 +188,8 @@ def hovering(*places: Point) -> Sky:
     sky = Sky(len(places), Random(1))
     for name, (one, at) in zip(sky.flyers, zip(sky.flyers.values(), places, strict=True), strict=True):
         one.at = (*at[:2], 0.0)
-        sky.traffic.see(name, one.at, in_air=False)
-    sky.traffic.fly({name: Target(at) for name, at in zip(sky.flyers, places, strict=True)})
+        sky.traffic.update_place(name, one.at, in_air=False)
+    sky.traffic.fly({name: VehicleTarget(at) for name, at in zip(sky.flyers, places, strict=True)})
     sky.until_there()
     return sky
 
@@ -197,7 +197,7 @@ def hovering(*places: Point) -> Sky:
 def test_one_that_is_blown_stops_who_would_fly_into_it() -> None:
     sky = hovering((0, 0, 2), (6, 3, 2))
     blown = sky.flyers["v1"]
-    sky.traffic.fly({"v0": Target((6, 0, 2))})
+    sky.traffic.fly({"v0": VehicleTarget((6, 0, 2))})
     blown.at, blown.stalled = (3.0, 0.2, 2.0), 10_000
     for _ in range(int(STILL_S / TICK_S)):
         sky.tick()
@@ -210,16 +210,16 @@ def test_one_that_is_blown_stops_who_would_fly_into_it() -> None:
 
 def test_who_is_above_makes_room_for_one_that_rises() -> None:
     sky = hovering((0, 0, 2), (4, 0, 2))
-    sky.traffic.fly({"v1": Target((4, 0, 0), lands=True)})
+    sky.traffic.fly({"v1": VehicleTarget((4, 0, 0), lands=True)})
     for _ in range(100):
         sky.tick()
     assert sky.flyers["v1"].at[2] <= LOW_M
-    sky.traffic.fly({"v0": Target((4, 0, 1.4))})
+    sky.traffic.fly({"v0": VehicleTarget((4, 0, 1.4))})
     for _ in range(100):
         sky.tick()
     assert sky.flyers["v0"].at == pytest.approx((4, 0, 1.4))
     sky.flyers["v1"].does = "stand"
-    sky.traffic.fly({"v0": Target((0, 0, 2)), "v1": Target((4, 0, 2))})
+    sky.traffic.fly({"v0": VehicleTarget((0, 0, 2)), "v1": VehicleTarget((4, 0, 2))})
     sky.until_there()
     assert sky.nearest_m >= LEAST_M
 
@@ -236,7 +236,7 @@ def test_one_that_rises_past_its_place_goes_back_to_it(above_m: float) -> None:
 
 
 def ways(fence_m: float = 9.0, **standing: Point) -> RoutePlanner:
-    fleet = Fleet({"a": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (fence_m, fence_m, fence_m)))
+    fleet = Fleet({"a": VehicleLink("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (fence_m, fence_m, fence_m)))
     return RoutePlanner(fleet, standing, DISTANCE_M)
 
 
@@ -259,9 +259,9 @@ def test_places_that_are_too_near_are_told() -> None:
 def test_ways_stay_within_the_fence() -> None:
     legs = ways().legs({"a": (0, 0, 2), "b": (2, 0, 2)}, {"a": (2, 0, 2), "b": (0, 0, 2)}, {})
     assert all(-1 <= at <= 9 for leg in legs for at in leg.path.ravel())
-    fleet = Fleet({"a": Link("udpin://0.0.0.0:1")}, Fence((0, 0, 0), (2, 0, 2)))
+    fleet = Fleet({"a": VehicleLink("udpin://0.0.0.0:1")}, Fence((0, 0, 0), (2, 0, 2)))
     with pytest.raises(
-        RouteError, match=r"the only way found leads by .*, outside of the fence \(0, 0, 0 to 2, 0, 2\)"
+        RouteError, match=r"the only route found passes .*, outside of the fence \(0, 0, 0 to 2, 0, 2\)"
     ):
         RoutePlanner(fleet, {}, DISTANCE_M).legs({"a": (0, 0, 2), "b": (2, 0, 2)}, {"a": (2, 0, 2), "b": (0, 0, 2)}, {})
 

@@ -9,7 +9,7 @@ import pytest
 from robochoc.vehicles.autopilot import OFFBOARD, Telemetry
 from robochoc.vehicles.fleet import AtEnd
 from robochoc.vehicles.limits import CLIMB_S, END_S, LANDING_S, MODE_S, SILENCE_S
-from robochoc.vehicles.messages import Phase, State, Target
+from robochoc.vehicles.messages import FlightPhase, VehicleState, VehicleTarget
 from robochoc.vehicles.pilot import Pilot
 from tests.support.played_autopilot import (
     FLEET,
@@ -28,18 +28,20 @@ from tests.support.played_autopilot import (
 def test_a_vehicle_arms_takes_off_flies_and_lands_at_the_end(pilot: Pilot, played: Played) -> None:
     flying(pilot)
     phases = [steps(pilot, played).phase for _ in range(3)]
-    assert phases == [Phase.CLIMBING, Phase.FLYING, Phase.ARRIVED]
+    assert phases == [FlightPhase.CLIMBING, FlightPhase.FLYING, FlightPhase.ARRIVED]
     pilot.end(AtEnd.LAND, waits=True)
-    assert steps(pilot, played).phase is Phase.LANDING
+    assert steps(pilot, played).phase is FlightPhase.LANDING
     assert not is_over(pilot)
     landed(played)
-    assert steps(pilot, played) == State("A", Phase.LANDED, 1, (3, 1, 2), 1.0, healthy=True, commanded=True)
+    assert steps(pilot, played) == VehicleState(
+        "A", FlightPhase.LANDED, 1, (3, 1, 2), 1.0, healthy=True, commanded=True
+    )
     assert is_over(pilot)
     assert played.done == ["arm", "rise 2.5", "go (3, 1, 2)", "land"]
 
 
 def test_a_vehicle_without_an_order_is_never_commanded(pilot: Pilot, played: Played) -> None:
-    assert steps(pilot, played, 20).phase is Phase.READY
+    assert steps(pilot, played, 20).phase is FlightPhase.READY
     pilot.end(AtEnd.LAND, waits=True)
     steps(pilot, played)
     assert is_over(pilot)
@@ -49,31 +51,31 @@ def test_a_vehicle_without_an_order_is_never_commanded(pilot: Pilot, played: Pla
 def test_a_new_order_takes_the_place_of_the_one_before(pilot: Pilot, played: Played) -> None:
     flying(pilot)
     steps(pilot, played, 2)
-    pilot.fly(2, Target((4, 2, 4)))
+    pilot.fly(2, VehicleTarget((4, 2, 4)))
     assert steps(pilot, played).order == 2
     assert played.done[-1] == "go (4, 2, 4)"
-    assert steps(pilot, played).phase is Phase.ARRIVED
+    assert steps(pilot, played).phase is FlightPhase.ARRIVED
 
 
 def test_who_is_to_land_flies_above_the_point_first(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
-    pilot.fly(2, Target((6, 0, 0), lands=True))
-    assert steps(pilot, played, 2).phase is Phase.LANDING
+    pilot.fly(2, VehicleTarget((6, 0, 0), lands=True))
+    assert steps(pilot, played, 2).phase is FlightPhase.LANDING
     assert played.done[-2:] == ["go (6, 0, 2)", "land"]
     landed(played)
-    assert steps(pilot, played).phase is Phase.LANDED
+    assert steps(pilot, played).phase is FlightPhase.LANDED
 
 
 def test_who_is_to_land_outside_of_the_fence_lands_where_it_is(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
-    pilot.fly(2, Target((50, 0, 0), lands=True))
-    assert steps(pilot, played).phase is Phase.LANDING
+    pilot.fly(2, VehicleTarget((50, 0, 0), lands=True))
+    assert steps(pilot, played).phase is FlightPhase.LANDING
     assert played.done[-1] == "land"
 
 
 def test_who_has_landed_is_not_commanded_at_the_end(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
-    pilot.fly(2, Target((6, 0, 0), lands=True))
+    pilot.fly(2, VehicleTarget((6, 0, 0), lands=True))
     steps(pilot, played, 2)
     landed(played)
     steps(pilot, played)
@@ -85,27 +87,27 @@ def test_who_has_landed_is_not_commanded_at_the_end(pilot: Pilot, played: Played
 
 
 def test_who_is_to_land_and_stands_on_the_ground_does_nothing(pilot: Pilot, played: Played) -> None:
-    flying(pilot, Target((6, 0, 0), lands=True))
-    assert steps(pilot, played).phase is Phase.LANDED
+    flying(pilot, VehicleTarget((6, 0, 0), lands=True))
+    assert steps(pilot, played).phase is FlightPhase.LANDED
     assert played.done == []
 
 
 def test_who_has_landed_takes_off_again(pilot: Pilot, played: Played) -> None:
-    flying(pilot, Target((6, 0, 0), lands=True))
+    flying(pilot, VehicleTarget((6, 0, 0), lands=True))
     steps(pilot, played)
     pilot.fly(2, THERE)
-    assert steps(pilot, played, 3).phase is Phase.ARRIVED
+    assert steps(pilot, played, 3).phase is FlightPhase.ARRIVED
 
 
 def test_who_is_sent_elsewhere_while_it_lands_takes_off_again(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
-    pilot.fly(2, Target((6, 0, 0), lands=True))
-    assert steps(pilot, played, 2).phase is Phase.LANDING
+    pilot.fly(2, VehicleTarget((6, 0, 0), lands=True))
+    assert steps(pilot, played, 2).phase is FlightPhase.LANDING
     pilot.fly(3, THERE)
     steps(pilot, played)
     played.seen = replace(played.seen, armed=False, in_air=False, place=(6, 0, 0))
-    assert steps(pilot, played, 5) == State(
-        "A", Phase.ARRIVED, 3, (3, 1, 2), 1.0, healthy=True, in_air=True, commanded=True
+    assert steps(pilot, played, 5) == VehicleState(
+        "A", FlightPhase.ARRIVED, 3, (3, 1, 2), 1.0, healthy=True, in_air=True, commanded=True
     )
     assert played.done[-5:] == ["land", "arm", "rise 2.5", "go (6, 0, 2.5)", "go (3, 1, 2)"]
 
@@ -113,7 +115,7 @@ def test_who_is_sent_elsewhere_while_it_lands_takes_off_again(pilot: Pilot, play
 def test_at_the_end_a_vehicle_may_hold(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
     pilot.end(AtEnd.HOLD, waits=True)
-    assert steps(pilot, played, 2).phase is Phase.ARRIVED
+    assert steps(pilot, played, 2).phase is FlightPhase.ARRIVED
     assert is_over(pilot)
     assert played.done[-1] == "hold"
 
@@ -147,7 +149,7 @@ def test_nothing_is_armed_that_is_not_ready(pilot: Pilot, played: Played, seen: 
 def test_who_refuses_is_out_and_is_not_left_armed(pilot: Pilot, played: Played, refused: str) -> None:
     played.refuses = {refused, "land"}
     flying(pilot)
-    assert steps(pilot, played).phase is Phase.OUT
+    assert steps(pilot, played).phase is FlightPhase.OUT
     steps(pilot, played)
     assert not played.seen.armed
     assert played.done[-2:] == ["land", "disarm"]
@@ -156,9 +158,9 @@ def test_who_refuses_is_out_and_is_not_left_armed(pilot: Pilot, played: Played, 
 def test_who_refuses_set_points_at_first_is_asked_again(pilot: Pilot, played: Played) -> None:
     played.refuses = {"go"}
     flying(pilot)
-    assert steps(pilot, played, 4).phase is Phase.CLIMBING
+    assert steps(pilot, played, 4).phase is FlightPhase.CLIMBING
     played.refuses = set()
-    assert steps(pilot, played).phase is Phase.FLYING
+    assert steps(pilot, played).phase is FlightPhase.FLYING
 
 
 def test_who_refuses_set_points_for_good_is_out(pilot: Pilot, played: Played) -> None:
@@ -178,7 +180,7 @@ def test_a_take_off_that_never_ends(pilot: Pilot, played: Played) -> None:
     ("seen", "why"),
     [
         ({"silent_s": 11.0}, "its link has been silent for 10 s"),
-        ({"place_age_s": 11.0}, "it has not told its place for 10 s"),
+        ({"place_age_s": 11.0}, "no place reported for 10 s"),
         ({"place": (3.0, 11.0, 2.0)}, "it has left the fence, at 3, 11, 2"),
         ({"place": (3.0, 1.0, 10.5)}, "it has left the fence, at 3, 1, 10.5"),
         ({"armed": False}, "its motors have stopped"),
@@ -199,8 +201,8 @@ def test_who_does_not_fly_as_told_is_out_and_lands(
     steps(pilot, played, 3)
     assert played.done[-1] == "land"
     assert played.done.count("land") == 1
-    pilot.fly(2, Target((4, 2, 4)))
-    assert steps(pilot, played, 3).phase is Phase.OUT
+    pilot.fly(2, VehicleTarget((4, 2, 4)))
+    assert steps(pilot, played, 3).phase is FlightPhase.OUT
     assert played.done[-1] == "land"
 
 
@@ -211,7 +213,7 @@ def test_an_end_that_is_refused_is_asked_for_again_and_given_up_at_last(pilot: P
     steps(pilot, played, 3, 1.0)
     assert played.done[-3:] == ["land"] * 3
     assert not is_over(pilot)
-    assert steps(pilot, played, 1, 2 * END_S).why == "it has not answered at the end, for 10 s"
+    assert steps(pilot, played, 1, 2 * END_S).why == "it has not accepted the final command within 10 s"
     assert is_over(pilot)
 
 
@@ -224,20 +226,20 @@ def test_a_landing_that_never_ends_is_not_waited_for_for_ever(pilot: Pilot, play
 
 def test_who_is_not_heard_in_time_is_out(pilot: Pilot, played: Played) -> None:
     played.connects, played.seen = False, Telemetry()
-    assert steps(pilot, played, 9, 1.0).phase is Phase.CONNECTING
-    assert steps(pilot, played, 3, 1.0).why == "it is not heard on udpin://0.0.0.0:1 within 10 s"
+    assert steps(pilot, played, 9, 1.0).phase is FlightPhase.CONNECTING
+    assert steps(pilot, played, 3, 1.0).why == "no message received on udpin://0.0.0.0:1 within 10 s"
 
 
 def test_the_time_that_it_takes_to_open_a_link_is_no_silence(pilot: Pilot, played: Played) -> None:
     played.connects, played.seen, played.opens_s = False, Telemetry(), 20.0
-    assert steps(pilot, played, 9, 1.0).phase is Phase.CONNECTING
-    assert steps(pilot, played, 3, 1.0).phase is Phase.OUT
+    assert steps(pilot, played, 9, 1.0).phase is FlightPhase.CONNECTING
+    assert steps(pilot, played, 3, 1.0).phase is FlightPhase.OUT
 
 
 def test_motors_of_a_vehicle_that_is_not_heard_are_not_said_to_have_stopped(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
     played.seen = replace(played.seen, armed=False, silent_s=SILENCE_S + 1)
-    assert steps(pilot, played, 2, MODE_S).phase in {Phase.FLYING, Phase.ARRIVED}
+    assert steps(pilot, played, 2, MODE_S).phase in {FlightPhase.FLYING, FlightPhase.ARRIVED}
     played.seen = replace(played.seen, silent_s=FLEET.patience_s + 1)
     assert steps(pilot, played).why == "its link has been silent for 10 s"
 
@@ -245,18 +247,18 @@ def test_motors_of_a_vehicle_that_is_not_heard_are_not_said_to_have_stopped(pilo
 def test_motors_of_a_vehicle_that_is_not_heard_do_not_say_that_it_has_landed(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
     pilot.end(AtEnd.LAND, waits=True)
-    assert steps(pilot, played).phase is Phase.LANDING
+    assert steps(pilot, played).phase is FlightPhase.LANDING
     played.seen = replace(played.seen, armed=False, in_air=False, silent_s=SILENCE_S + 1)
-    assert steps(pilot, played, 2, MODE_S).phase is Phase.LANDING
+    assert steps(pilot, played, 2, MODE_S).phase is FlightPhase.LANDING
     assert not is_over(pilot)
     played.seen = replace(played.seen, silent_s=0.5)
-    assert steps(pilot, played).phase is Phase.LANDED
+    assert steps(pilot, played).phase is FlightPhase.LANDED
     assert is_over(pilot)
 
 
 def test_who_tells_no_place_is_out(pilot: Pilot, played: Played) -> None:
     played.seen = replace(GROUND, place=None)
-    assert steps(pilot, played, 12, 1.0).why == "it has told no place on udpin://0.0.0.0:1 within 10 s"
+    assert steps(pilot, played, 12, 1.0).why == "no place reported on udpin://0.0.0.0:1 within 10 s"
 
 
 def test_who_is_not_heard_is_not_waited_for_for_ever(pilot: Pilot, played: Played) -> None:
@@ -281,10 +283,10 @@ def test_who_has_a_pilot_that_fails_is_out_and_lands(
     pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     arrived(pilot, played)
-    pilot.fly(2, Target((4, 2, 4)))
+    pilot.fly(2, VehicleTarget((4, 2, 4)))
     monkeypatch.setattr(played, what, broken)
     assert steps(pilot, played).why == FAILED
-    assert steps(pilot, played, 3).phase is Phase.OUT
+    assert steps(pilot, played, 3).phase is FlightPhase.OUT
     assert played.done.count("land") == 1
     pilot.end(AtEnd.LAND, waits=False)
     steps(pilot, played)
@@ -295,7 +297,7 @@ def test_who_cannot_be_planned_for_lands_all_the_same(
     pilot: Ordered, played: Played, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arrived(pilot, played)
-    for method in ("see", "lose", "clearance", "is_clear_below"):
+    for method in ("update_place", "lose", "clearance", "is_clear_below"):
         monkeypatch.setattr(pilot.traffic, method, broken)
     assert steps(pilot, played).why == FAILED
     assert played.done[-1] == "land"
@@ -319,7 +321,7 @@ def test_whom_a_person_flies_is_left_alone_by_a_pilot_that_fails(
 ) -> None:
     arrived(pilot, played)
     played.seen = replace(played.seen, mode="POSCTL")
-    monkeypatch.setattr(pilot.traffic, "see", broken)
+    monkeypatch.setattr(pilot.traffic, "update_place", broken)
     steps(pilot, played, 3)
     assert "land" not in played.done
 
@@ -367,7 +369,7 @@ def test_a_take_over_counts_at_once_when_the_vehicle_has_obeyed_before(pilot: Pi
     steps(pilot, played, 2)
     played.seen = replace(played.seen, mode="ALTCTL")
     done = [*played.done]
-    assert steps(pilot, played).phase is Phase.OUT
+    assert steps(pilot, played).phase is FlightPhase.OUT
     steps(pilot, played, 100)
     assert played.done == done
 
@@ -397,10 +399,10 @@ def test_a_person_who_takes_over_while_it_lands_at_the_end_is_not_fought(pilot: 
 
 def test_a_person_who_takes_over_while_it_lands_on_the_way_is_told(pilot: Pilot, played: Played) -> None:
     arrived(pilot, played)
-    pilot.fly(2, Target((6, 0, 0), lands=True))
-    assert steps(pilot, played, 2).phase is Phase.LANDING
+    pilot.fly(2, VehicleTarget((6, 0, 0), lands=True))
+    assert steps(pilot, played, 2).phase is FlightPhase.LANDING
     played.seen = replace(played.seen, mode="POSCTL")
-    assert steps(pilot, played).phase is Phase.LANDING
+    assert steps(pilot, played).phase is FlightPhase.LANDING
     assert (
         steps(pilot, played, 2, MODE_S).why == "it no longer follows set points: its mode is posctl (a person flies it)"
     )

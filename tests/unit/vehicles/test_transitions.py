@@ -8,17 +8,17 @@ from dataclasses import replace
 import pytest
 
 from robochoc.vehicles.autopilot import Telemetry
-from robochoc.vehicles.craft import Clearance
 from robochoc.vehicles.fleet import AtEnd
 from robochoc.vehicles.limits import CLIMB_S, END_S, GIVE_WAY_S, LANDING_S, MODE_S
-from robochoc.vehicles.messages import Target
+from robochoc.vehicles.messages import VehicleTarget
 from robochoc.vehicles.pilot import Pilot, Transition
+from robochoc.vehicles.traffic import Clearance
 from tests.support.played_autopilot import GROUND, THERE, Ordered, Played, arrived, flying, landed, steps
 
 ROWS = (*Pilot.FLIGHT, *Pilot.RECOVERY, *Pilot.END)
 IN_AIR = replace(GROUND, armed=True, in_air=True, mode="HOLD", place=(1, 1, 3))
-OUTSIDE = Target((50, 0, 0), lands=True)
-BELOW = Target((6, 0, 0), lands=True)
+OUTSIDE = VehicleTarget((50, 0, 0), lands=True)
+BELOW = VehicleTarget((6, 0, 0), lands=True)
 Flight = Callable[[Ordered, Played], None]
 
 
@@ -46,7 +46,7 @@ def ready(pilot: Ordered, played: Played) -> None:
     steps(pilot, played)
 
 
-def with_order(target: Target = THERE, **telemetry: object) -> Flight:
+def with_order(target: VehicleTarget = THERE, **telemetry: object) -> Flight:
     def flight(pilot: Ordered, played: Played) -> None:
         sees(played, **telemetry)
         flying(pilot, target)
@@ -108,7 +108,7 @@ def then(first: Flight, **telemetry: object) -> Flight:
     return flight
 
 
-def ordered(first: Flight, target: Target) -> Flight:
+def ordered(first: Flight, target: VehicleTarget) -> Flight:
     def flight(pilot: Ordered, played: Played) -> None:
         first(pilot, played)
         pilot.fly(2, target)
@@ -174,7 +174,7 @@ FLIGHTS: dict[str, tuple[Flight, float]] = {
     "order to wait": (held_up, 0.1),
     "take-off after a wait": (let_go, 0.1),
     "order to land at once": (ordered(arrived, OUTSIDE), 0.1),
-    "order on the way": (ordered(arrived, Target((4, 2, 4))), 0.1),
+    "order on the way": (ordered(arrived, VehicleTarget((4, 2, 4))), 0.1),
     "climbed, lands": (climbs_and_lands, 0.1),
     "climbed": (climbing, 0.1),
     "climb too long": (climbing_low, CLIMB_S + 1),
@@ -197,9 +197,9 @@ FLIGHTS: dict[str, tuple[Flight, float]] = {
     "end: flown by others": (then(ending(arrived), mode="POSCTL"), 0.1),
     "end: on the ground": (ending(on_ground_again), 0.1),
     "end: waiting its turn": (waits_its_turn, 0.1),
-    "end: told to land": (ending(arrived), 0.1),
-    "end: told to land out of order": (ending(out), GIVE_WAY_S + 1),
-    "end: told to hold": (ending(arrived, AtEnd.HOLD), 0.1),
+    "end: commanded to land": (ending(arrived), 0.1),
+    "end: commanded to land out of order": (ending(out), GIVE_WAY_S + 1),
+    "end: commanded to hold": (ending(arrived, AtEnd.HOLD), 0.1),
     "end: refused too long": (ending(refused_landing, before=1), END_S + 1),
 }
 """A flight to each row, and the seconds until the step that executes it."""

@@ -1,6 +1,6 @@
-"""The guard process from the side of its parent: orders go there, the vehicles' states come from there.
+"""The client of the guard process: sends orders to it, and receives the vehicles' states.
 
-A sink and a source with the same fleet file share one guard; the last that leaves ends it.
+A sink and a source with the same fleet file share one guard; the last user ends it.
 """
 
 from __future__ import annotations
@@ -20,56 +20,56 @@ import msgspec
 from robochoc.system.files import resolved
 from robochoc.system.signals import signals_held
 from robochoc.vehicles.fleet import AtEnd, Fleet
-from robochoc.vehicles.kinds import Kind
+from robochoc.vehicles.kinds import VehicleKind
 from robochoc.vehicles.limits import END_S, LANDING_S, TURN_S
 from robochoc.vehicles.messages import (
     End,
-    Ended,
-    Failed,
+    FlightPhase,
     Fly,
     FromGuard,
-    NoWays,
+    GuardEnded,
+    GuardFailed,
+    GuardSetup,
+    NoRoutes,
     Permit,
-    Phase,
     Recover,
-    Setup,
-    State,
-    Target,
     ToGuard,
+    VehicleState,
+    VehicleTarget,
     line_of,
 )
 
 SILENT_S = 20.0
-"""A guard that says nothing for so long hangs: pilots may wait some seconds for an answer."""
+"""A guard that sends nothing for a longer time counts as hanging: pilots may wait some seconds for an answer."""
 START_S = 60.0
-"""For so long it may say nothing at first: a busy machine takes its time to start it and its links."""
+"""The longest time until its first message: on a busy machine, starting the guard and its links is slow."""
 _SPARE_S = 5.0
 _UNWRITABLE = "/proc"
-"""A folder in which nobody makes files, not even root."""
+"""A folder in which not even root can create files."""
 _SLICE_S = 0.2
-_DONE = (Phase.ARRIVED, Phase.LANDED, Phase.OUT)
+_DONE = (FlightPhase.ARRIVED, FlightPhase.LANDED, FlightPhase.OUT)
 
 
 class GuardError(Exception):
-    """The guard process is not there any more, or cannot do its work. The message says what the vehicles do."""
+    """The guard process has ended or failed. The message states the behaviour of the vehicles."""
 
 
-class GuardProcess:
-    """A guard process for `fleet`. Raises `GuardError`, as its methods do; whoever starts it ends it by `leave`."""
+class GuardClient:
+    """A guard process for `fleet`, which is ended by `close`. It and its methods raise `GuardError`."""
 
     def __init__(self, fleet: Fleet) -> None:
         self.fleet = fleet
-        self.states: dict[str, State] = {}
-        """The newest state of each vehicle that has told one."""
-        self.observers: list[Callable[[State], None]] = []
+        self.states: dict[str, VehicleState] = {}
+        """The newest state of each vehicle that has reported one."""
+        self.observers: list[Callable[[VehicleState], None]] = []
         """Called with each state, in another thread."""
         self._order = 0
         self._orders: dict[str, int] = {}
         self._sent_s = -math.inf
-        self._came = threading.Condition()
+        self._changed = threading.Condition()
         self._problem = self._no_ways = ""
         self._is_over = self._ends = self._has_ended = False
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
         with signals_held():
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "robochoc.vehicles.guard"],
@@ -77,68 +77,69 @@ class GuardProcess:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 env=_environment(fleet.kind),
-                start_new_session=True,  # neither Ctrl-C nor the end of a terminal reaches it
+                start_new_session=True,  # not reached by Ctrl-C, or by the end of a terminal
             )
-        self._reader = threading.Thread(target=self._read, daemon=True, name="hears the guard")
+        self._reader = threading.Thread(target=self._read, daemon=True, name="reader of the guard")
         self._reader.start()
         try:
-            self._say(Setup(fleet))
+            self._send(GuardSetup(fleet))
         except GuardError:
             self._shut()
             raise
 
     def permit(self) -> None:
-        """Let vehicles be armed."""
-        self._say(Permit())
+        """Permit arming."""
+        self._send(Permit())
 
-    def fly(self, targets: Mapping[str, Target]) -> None:
-        """Send vehicles to their targets, in place of earlier ones."""
+    def fly(self, targets: Mapping[str, VehicleTarget]) -> None:
+        """Send vehicles to their targets, which replace earlier ones."""
         self._order += 1
         self._orders |= dict.fromkeys(targets, self._order)
         self._sent_s = time.monotonic()
-        self._say(Fly(self._order, targets))
+        self._send(Fly(self._order, targets))
 
     def end(self, how: AtEnd, *, waits: bool) -> None:
-        """Bring all vehicles to an end, and wait until each has obeyed; with `waits`, until those that land are down.
+        """End all flights, and wait until each vehicle has obeyed; with `waits`, until landing vehicles are down.
 
-        Those that land one after the other, as one is above another's place, are waited for.
+        Vehicles that have to land one after the other, since one is above another's place, are waited for.
 
-        Raises `GuardError` if the guard was lost before: vehicles then do what their own failsafe says.
+        Raises:
+            GuardError: The guard was lost before: vehicles then follow their own failsafe.
         """
         self._ends = True
         with suppress(GuardError):
-            self._say(End(how, waits))
+            self._send(End(how, waits))
         until = time.monotonic() + TURN_S + END_S + _SPARE_S + (LANDING_S if waits else 0.0)
-        with self._came:
+        with self._changed:
             while not self._is_over and time.monotonic() < until:
-                self._came.wait(_SLICE_S)
+                self._changed.wait(_SLICE_S)
         self._ends = self._has_ended
         if not self._has_ended:
             self._is_over = True
             self.check()
 
     def wait_for(self, condition: Callable[[], bool], within_s: float) -> bool:
-        """Wait for `condition` on the states; return whether it has come true within the time."""
+        """Wait for `condition` on the states; return whether it was met in time."""
         until = time.monotonic() + within_s
-        with self._came:
+        with self._changed:
             while not condition():
                 self.check()
                 left_s = until - time.monotonic()
                 if left_s <= 0:
                     return False
-                self._came.wait(min(left_s, _SLICE_S))
+                self._changed.wait(min(left_s, _SLICE_S))
         return True
 
     def check(self) -> None:
-        """Raise `GuardError` if the guard is gone, or hangs."""
+        """Raise `GuardError` if the guard has ended, hangs, or has refused a decision."""
         if self._no_ways:
             raise GuardError(f"the decision is not flown: {self._no_ways}")
         problem = self._problem
         if not problem and self._is_over and not self._ends:
             problem = "the guard process has ended"
         limit_s = SILENT_S if self.states else START_S
-        if not problem and time.monotonic() - self._heard_s > limit_s:
-            problem = f"the guard process has said nothing for {limit_s:g} s"
+        if not problem and time.monotonic() - self._received_s > limit_s:
+            problem = f"no message from the guard process for {limit_s:g} s"
         if problem:
             raise self._lost(problem)
 
@@ -147,19 +148,19 @@ class GuardProcess:
 
     @property
     def is_flying(self) -> bool:
-        """Return whether vehicles are on the way to where they were sent, and still may be."""
+        """Whether vehicles are on the way to their targets, within the time limit."""
         in_time = time.monotonic() - self._sent_s < self.fleet.time_s
         return in_time and not all(map(self.is_done, self._orders))
 
     def is_done(self, name: str) -> bool:
-        """Return whether a vehicle is through with its newest order: it is there, or out of order."""
+        """Return whether a vehicle has completed its newest order: it has arrived, landed, or is out of order."""
         state = self.states.get(name)
         return state is not None and state.phase in _DONE and state.order == self._orders.get(name)
 
     def close(self) -> None:
-        """End the process. Vehicles that were not brought to an end are, by itself, when it hears nothing more.
+        """End the process. When its input ends, the guard ends all flights.
 
-        If it was lost, another guard does that.
+        If the guard was lost, another guard ends them.
         """
         self._shut()
         if self._orders and not self._has_ended:
@@ -168,13 +169,13 @@ class GuardProcess:
                 _recover(msgspec.structs.replace(self.fleet, vehicles=flown))
 
     def recover(self) -> None:
-        """Bring to an end what another guard has left armed, and wait for that."""
+        """End the flights of vehicles that another guard has left armed, and wait until they have ended."""
         self._ends = True
-        self._say(Recover(self.fleet.end))
+        self._send(Recover(self.fleet.end))
         until = time.monotonic() + self.fleet.connect_s + END_S + _SPARE_S
-        with self._came:
+        with self._changed:
             while not self._is_over and time.monotonic() < until:
-                self._came.wait(_SLICE_S)
+                self._changed.wait(_SLICE_S)
 
     def _shut(self) -> None:
         if self._process.stdin:
@@ -191,81 +192,81 @@ class GuardProcess:
 
     @property
     def pid(self) -> int:
-        """Return the number of the process."""
+        """The process id."""
         return self._process.pid
 
-    def _say(self, message: ToGuard) -> None:
+    def _send(self, message: ToGuard) -> None:
         content = line_of(message)
         try:
             if self._process.stdin is None:
                 raise BrokenPipeError
             os.write(self._process.stdin.fileno(), content)
         except (OSError, ValueError):
-            self.check()  # a report of the guard may state the reason
+            self.check()  # a message of the guard may state the reason
             raise self._lost("the guard process has ended") from None  # the reader has not noticed it yet
 
     def _read(self) -> None:
         stdout = self._process.stdout
         for line in stdout or ():
             with suppress(msgspec.DecodeError):
-                self._take(msgspec.json.decode(line, type=FromGuard))
-        with self._came:
+                self._receive(msgspec.json.decode(line, type=FromGuard))
+        with self._changed:
             self._is_over = True
-            self._came.notify_all()
+            self._changed.notify_all()
 
-    def _take(self, message: FromGuard) -> None:
-        with self._came:
-            self._heard_s = time.monotonic()
+    def _receive(self, message: FromGuard) -> None:
+        with self._changed:
+            self._received_s = time.monotonic()
             match message:
-                case State():
+                case VehicleState():
                     self.states[message.vehicle] = message
-                case NoWays(why=why):
+                case NoRoutes(why=why):
                     self._no_ways = self._no_ways or why
-                case Failed(why=why):
+                case GuardFailed(why=why):
                     self._problem = self._problem or f"the guard process failed: {why}"
-                case Ended():
+                case GuardEnded():
                     self._is_over = self._has_ended = True
-            self._came.notify_all()
-        if isinstance(message, State):
+            self._changed.notify_all()
+        if isinstance(message, VehicleState):
             for observer in self.observers:
                 observer(message)
 
 
 def _recover(fleet: Fleet) -> None:
-    guard = GuardProcess(fleet)
+    guard = GuardClient(fleet)
     try:
         guard.recover()
     finally:
         guard.close()
 
 
-def _environment(kind: Kind) -> dict[str, str]:
-    """Return the environment of the guard. MAVSDK's files, which it would leave behind when killed, have no place.
+def _environment(kind: VehicleKind) -> dict[str, str]:
+    """Return the environment of the guard, in which MAVSDK writes no files that it would leave behind when killed.
 
-    They are descriptions of cameras and the like. MAVSDK goes on without them where no folder can be made; it ends
-    where the temporary folder does not exist, or so it does in 4.1.
+    These files are descriptions of cameras and the like. MAVSDK 4.1 continues without them if no folder can be created,
+    but ends if the temporary folder does not exist.
     """
-    leaves_files = kind == Kind.MAVLINK and Path(_UNWRITABLE).is_dir()
+    leaves_files = kind == VehicleKind.MAVLINK and Path(_UNWRITABLE).is_dir()
     nowhere = {"TMPDIR": _UNWRITABLE, "XDG_CACHE_HOME": _UNWRITABLE} if leaves_files else {}
     return {**os.environ, **nowhere}
 
 
 class _Shared:
-    """The guards of this process, by fleet file, and how many use each."""
+    """The guards of this process, by fleet file, with the number of users of each."""
 
     def __init__(self) -> None:
-        self._open: dict[Path, tuple[GuardProcess, int]] = {}
+        self._open: dict[Path, tuple[GuardClient, int]] = {}
 
-    def enter(self, path: Path, fleet: Fleet) -> GuardProcess:
-        """Return the guard for a fleet file; it is started for the first that asks."""
+    def enter(self, path: Path, fleet: Fleet) -> GuardClient:
+        """Return the guard for a fleet file; start it for the first user."""
         key = resolved(path)
         guard, users = self._open.get(key, (None, 0))
-        guard = guard or GuardProcess(fleet)
+        guard = guard or GuardClient(fleet)
         self._open[key] = guard, users + 1
         return guard
 
     def leave(self, path: Path) -> None:
-        """End the guard if nobody else uses it."""
+        """Release the guard, and end it after its last user."""
         key = resolved(path)
         guard, users = self._open.pop(key)
         if users > 1:
