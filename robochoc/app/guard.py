@@ -171,9 +171,9 @@ class _BoundedBody:
     def __init__(self, receive: Receive) -> None:
         self.too_much = False
         self.is_late = False
-        """Whether the next part of the request's body was late."""
+        """True if the next part of the request's body was late."""
         self.gone = False
-        """Whether the client has disconnected."""
+        """True if the client has disconnected."""
         self._receive, self._left = receive, MOST_BYTES
         self._is_complete = False
 

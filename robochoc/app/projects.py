@@ -40,7 +40,7 @@ class Project(PartsOwner):
         self._saving: asyncio.TimerHandle | None = None
         self._writing = Lock()
         self.removed = False
-        """Whether the team was removed. Open pages of the team show that."""
+        """True if the team was removed. Open pages of the team show that."""
         self.unsaved = ""
         """The error of the last saving; empty if it succeeded."""
 
@@ -72,12 +72,12 @@ class Project(PartsOwner):
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is an edit to undo."""
+        """True if there is an edit to undo."""
         return bool(self._history.before)
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is an undone edit."""
+        """True if there is an undone edit."""
         return bool(self._history.after)
 
     def edit(self, change: Callable[[Sketch], Sketch]) -> None:

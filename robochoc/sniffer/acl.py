@@ -32,14 +32,14 @@ from robochoc.services.symbolic import (
 from robochoc.system.errors import TransferableError
 
 CAPS = Caps(characters=1 << 25, expressions=10_000, depth=16)
-"""The largest message of a protocol, a piece of a table of `dpop`, has 16 MiB, and a third more as text."""
+"""Limits of a message. The largest message of a protocol, a part of a `dpop` table, has 16 MiB (22 MiB as text)."""
 
 _DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
 _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
 
 
 class ACLError(TransferableError, ValueError):
-    """A text or message that cannot be used; `at` is the position of the error; None: it has no position."""
+    """An invalid text or message. `at`: the position of the error in the text; None: not known."""
 
     def __init__(self, message: str, at: int | None = None) -> None:
         super().__init__(message if at is None else f"character {at}: {message}")
@@ -78,7 +78,7 @@ class ACLMessage(msgspec.Struct, frozen=True):
             if not _USER_DEFINED.fullmatch(key):
                 raise ValueError(f"{key[:40]!r} is not a valid name of a user-defined parameter, such as x-clock")
         if len(dict(self.user)) < len(self.user):
-            raise ValueError("a user-defined parameter is given twice")
+            raise ValueError("a user-defined parameter is given more than once")
 
 
 _TEXTS = ("content", "language", "encoding", "ontology", "protocol", "conversation-id", "reply-with", "in-reply-to")
@@ -150,12 +150,12 @@ def _message(whole: Expression) -> ACLMessage:
 
 
 def _parameters(whole: Expression, act: str) -> dict[str, Expression]:
-    """Return the parameters of a message by name. Raise `SymbolicExpressionError` for one that no message has."""
+    """Return the parameters of a message by name. Raise `SymbolicExpressionError` for an unknown parameter."""
     found = parameters(items_of(whole, (act,), "a message"), "the message")
     for key, value in found.items():
         if key not in _KNOWN and not key.startswith("x-"):
             raise SymbolicExpressionError(
-                f"a message has no parameter :{key[:40]}; other ones are to begin with :X-", value.at
+                f"the parameter :{key[:40]} is unknown; user-defined parameters must begin with :X-", value.at
             )
     return found
 

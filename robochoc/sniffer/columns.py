@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import msgspec
 
 NOT_YET = 0xFFFFFFFF
-"""The value of a missing step or message in columns of unsigned integers of 4 bytes."""
+"""The value for a missing step or message in columns of unsigned integers of 4 bytes."""
 
 Column: TypeAlias = "array[float] | array[int]"
 
@@ -43,9 +43,9 @@ def _little_endian(column: Column) -> bytes:
 
 
 class Contents:
-    """The packed contents of messages, by their numbers, in pages of 4 MiB, so that growing copies nothing.
+    """The packed contents of messages, by their numbers. They are stored in pages of 4 MiB, which are never copied.
 
-    A million messages take as much memory as in transit.
+    The memory needed is the size of the messages in transit.
     """
 
     _LARGEST = 1 << 22

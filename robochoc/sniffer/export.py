@@ -1,32 +1,77 @@
-"""Conversations in forms that other programs read: FIPA ACL as text, a table (CSV), a diagram (mermaid).
+"""Conversations in forms for other programs: FIPA ACL text, a table (CSV), a diagram (Mermaid), data of a page.
 
-The table is of RFC 4180, in UTF-8. What a spreadsheet would take for a formula is left as it is: the table is data.
+The table follows RFC 4180, in UTF-8. Cells that a spreadsheet could interpret as formulas are not changed.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 
 import msgspec
 
+from robochoc.journal.journal import Journal
+from robochoc.replay import CannotReplayError, states_of
 from robochoc.sniffer.acl import text
 from robochoc.sniffer.columns import NOT_YET
-from robochoc.sniffer.page_data import PageData
+from robochoc.sniffer.page_data import DETAILS, STATES, PageData, message_columns, step_columns
 from robochoc.sniffer.trace import Trace
 from robochoc.system.plain_text import printable
+
+_encode = msgspec.json.encode
+_LEVEL = 6
+
+
+def embedded_answers(data: PageData, journal: Journal | None = None, *, most_states: int = 20_000) -> dict[str, bytes]:
+    """Return the answers about the whole trace of `data`; with its `journal` also robots' states.
+
+    States are computed by replay, for robots in the order of their names, until they have `most_states` steps together.
+    """
+    return {name: zlib.compress(answer, _LEVEL) for name, answer in _answers(data, journal, most_states)}
+
+
+def _answers(data: PageData, journal: Journal | None, most_states: int) -> Iterator[tuple[str, bytes]]:
+    trace = data.trace
+    yield "about", data.about()
+    yield "columns", message_columns(trace, 0, len(trace.messages.t))
+    yield "steps", step_columns(trace, 0, len(trace.steps.t))
+    yield "decisions", _encode([(step, data.names.labelled(values)) for step, values in trace.decisions])
+    for chunk in range(-(-len(trace.messages.t) // DETAILS)):
+        yield f"details:{chunk}", data.details(chunk)
+    if journal and not data.cannot_replay():
+        yield from _states(data, journal, most_states)
+
+
+def _states(data: PageData, journal: Journal, most: int) -> Iterator[tuple[str, bytes]]:
+    counts = [0] * len(data.trace.robots)
+    for robot in data.trace.steps.robot:
+        counts[robot] += 1
+    for number, name in enumerate(data.trace.robots):
+        most -= counts[number]
+        if most < 0:
+            return
+        try:
+            coming = iter(states_of(journal, name))
+            chunk = 0
+            while states := list(islice(coming, STATES)):
+                yield f"states:{number}:{chunk}", _encode(states)
+                chunk += 1
+        except CannotReplayError:
+            continue  # the page shows that its states are not available
+
 
 HEADINGS = (
     "message", "run", "step", "sent_at", "taken_at", "taken_in_step", "sender", "receiver", "type", "performative",
     "bytes", "clock", "taken_clock", "causes", "words", "content",
 )  # fmt: skip
-"""`message`, `step` and `causes` are numbers from 0 on, `run` from 1 on; clocks are NCCC clocks."""
+"""`message`, `step` and `causes` are numbers from 0, `run` is a number from 1; clocks are NCCC clocks."""
 MOST_ARROWS = 400
 """The maximum for readable diagrams, far below Mermaid's limit of 50,000 characters."""
 MOST_CHARACTERS = 50_000
 _LONGEST_LABEL = 60
-_encode = msgspec.json.encode
 
 
 class TooMuchToDrawError(ValueError):
@@ -34,13 +79,13 @@ class TooMuchToDrawError(ValueError):
 
 
 def acl_texts(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
-    """Yield the messages in FIPA ACL as text (FIPA00070), each on a line of its own."""
+    """Yield the messages as FIPA ACL text (FIPA00070), one per line."""
     for message in messages:
         yield f"{text(data.acl_messages.acl_of(message))}\n".encode()
 
 
 def table(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
-    """Yield the messages as CSV: a header, then a row for each."""
+    """Yield the messages as CSV: a header, and a row for each message."""
     yield _row(HEADINGS)
     trace, of, steps = data.trace, data.trace.messages, data.trace.steps
     for message in messages:
@@ -75,13 +120,13 @@ def _row(cells: Sequence[object]) -> bytes:
 
 
 def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
-    """Return the messages as a mermaid sequence diagram, with notes for decisions; Markdown pages can hold it.
+    """Return the messages as a Mermaid sequence diagram for a Markdown page, with notes for decisions.
 
     Raises:
         TooMuchToDrawError: if there are too many messages.
     """
     if len(messages) > MOST_ARROWS:
-        raise TooMuchToDrawError(f"{len(messages):,} messages are too many for a diagram: at most {MOST_ARROWS}")
+        raise TooMuchToDrawError(f"{len(messages):,} messages are too many for a diagram; the maximum is {MOST_ARROWS}")
     trace, of = data.trace, data.trace.messages
     robots = sorted({*(of.sender[one] for one in messages), *(of.receiver[one] for one in messages)})
     lines = ["sequenceDiagram"]
@@ -99,13 +144,13 @@ def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
     diagram = "\n".join([*lines, ""])
     if len(diagram) > MOST_CHARACTERS:
         raise TooMuchToDrawError(
-            f"the diagram has {len(diagram):,} characters: mermaid takes {MOST_CHARACTERS:,} at most"
+            f"the diagram has {len(diagram):,} characters, more than Mermaid's limit of {MOST_CHARACTERS:,}"
         )
     return diagram.encode()
 
 
 def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
-    """Return the first of `messages`, as many as a diagram can hold."""
+    """Return the first messages, as many as fit in a diagram."""
     part = messages[:MOST_ARROWS]
     while part:
         try:
@@ -118,7 +163,7 @@ def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
 
 
 def _notes(data: PageData, messages: Sequence[int]) -> list[tuple[int, Mapping[str, int | str]]]:
-    """Return the decisions between the first message and the last one."""
+    """Return the decisions between the first and the last message."""
     if not messages:
         return []
     trace = data.trace
@@ -137,7 +182,7 @@ def _note(trace: Trace, step: int, assignment: Mapping[str, int | str], drawn: s
 
 
 def _label(words: str) -> str:
-    """Return `words` with mermaid's special characters escaped by their numbers."""
+    """Return `words` with Mermaid's special characters escaped by their numbers."""
     shown = printable(words)
     if len(shown) > _LONGEST_LABEL:
         shown = f"{shown[: _LONGEST_LABEL - 1]}…"

@@ -1,4 +1,4 @@
-"""A journal's file as it is read while others write it: with a place of its own, and an end that moves."""
+"""Reading a journal's file while another process writes it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _HEAD_BYTES = 256
 
 
 class NoFileError(OSError):
-    """A pipe, device or folder: it cannot be read again."""
+    """A pipe, device or folder, which cannot be read repeatedly."""
 
 
 def open_to_read(path: Path) -> int:
-    """Return a descriptor of the file at `path`, for reading; do not wait for a FIFO. Raises `OSError`."""
+    """Open the file at `path` for reading, without waiting for a FIFO; return its descriptor. Raises `OSError`."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         _check_file(descriptor)
@@ -32,9 +32,9 @@ def _check_file(descriptor: int) -> None:
 
 
 class GrowingFile(io.RawIOBase):
-    """Reads the file `descriptor` from its start up to `end`, which the caller moves on.
+    """Reads the file `descriptor` from its start up to `end`, which the caller increases by `widen`.
 
-    It keeps a position of its own, so a writer with the same open file, such as a parent process, is not disturbed.
+    It has its own position, so that a writer with the same open file, such as a parent process, is not disturbed.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -54,7 +54,7 @@ class GrowingFile(io.RawIOBase):
         return os.pread(self._descriptor, _HEAD_BYTES, 0)
 
     def widen(self, most: int) -> bool:
-        """Move `end` on by up to `most` bytes that exist; return whether there were any."""
+        """Increase `end` by up to `most` existing bytes; return whether there were any."""
         before, self.end = self.end, min(self.size, self.end + most)
         return self.end > before
 

@@ -1,11 +1,10 @@
-"""A journal that is followed as it grows, piece by piece, into a trace.
+"""A trace of a growing journal, extended piece by piece.
 
-Robots report in bundles, so a journal that is written in mid-run holds events in the order in which they came. A
-trace takes them so: its causes are right, and the page can show them at once. When the journal is whole, and they were
-not in the order of their times, it is read again in that order, which is the one that everybody else reads it in; the
-trace of that has the next generation.
+Robots report events in batches, so during a run the journal has events in the order of their arrival. A trace accepts
+this order: its causes are correct, and the page can show it at once. If the complete journal is not sorted by time, it
+is read again in the order of time, as all other readers use it; the resulting trace has the next generation.
 
-What has been read is not kept: a file of any length takes as much memory as its trace.
+Entries are not stored after reading, so a file of any length needs only the memory of its trace.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ from robochoc.sniffer.trace import Trace
 from robochoc.system.temporary_files import unnamed_file
 
 PIECE_BYTES = 1 << 16
-"""Of a journal, read in one go: a fraction of a second's work."""
+"""The number of bytes that are read at once: a fraction of a second's work."""
 TEXT = b'{"event":"Journal"'
-"""The beginning of a journal in its text form; the other form begins with `MAGIC`."""
+"""The start of a journal in text form; the binary form starts with `MAGIC`."""
 _AT_ONCE_S = 0.5
-"""So much work may be done before anything is shown."""
+"""The longest work before the first display, in seconds."""
 _EVENTS_AT_ONCE = 5_000
 _FORSAKEN_S = 30.0
 """The time without new entries after which the writer of an unfinished journal counts as ended."""
@@ -53,7 +52,7 @@ class LiveTrace:
         self.restart(file)
 
     def restart(self, file: GrowingFile) -> None:
-        """Start again with the journal in `file`: the next generation."""
+        """Start again with the journal in `file`, as the next generation."""
         self._file = file
         self._follower = Follower(BufferedReader(file))
         self._head = file.head
@@ -72,7 +71,7 @@ class LiveTrace:
 
     @property
     def settled(self) -> bool:
-        """Whether the whole journal has been read, its end included, and sorted."""
+        """True if the complete journal has been read and sorted."""
         return self._done
 
     @property
@@ -81,11 +80,11 @@ class LiveTrace:
 
     @property
     def presentable(self) -> bool:
-        """Whether there is something to show. A small journal is sorted first, which does not take long."""
+        """True if there is something to show. A small journal is sorted first, which is fast."""
         return self.trace is not None and (self._done or self._waits or self._worked_s > _AT_ONCE_S)
 
     def advance(self) -> bool:
-        """Do a piece of work; return False if there was none. Raises `JournalError` and `TraceTooLargeError`."""
+        """Do a small part of the work; return False if there was none. Raises `JournalError`, `TraceTooLargeError`."""
         began = time.monotonic()
         done = self._advance()
         self._worked_s += time.monotonic() - began
@@ -100,10 +99,10 @@ class LiveTrace:
                 self._ordering, self._done = None, True
             return True
         if self._done:
-            goes_on = self._outcome is None and self._follower.damage is None and self._file.size > self._file.end
-            if goes_on:  # whoever had stopped writing
+            continues = self._outcome is None and self._follower.damage is None and self._file.size > self._file.end
+            if continues:  # the writer was slow, not ended
                 self.restart(self._file.again())
-            return goes_on
+            return continues
         if self._read() or self._file.widen(PIECE_BYTES):
             return True
         if self._age_s() > _FORSAKEN_S:
@@ -117,7 +116,7 @@ class LiveTrace:
     def _read(self) -> bool:
         """Read a few entries; return whether there was anything to do."""
         if self.trace is None and not _may_begin(self._file.head):
-            raise JournalError("it does not begin as a journal does")
+            raise JournalError("the file does not start like a journal")
         lines = self._follower.read(_EVENTS_AT_ONCE)
         self._take(lines)
         if self._follower.damage is None:
@@ -139,22 +138,22 @@ class LiveTrace:
                         self._disordered = True
                     self._last = line.t
                     events.append(line)
-        if self.trace is not None:  # the follower sees to it that the header comes first
+        if self.trace is not None:  # the follower ensures that the header is the first entry
             self.trace.add(events)
         if self._outcome is not None:
             self._end()
 
     def _end(self) -> None:
         if self.trace is None:
-            raise JournalError("it has no header")
-        if self._disordered:  # and not over yet: the order is not the last one
+            raise JournalError("the journal has no header")
+        if self._disordered:  # the trace is not complete yet: it is sorted first
             self._ordering = self._in_order(self.trace.header)
         else:
             self.trace.end(self._outcome, self._follower.damage)
             self._done = True
 
     def _in_order(self, header: Header) -> Iterator[None]:
-        """Make the trace again from the events sorted by time; yield after each piece."""
+        """Build the trace again from the events sorted by time; yield after each part."""
         trace = Trace(header, self._generation + 1)
         for events in events_by_time(self._file):
             trace.add(events)
@@ -165,12 +164,12 @@ class LiveTrace:
 
 
 def _may_begin(head: bytes) -> bool:
-    """Return whether a journal begins with `head`, or may do so with more bytes."""
+    """Return whether `head` is the start of a journal, or may become one with more bytes."""
     return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
 
 
 def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[JournalEntry]:
-    """Return the next few entries before `end`, from the `follower` that reads `file`; none at the end."""
+    """Return the next entries before `end` from the `follower`, which reads `file`; none at the end."""
     lines = follower.read(_EVENTS_AT_ONCE)
     while not lines and file.end < end and file.widen(min(PIECE_BYTES, end - file.end)):
         lines = follower.read(_EVENTS_AT_ONCE)
@@ -178,12 +177,12 @@ def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Journa
 
 
 def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
-    """Yield the events of `file`, up to its present end, in pieces: each run's sorted by time. See `sorted_by_time`."""
+    """Yield the events of `file` up to its present end, sorted by time within each run. See `sorted_by_time`."""
     return sorted_by_time(entries_of(file))
 
 
 def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
-    """Yield what is written in `file`, up to its present end, in pieces."""
+    """Yield lists of the entries of `file`, up to its present end."""
     here = file.again()
     follower = Follower(BufferedReader(here))
     while lines := next_entries(follower, here, file.end):
@@ -191,12 +190,13 @@ def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
 
 
 def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[AnyEvent]]:
-    """Yield the events in `pieces`, in other pieces: each run's sorted by time.
+    """Yield lists of the events in `pieces`, sorted by time within each run.
 
-    Some of them are empty: they stand for work done. Events of equal times keep their order. A run's events are stored
-    in an unnamed temporary file until the run is over; only their times and places stay in memory.
+    A list may be empty, so that the caller can do other work meanwhile. Events with equal times remain in their order.
+    A run's events are stored in an unnamed temporary file until the end of the run; only their times and positions are
+    in memory.
     """
-    aside = _Aside()
+    aside = _StoredEvents()
     try:
         for lines in pieces:
             for line in lines:
@@ -204,7 +204,7 @@ def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[An
                     continue
                 if isinstance(line, Began):
                     yield from aside.sorted()
-                    aside = _Aside()
+                    aside = _StoredEvents()
                 aside.put(line)
             yield []
         yield from aside.sorted()
@@ -212,7 +212,7 @@ def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[An
         aside.close()
 
 
-class _Aside:
+class _StoredEvents:
     """The packed events of one run, in an unnamed temporary file."""
 
     def __init__(self) -> None:
@@ -230,8 +230,8 @@ class _Aside:
         self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
 
     def sorted(self) -> Iterator[list[AnyEvent]]:
-        """Yield the events sorted by time, in pieces; then delete the file."""
-        import numpy as np  # noqa: PLC0415 - not before there is something to sort
+        """Yield lists of the events, sorted by time; then delete the file."""
+        import numpy as np  # noqa: PLC0415 - slow, and only needed for sorting
 
         with self._file as file:
             file.flush()

@@ -1,8 +1,8 @@
-"""The sniffer's page: its document, style and scripts (`assets/`) joined into one, with meshcat's viewer.
+"""The sniffer's page: one document with its style and scripts (`assets/`), and Meshcat's viewer.
 
-Served, it asks the server that it came from for what it shows; embedded, all of that stands in it, and it opens from
-a file, anywhere. Its scripts are classic ones, each adding to one object `Sniffer`: `model.js` makes it, `main.js`
-begins, and between them the others stand by their names, as they name each other when they are called, not before.
+A served page requests its data from its server. An embedded page contains all data, so it can be opened as a file. The
+scripts are classic scripts that extend one object `Sniffer`: `model.js` creates it and is first, `main.js` starts the
+page and is last, and the others are in alphabetical order, since they use each other only in later calls.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ Mode = Literal["served", "embedded"]
 
 _FIRST, _LAST = "model.js", "main.js"
 _TITLE = "<title>Sniffer</title>"
-"""Of the document, until something has one."""
+"""The title in `index.html`, which is replaced."""
 
 
 def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
-    """Return the page, in UTF-8. The same answers make the same page.
+    """Return the page, in UTF-8. Equal arguments give equal pages.
 
     Args:
         mode: Served by a server, or embedded: one file with all data.
@@ -39,7 +39,7 @@ def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title:
     connections = "'self'" if mode == "served" else "'none'"
     scripts = [_asset(name) for name in _scripts()]
     if mode == "served" or "scene" in answers:
-        scripts += [labels_script(), viewer_script()]  # the last: the page need not wait until it has been read
+        scripts += [labels_script(), viewer_script()]  # last, so that the page does not wait for them
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy(scripts, connections)}">\n'
         f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'
@@ -56,7 +56,7 @@ def _script(script: str) -> str:
 
 
 def _block(name: str, content: bytes) -> str:
-    """Return an answer of `PageData` as a script element of a type that browsers do not run."""
+    """Return an answer of `PageData` as a script element with a type that browsers do not execute."""
     text = base64.b64encode(content).decode()
     return f'<script id="feed:{escape(name)}" type="application/octet-stream">{text}</script>'
 

@@ -1,12 +1,12 @@
 """The answers to a page about a trace: JSON, or columns of numbers (little-endian).
 
-    about       JSON: what was run, who took part, how many messages there are, how it ended
+    about       JSON: the run, the robots, the number of messages, the outcome
     columns     messages: t, clock (8 bytes, floating point), step, bytes (4), sender, receiver, kind, run (2)
     steps       t, clock, checks (8), packet_end (4), the packets (4), robot, run (2)
     decisions   JSON: [[step, {variable: value}], ...]
-    details     JSON: what messages hold, in words and as FIPA ACL
+    details     JSON: the contents of messages, in words and as FIPA ACL
 
-Steps and messages have numbers (`trace.py`). No answer holds more than a fixed number of rows.
+Steps and messages are numbered (`trace.py`). The number of rows of an answer is limited.
 """
 
 from __future__ import annotations
@@ -27,20 +27,19 @@ from robochoc.sniffer.columns import packed_columns
 from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.team_names import TeamNames
-from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.trace_tables import Note, RunRecord
+from robochoc.sniffer.trace import RunRecord, Trace, TraceNote
 
 FORMAT = 1
 MOST_ROWS = 1 << 16
-"""Messages, steps, or decisions in one answer."""
+"""The maximum number of messages, steps, or decisions in one answer."""
 DETAILS = 1024
-"""Messages in one chunk of details."""
+"""The number of messages in one chunk of details."""
 STATES = 64
-"""Steps of a robot in one chunk of its states."""
+"""The number of a robot's steps in one chunk of its states."""
 MOST_NOTES = 1000
-"""Of each sort: on what becomes cheaper, and all others."""
+"""The maximum number of notes on improvements, and of all other notes."""
 MOST_EPOCHS = 8
-"""Of which the verdict says how they ended."""
+"""The maximum number of epochs whose results are in the verdict."""
 
 _OFTEN = {"heard", "improved"}
 
@@ -48,18 +47,18 @@ _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 
 class BadRequestError(ValueError):
-    """A request that has no answer."""
+    """A request for data that do not exist, or for too much data."""
 
 
 def message_columns(trace: Trace, first: int, end: int) -> bytes:
-    """Return the columns of the messages from `first` to before `end`."""
+    """Return the columns of the messages from `first` up to, but not including, `end`."""
     of = trace.messages
     columns = (of.t, of.clock, of.step, of.bytes, of.sender, of.receiver, of.kind, of.run)
     return packed_columns(column[first:end] for column in columns)
 
 
 def step_columns(trace: Trace, first: int, end: int) -> bytes:
-    """Return the columns of the steps from `first` to before `end`, with the messages they received."""
+    """Return the columns of the steps from `first` up to, but not including, `end`, with their received messages."""
     of = trace.steps
     packets = trace.packets[_end_before(of.packet_end, first) : _end_before(of.packet_end, end)]
     columns = (of.t[first:end], of.clock[first:end], of.checks[first:end], of.packet_end[first:end], packets)
@@ -73,7 +72,7 @@ def _end_before(ends: Sequence[int], step: int) -> int:
 class PageData:
     """The answers about one trace. `live`: the trace may still grow.
 
-    `chosen` are names, or patterns of names (`patterns.py`), of the robots to show at first; none: all.
+    `chosen`: names or patterns (`patterns.py`) of the robots to show at first; empty: all.
     """
 
     def __init__(self, trace: Trace, *, live: bool = False, chosen: Sequence[str] = ()) -> None:
@@ -103,7 +102,7 @@ class PageData:
                 "kinds": [self._kind(name) for name in trace.kinds],
                 "runs": [_run(run) for run in trace.runs],
                 "outcome": msgspec.Raw(result_json(trace.outcome)) if trace.outcome is not None else None,
-                "notes": [_note_of(note) for note in _told(trace.notes)],
+                "notes": [_note_of(note) for note in _last_notes(trace.notes)],
                 "replay": self.cannot_replay(),
                 "chosen": self._chosen,
                 "live": self._live,
@@ -132,12 +131,12 @@ class PageData:
         }
 
     def cannot_replay(self) -> str:
-        """Return why robots' states are not available; empty if they are."""
+        """Return the reason why robots' states are not available; empty if they are."""
         if not self.trace.runs:
-            return "no run has begun"
+            return "no run has started"
         for run in self.trace.runs:
             if run.given is None or run.given.why:
-                return run.given.why if run.given else "the journal does not say what the robots were given"
+                return run.given.why if run.given else "the journal does not contain the robots' problems"
         return ""
 
     def columns(self, first: int, end: int) -> bytes:
@@ -146,7 +145,7 @@ class PageData:
         return message_columns(self.trace, first, end)
 
     def steps(self, first: int, end: int) -> bytes:
-        """Return the columns of steps, with the messages they received."""
+        """Return the columns of steps, with their received messages."""
         _check(first, end, len(self.trace.steps.t))
         return step_columns(self.trace, first, end)
 
@@ -160,11 +159,11 @@ class PageData:
         first = chunk * DETAILS
         count = len(self.trace.messages.t)
         if chunk < 0 or first >= max(count, 1):
-            raise BadRequestError(f"there is no chunk {chunk} of details")
+            raise BadRequestError(f"chunk {chunk} of details does not exist")
         return _encode([self.detail(message) for message in range(first, min(first + DETAILS, count))])
 
     def detail(self, message: int) -> dict[str, Any]:
-        """Return the content of one message: its fields, in words, and as FIPA ACL."""
+        """Return the content of a message: its fields, in words, and as FIPA ACL."""
         acl = self.acl_messages.acl_of(message)
         return {
             "content": self.acl_messages.plain(message),
@@ -174,7 +173,7 @@ class PageData:
         }
 
     def words(self, message: int) -> str:
-        """Return one message in words."""
+        """Return a message in words."""
         trace, of = self.trace, self.trace.messages
         run = of.run[message]
         words = self.names.wording(run, trace.robots[of.sender[message]], trace.robots[of.receiver[message]])
@@ -188,9 +187,9 @@ class PageData:
 
 def _check(first: int, end: int, count: int) -> None:
     if not 0 <= first <= end <= count:
-        raise BadRequestError(f"there are no rows from {first} to {end}, only {count}")
+        raise BadRequestError(f"rows {first} to {end} do not exist; there are {count}")
     if end - first > MOST_ROWS:
-        raise BadRequestError(f"{end - first} rows are too many at once: at most {MOST_ROWS}")
+        raise BadRequestError(f"{end - first} rows are too many for one request; the maximum is {MOST_ROWS}")
 
 
 def _run(run: RunRecord) -> dict[str, Any]:
@@ -204,14 +203,14 @@ def _run(run: RunRecord) -> dict[str, Any]:
     }
 
 
-def _told(notes: Sequence[Note]) -> list[Note]:
-    """Return the last notes, in their order; incumbents must not displace losses and refusals."""
+def _last_notes(notes: Sequence[TraceNote]) -> list[TraceNote]:
+    """Return the last notes in their order. Frequent notes on improvements do not displace losses and refusals."""
     often = [place for place, note in enumerate(notes) if note.kind in _OFTEN]
     seldom = [place for place, note in enumerate(notes) if note.kind not in _OFTEN]
     return [notes[place] for place in sorted([*often[-MOST_NOTES:], *seldom[-MOST_NOTES:]])]
 
 
-def _note_of(note: Note) -> dict[str, Any]:
+def _note_of(note: TraceNote) -> dict[str, Any]:
     return {"t": note.t, "step": note.step, "kind": note.kind, "robot": note.robot, "text": note.text}
 
 
@@ -219,7 +218,7 @@ def verdict_of(trace: Trace) -> str:
     """Return the result of the run in words; for several epochs, the result of each."""
     outcome = trace.outcome
     if outcome is None:
-        return "The run broke off before an outcome." if trace.over else "The run goes on."
+        return "The run ended without an outcome." if trace.over else "The run continues."
     last = _ending(trace, outcome)
     return f"{_epochs(outcome.epochs)} The last: {last}" if len(outcome.epochs) > 1 else last
 
@@ -252,14 +251,14 @@ def _said(verdict: Verdict) -> str:
 
 
 def _by(outcome: Outcome) -> str:
-    """Return in words which robot concluded alone; a robot that gave up is named in the reason."""
+    """Return the robot that concluded alone, in words. A robot that gave up is named in the reason instead."""
     if outcome.witness is None or outcome.verdict == Verdict.UNKNOWN:
         return ""
     return f", as {outcome.ruled_out if outcome.verdict == Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
 def _epochs(epochs: Sequence[EpochOutcome]) -> str:
-    """Return in words the number of epochs, and the results of the first ones."""
+    """Return the number of epochs and the results of the first ones, in words."""
     ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
     more = len(epochs) - len(ends)
     return f"{len(epochs):,} epochs: {', '.join(ends)}{f' and {more:,} more' if more else ''}."

@@ -1,4 +1,4 @@
-"""Names of robots, or patterns of them, as `robochoc sniff` and `robochoc journal` take them: `Robot3.1,Robot2.*`.
+"""Names and patterns of robots in options of `robochoc sniff` and `robochoc journal`, such as `Robot3.1,Robot2.*`.
 
 `*` matches any characters, `?` any single character, as in the properties of JADE's sniffer.
 """
@@ -10,26 +10,26 @@ from collections.abc import Iterable, Sequence
 
 
 def patterns_in(text: str) -> tuple[str, ...]:
-    """Return the names and patterns in `text`, which are separated by commas."""
+    """Return the names and patterns in `text`, separated by commas."""
     return tuple(part for part in (part.strip() for part in text.split(",")) if part)
 
 
 def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Return those of `names` that match one of `patterns`, in their order."""
+    """Return the names that match one of the patterns, in their order."""
     wholes = [_expression(pattern) for pattern in patterns]
     return [name for name in names if any(whole.fullmatch(name) for whole in wholes)]
 
 
 def unmatched(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Return those of `patterns` that match none of `names`."""
+    """Return the patterns that match none of the names."""
     known = list(names)
     return [pattern for pattern in patterns if not matching(known, (pattern,))]
 
 
 def _expression(pattern: str) -> re.Pattern[str]:
-    """Return a regular expression in which each part between two `*` matches its first place only.
+    """Return a regular expression in which each part between two `*` matches only at its first occurrence.
 
-    Without backtracking, names that nearly match take no more time.
+    There is no backtracking, so names that almost match are not slow.
     """
     first, *rest = ("".join("." if sign == "?" else re.escape(sign) for sign in part) for part in pattern.split("*"))
     if not rest:

@@ -1,4 +1,4 @@
-"""Recorded messages: the protocols of a trace's runs, and messages made again from their recorded fields."""
+"""Recorded messages: the protocols of a trace's runs, and message objects rebuilt from recorded fields."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class RunProtocols:
         return kind.act if kind else INFORM
 
     def act_of_type(self, name: str) -> Act:
-        """Return the FIPA act of messages called `name`, in the first run whose protocol has such messages."""
+        """Return the FIPA act of the message type `name`, in the first run whose protocol has this type."""
         for run in range(len(self._trace.runs)):
             kind = self.message_types(run).get(name)
             if kind is not None:
@@ -104,8 +104,8 @@ def installed_protocol(name: str, asked: str) -> tuple[str, type[Protocol]] | No
     """Return the name and the class of a run's protocol; None if it is not installed.
 
     Args:
-        name: What the run's beginning calls it: its class; in a run without a beginning, its name.
-        asked: The protocol that was asked for: what the journal's header calls it.
+        name: The protocol's class, as recorded at the start of the run; its name if the start is not recorded.
+        asked: The name of the requested protocol, from the journal's header.
     """
     if name == asked:
         with suppress(UnknownProtocolError):
@@ -114,7 +114,7 @@ def installed_protocol(name: str, asked: str) -> tuple[str, type[Protocol]] | No
 
 
 def _with_infinity(value: Any, declared: Type) -> Any:  # noqa: ANN401 - fields are of any type
-    """Return `value` with `inf` for each None where its declared type has numbers, and no None."""
+    """Return `value` with `inf` for each None whose declared type is a number that cannot be None."""
     if value is None:
         return math.inf if _is_number(declared) else None
     if isinstance(value, dict):

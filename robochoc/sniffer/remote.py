@@ -1,4 +1,4 @@
-"""Follow a run of a master elsewhere: have its journal, block by block, from the first one on."""
+"""Follow the run of a remote master: receive its journal, block by block, from the first block."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _NUMBER_BITS = 32
 
 
 class WholeBlocks(BlockReader):
-    """Collects a journal's bytes and passes on whole blocks; each must follow the last."""
+    """Collects the bytes of a journal, and returns complete blocks, each of which must continue the previous one."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class WholeBlocks(BlockReader):
         self._passed = 0
 
     def take(self, content: bytes) -> bytes:
-        """Return the new whole blocks after adding `content`. Raises `JournalError` and `JournalDamagedError`."""
+        """Add `content`; return the newly completed blocks. Raises `JournalError` and `JournalDamagedError`."""
         self._held += content
         self.feed(content)
         while self.next() is not None:
@@ -49,14 +49,14 @@ class WholeBlocks(BlockReader):
         return whole
 
 
-class Followed(NamedTuple):
-    """The end of following a journal: the run is `over` and complete, or the rest is not available (`why`)."""
+class FollowResult(NamedTuple):
+    """The end of a followed journal. `over`: the run has ended, and the journal is complete; `why`: the reason."""
 
     over: bool
     why: str
 
 
-STOPPED = Followed(over=False, why="stopped")
+STOPPED = FollowResult(over=False, why="stopped")
 
 
 def receive(
@@ -67,25 +67,25 @@ def receive(
     patience_s: float = 10.0,
     stopped: Callable[[], bool] = lambda: False,
     granted: Callable[[], None] = lambda: None,
-) -> Followed:
-    """Pass the run's journal to `sink` in whole blocks, until the run or the master ends.
+) -> FollowResult:
+    """Pass the run's journal to `sink` in complete blocks, until the run or the master ends.
 
-    Each block's checksum includes that of the block before, and is verified before the block is passed on.
+    Each block's checksum covers that of the previous block, and is verified before the block is passed to `sink`.
 
     Args:
         place: The master's address.
         identity: The key pair to connect with.
         sink: Receives the blocks.
         patience_s: The time to wait for an answer, in seconds.
-        stopped: Is called regularly; the function returns when it returns True.
-        granted: Is called when the master has accepted the connection.
+        stopped: Called regularly; if it returns True, following ends.
+        granted: Called when the master has accepted the connection.
 
     Raises:
         CannotConnectError: if there is no connection.
         NoAnswerError: if the master does not accept.
     """
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
-        sniffer = _Sniffer(place, transport)
+        sniffer = _MasterClient(place, transport)
         run = sniffer.admitted(max(ANSWER_S, patience_s), stopped)
         if run is None:
             return STOPPED
@@ -94,7 +94,7 @@ def receive(
 
 
 class IncomingJournal:
-    """The part of the journal of `run` received from the master at `place`; `sink` gets its valid blocks."""
+    """The received part of the journal of `run`, from the master at `place`; its valid blocks are passed to `sink`."""
 
     def __init__(self, place: Address, run: str, sink: Callable[[bytes], object]) -> None:
         self._place = place
@@ -103,24 +103,24 @@ class IncomingJournal:
         self._sink = sink
         self._start = 0
         self.idle = False
-        """Whether there was nothing new."""
+        """True if the last answer had no new content."""
 
     @property
     def question(self) -> bytes:
         """The next request."""
         return question(self._run, self._start)
 
-    def take(self, content: bytes) -> Followed | None:
+    def take(self, content: bytes) -> FollowResult | None:
         """Process an answer; return the end of the journal if it was reached."""
         try:
             piece = piece_in(content)
             if piece.run != self._run:
-                return Followed(over=False, why=f"the master at {self._place} was restarted")
-            if piece.start != self._start:  # an answer to an earlier question
+                return FollowResult(over=False, why=f"the master at {self._place} was restarted")
+            if piece.start != self._start:  # the answer to an earlier request
                 return None
             whole = self._blocks.take(piece.content)
         except (JournalError, JournalDamagedError) as bad:
-            return Followed(over=False, why=f"the master at {self._place} sent an invalid journal: {bad}")
+            return FollowResult(over=False, why=f"the master at {self._place} sent an invalid journal: {bad}")
         if whole:
             self._sink(whole)
         self._start += len(piece.content)
@@ -128,10 +128,11 @@ class IncomingJournal:
         if not piece.over:
             return None
         missing = self._blocks.rest
-        return Followed(not missing, f"the run is over, but of its journal {missing}" if missing else "the run is over")
+        rest = f", but its journal is incomplete: {missing}" if missing else ""
+        return FollowResult(not missing, f"the run is over{rest}")
 
 
-class _Sniffer:
+class _MasterClient:
     """A client of the master at `place`, connected by `transport`."""
 
     def __init__(self, place: Address, transport: Transport) -> None:
@@ -142,7 +143,7 @@ class _Sniffer:
         self._number = secrets.randbits(_NUMBER_BITS)
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
-        """Return the run to follow; None: stopped. Raises `NoAnswerError` on a refusal or no answer."""
+        """Return the run to follow; None if stopped. Raises `NoAnswerError` after a refusal, or without an answer."""
         until, asked = time.monotonic() + patience_s, 0.0
         while time.monotonic() < until and not stopped():
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -151,18 +152,18 @@ class _Sniffer:
             answer = self._answer(LOOK_S)
             if answer and answer.why:
                 raise NoAnswerError(
-                    f"the master at {self._place} does not let {self._name} sniff: {answer.why[:LONGEST]}"
+                    f"the master at {self._place} does not allow {self._name} to sniff: {answer.why[:LONGEST]}"
                 )
             if answer:
                 return answer.run
         if stopped():
             return None
         raise NoAnswerError(
-            f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
+            f"the master at {self._place} does not answer {self._name}: check that it is enrolled with the Authority"
         )
 
-    def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> Followed:
-        """Request piece after piece of the journal."""
+    def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> FollowResult:
+        """Request the journal, piece by piece, until it ends."""
         heard = time.monotonic()
         while not stopped():
             content = self._transport.ask(journal_key(self._name), journal.question, PIECE_S)
@@ -172,8 +173,9 @@ class _Sniffer:
                 if journal.idle and not ending:
                     time.sleep(LOOK_S)
             elif time.monotonic() - heard > patience_s:
-                return Followed(
-                    over=False, why=f"the master at {self._place} is gone, or lets {self._name} sniff no more"
+                return FollowResult(
+                    over=False,
+                    why=f"the master at {self._place} has ended, or does not allow {self._name} to sniff any more",
                 )
             else:
                 ending = self._refused()
@@ -184,14 +186,15 @@ class _Sniffer:
     def _ask(self) -> None:
         self._transport.send(MASTER, self._framing.write(MASTER, JournalRequest(self._number)))
 
-    def _refused(self) -> Followed | None:
-        """Request a reason for the missing answer; None: there is none, or no answer."""
+    def _refused(self) -> FollowResult | None:
+        """Request the reason for a missing answer; return None if there is none, or no answer."""
         self._ask()
         answer = self._answer(PIECE_S)
         if answer is None or not answer.why:
             return None
-        return Followed(
-            over=False, why=f"the master at {self._place} lets {self._name} sniff no more: {answer.why[:LONGEST]}"
+        return FollowResult(
+            over=False,
+            why=f"the master at {self._place} does not allow {self._name} to sniff any more: {answer.why[:LONGEST]}",
         )
 
     def _answer(self, patience_s: float) -> JournalAnswer | None:

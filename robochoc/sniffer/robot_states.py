@@ -1,7 +1,7 @@
-"""Robots' states after each of their steps, in chunks, from the journal's file.
+"""Robots' states after each of their steps, in chunks, by replay of the journal's file.
 
-A robot is played again with what it was told. Its events are read from the file when somebody asks, those of the
-other robots only where the robot cannot be played without them.
+A robot is replayed with the messages that it received. Its events are read from the file on request; those of other
+robots only if the replay needs them.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from robochoc.sniffer.live_trace import next_entries
 from robochoc.sniffer.page_data import STATES, BadRequestError
 
 MOST_EVENTS = 1_000_000
-"""Of one robot: some hundred MB."""
+"""The maximum number of events of one robot: some hundred MB."""
 _KEPT_BYTES = 1 << 26
 
 
 class _Playing(NamedTuple):
     robot: str
     size: int
-    """The length of the file at that time."""
+    """The length of the file when the replay started."""
     states: Iterator[RobotState]
 
 
 class RobotStates:
-    """Replays the robot of the last request, and keeps its states."""
+    """Replays the robot of the last request, and caches its states."""
 
     def __init__(self) -> None:
         self._cache = Cache(_KEPT_BYTES)
@@ -44,10 +44,10 @@ class RobotStates:
         self.stopped = False
 
     def chunk(self, file: GrowingFile, robot: str, number: int, *, final: bool) -> bytes:
-        """Return the states after the steps of chunk `number`, as JSON; `[]` past the last one.
+        """Return the states after the steps of chunk `number`, as JSON; `[]` after the last chunk.
 
-        The reader `file` is not moved; the file is read up to its present end. Only `final` states are kept: during a
-        run, messages to the robot may still be missing.
+        The file is read up to its present end, without moving the reader `file`. Only `final` states are cached:
+        during a run, messages to the robot may still be missing.
 
         Raises:
             BadRequestError: if the robot cannot be replayed.
@@ -92,7 +92,7 @@ class RobotStates:
 
     def _events(self, file: GrowingFile, robot: str | None = None) -> Iterator[AnyEvent]:
         """Yield the events of `robot`, or of all robots, each run's sorted by time."""
-        whose = robot or "all robots together"
+        whose = f"the states of {robot}" if robot else "all robots together"
         here = file.again()
         follower = Follower(BufferedReader(here))
         run: list[AnyEvent] = []
@@ -103,7 +103,10 @@ class RobotStates:
                     continue
                 count += 1
                 if count > MOST_EVENTS:
-                    raise BadRequestError(f"{whose} did too much to be played again here (see robochoc replay)")
+                    raise BadRequestError(
+                        f"{whose} have more than {MOST_EVENTS:,} events, too many for a replay in the page: use"
+                        " 'robochoc replay'"
+                    )
                 if isinstance(line, Began):
                     yield from sorted(run, key=_time)
                     run.clear()

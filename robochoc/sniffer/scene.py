@@ -1,7 +1,7 @@
-"""The 3D scene beside the page: the drones on the ground, and where each goes by what its robot decides.
+"""The 3D scene of the page: the drones, which move to the positions that their robots decide.
 
-A drone hovers at the place that its robot's decision says, and stands on its ground place as long as there is none.
-Lengths are in cells, as in `layout`.
+A drone hovers at the position of its robot's decision; before a decision it stands at its home on the ground. Lengths
+are in cells, as in `layout`.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from robochoc.view.drawing import path_of, still
 from robochoc.view.scene import DrawnDrone, Scene
 
 _MOST_DRONES = 2_000
-"""The maximum that browsers animate smoothly and readers can distinguish."""
+"""The maximum number of drones that browsers animate smoothly and readers can distinguish."""
 _MOST_PLACES = 1_000
-"""Of all robots: when so many places are known, what is decided need not be looked at for the box to hold it."""
+"""If more positions are known, decisions of known robots are not checked for the size of the box."""
 
 Move = tuple[int, int, float, float, float]
-"""From a step on, a drone (by its number) is at x, y, z."""
+"""A step, the number of a drone, and its position x, y, z from that step on."""
 
 
 def whole_scene(trace: Trace) -> bytes:
@@ -40,7 +40,7 @@ def whole_scene(trace: Trace) -> bytes:
 
 
 def robots_given(trace: Trace) -> dict[str, Robot]:
-    """Return the robots given in the last run, without those whose file is invalid."""
+    """Return the robots of the last run by name, without those with an invalid file."""
     robots = {}
     for name, file in (trace.runs[-1].files if trace.runs else {}).items():
         with suppress(InvalidInputError, UnicodeEncodeError):
@@ -49,9 +49,9 @@ def robots_given(trace: Trace) -> dict[str, Robot]:
 
 
 class TraceScene:
-    """The drones of one trace. `robots` are those with known files; for others, only decisions are known.
+    """The drones of one trace. `robots`: the robots with known files; of others, only decisions are known.
 
-    The box contains all possible places of known robots, and the places that others have taken so far.
+    The box contains all possible positions of known robots, and the past positions of others.
     """
 
     def __init__(self, trace: Trace, robots: Mapping[str, Robot]) -> None:
@@ -76,7 +76,7 @@ class TraceScene:
         """Return the page's data, with the moves of the decisions from `first`; JSON-compatible."""
         upto = len(self._trace.decisions)
         if first > upto:
-            raise BadRequestError(f"there are {upto} decisions")
+            raise BadRequestError(f"decision {first} does not exist; there are {upto}")
         commands = self._commands() if self and not first else []
         return {
             "commands": [base64.b64encode(command).decode() for command in commands],
@@ -91,7 +91,7 @@ class TraceScene:
         }
 
     def moves(self, first: int, end: int) -> Iterator[Move]:
-        """Yield the moves of the drones for the decisions from `first` to before `end`."""
+        """Yield the moves of the drones for the decisions from `first` up to, but not including, `end`."""
         trace = self._trace
         opened = [run.step for run in trace.runs[1:] if run.epoch is None]
         before = trace.decisions[first - 1][0] if first else -1
@@ -116,7 +116,7 @@ class TraceScene:
         return [craft_of_variable(variable, values) for variable in self._trace.variables.get(name, ())]
 
     def _places(self, name: str, values: Assignment) -> Iterator[tuple[int, Point]]:
-        """Yield the places of a robot's drones for its decision."""
+        """Yield the positions of a robot's drones for its decision."""
         numbers = self._drones.get(name)
         if not numbers:
             return
@@ -133,7 +133,7 @@ class TraceScene:
                 yield number, (rows.at(craft.cell[0]), columns.at(craft.cell[1]), levels.at(craft.level))
 
     def _others(self) -> Iterator[Craft]:
-        """Yield the possible and past places of drones."""
+        """Yield the possible and past positions of drones."""
         seen: set[Craft] = set()
         for robot in self._robots.values():
             if robot is not None:

@@ -1,24 +1,73 @@
-"""A selection of messages of a trace by robots, types, numbers, and conversation. All parts must match."""
+"""A selection of messages of a trace by robots, types, numbers, and conversation, and an excerpt of its journal."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
+from robochoc.journal.events import AnyEvent, Began, Received, Sent
+from robochoc.journal.journal import Journal
 from robochoc.sniffer.patterns import matching, unmatched
 from robochoc.sniffer.trace import Trace
 
 
+def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
+    """Return `journal`, whose trace is `trace`, without the events of messages other than `messages`.
+
+    All other events remain.
+    """
+    return replace(journal, events=tuple(_selected_events(journal.events, trace, set(messages))))
+
+
+def _selected_events(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iterator[AnyEvent]:
+    """Yield the events without those of messages that are not selected.
+
+    A sender's messages in a run have ascending numbers, and each receiver receives them in this order.
+    """
+    of = trace.messages
+    spoken: dict[tuple[int, str], list[int]] = defaultdict(list)
+    for message, (run, sender) in enumerate(zip(of.run, of.sender, strict=True)):
+        spoken[run, trace.robots[sender]].append(message)
+    said: dict[tuple[int, str], int] = defaultdict(int)
+    in_transit: dict[tuple[str, str], list[bool]] = defaultdict(list)
+    taken: dict[tuple[str, str], int] = defaultdict(int)
+    run = -1
+    for event in events:
+        match event:
+            case Began():
+                run += 1
+                in_transit.clear()
+                taken.clear()
+                yield event
+            case Sent():
+                key = max(run, 0), event.sender
+                place = said[key]
+                said[key] += 1
+                meant = place < len(spoken[key]) and spoken[key][place] in messages
+                in_transit[event.sender, event.receiver].append(meant)
+                if meant:
+                    yield event
+            case Received():
+                channel = event.sender, event.receiver
+                place = taken[channel]
+                taken[channel] += 1
+                if place < len(in_transit[channel]) and in_transit[channel][place]:
+                    yield event
+            case _:
+                yield event
+
+
 class NothingSelectedError(ValueError):
-    """A part of a selection that matches nothing in the journal; the message lists what there is."""
+    """A part of a selection matches nothing in the journal; the message lists the existing names or numbers."""
 
 
 @dataclass(frozen=True)
 class Selection:
     """A selection of messages: both robots must match `robots`, and the type must match `kinds`.
 
-    `robots` and `kinds` are names or patterns. `first` and `last` are numbers of messages, from 0 on, both included.
-    `run` is the number of a run, from 1 on: the conversation. Empty or None parts do not restrict the selection.
+    `robots` and `kinds` are names or patterns. `first` and `last` are numbers of messages, from 0, both included.
+    `run` is the number of a run (a conversation), from 1. Empty parts, and None, do not restrict the selection.
     """
 
     robots: Sequence[str] = ()
@@ -29,7 +78,7 @@ class Selection:
 
     @property
     def whole(self) -> bool:
-        """Whether everything is selected."""
+        """True if everything is selected."""
         return self == Selection()
 
     def of(self, trace: Trace) -> range | list[int]:
@@ -38,13 +87,13 @@ class Selection:
         numbers = range(min(self.first, count), count if self.last is None else min(self.last + 1, count))
         if count and not numbers:
             upto = "on" if self.last is None else f"to {self.last}"
-            raise NothingSelectedError(f"there is no message from {self.first} {upto}, only 0 to {count - 1}")
+            raise NothingSelectedError(f"there is no message from {self.first} {upto}; messages are 0 to {count - 1}")
         if not (self.robots or self.kinds or self.run is not None):
             return numbers
         robots = _places(trace.robots, self.robots, "robot")
         kinds = _places(trace.kinds, self.kinds, "type of message")
         if self.run is not None and not 1 <= self.run <= len(trace.runs):
-            raise NothingSelectedError(f"there is no conversation {self.run}, only 1 to {len(trace.runs)}")
+            raise NothingSelectedError(f"there is no conversation {self.run}; conversations are 1 to {len(trace.runs)}")
         of = trace.messages
         return [
             number
@@ -62,6 +111,6 @@ def _places(names: Sequence[str], patterns: Sequence[str], what: str) -> set[int
     lost = unmatched(names, patterns)
     if lost:
         known = ", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")  # noqa: PLR2004 - a line's worth
-        raise NothingSelectedError(f"no {what} is called {lost[0]!r}; there are {known or 'none'}")
+        raise NothingSelectedError(f"no {what} matches {lost[0]!r}; known names: {known or 'none'}")
     meant = set(matching(names, patterns))
     return {place for place, name in enumerate(names) if name in meant}

@@ -1,21 +1,113 @@
 """Messages in words: `Robot2.1 says: as long as V1.1 = 2, V2.1 cannot be 3`.
 
-The words stand with the message's class (`Message.in_words`). A message without words, or of a protocol that is not
-installed, is shown by its type, its FIPA act and its fields. So any journal can be shown.
+The words are defined in the message's class (`Message.in_words`). A message without words, or of a protocol that is not
+installed, is shown by its type, its FIPA act and its fields, so that any journal can be shown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, overload
 
 import msgspec
 
+from robochoc.formats import InvalidInputError
+from robochoc.journal.entries import Header, JournalEntry
+from robochoc.journal.events import Began, Given, Sent
+from robochoc.journal.given import GivenProblemError, TeamReader
 from robochoc.protocols.acts import INFORM
 from robochoc.protocols.message import Message
 from robochoc.protocols.wording import Wording
-from robochoc.sniffer.recorded_messages import message_of
+from robochoc.sniffer.recorded_messages import installed_protocol, message_of, types_by_name
+from robochoc.sniffer.team_names import RunNames, run_names
 from robochoc.system.plain_text import MOST_LISTED, listed, printable
+
+ValueLabel = Callable[[str, int], str]
+"""Returns the name of a variable's value."""
+
+
+class JournalSentences:
+    """Follows a journal entry by entry, and returns its messages in words. Only names are stored.
+
+    `called` returns the names of values. None: values are shown as in the journal, and symbols by their names.
+    """
+
+    def __init__(self, called: ValueLabel | None = None) -> None:
+        self._called = called
+        self._reader = TeamReader()
+        self._asked = self._protocol = ""
+        self._types: Mapping[str, type[Message]] = {}
+        self._on_tree = False
+        self._names = RunNames()
+
+    def follow(self, entry: JournalEntry) -> None:
+        """Update the present protocol, and the names of the robots and their variables."""
+        match entry:
+            case Header():
+                self._asked = entry.protocol
+                self._set_protocol(entry.protocol)
+            case Began():
+                self._set_protocol(entry.protocol)
+            case Given():
+                self._given(entry)
+            case _:
+                pass
+
+    def sentence(self, sent: Sent) -> str:
+        """Return a message as a sentence of its sender."""
+        words = self._names.wording(sent.sender, sent.receiver, on_tree=self._on_tree)
+        return sentence(sent.type, sent.content, words, self._types.get(sent.type))
+
+    def _set_protocol(self, protocol: str) -> None:
+        if protocol == self._protocol:
+            return
+        self._protocol = protocol
+        found = installed_protocol(protocol, self._asked)
+        self._types = types_by_name(found[1]) if found else {}
+        self._on_tree = found is not None and found[1].traits.tree
+
+    def _given(self, given: Given) -> None:
+        try:
+            names = run_names(self._reader.team(given), on_tree=self._on_tree)
+        except (GivenProblemError, InvalidInputError, ValueError):
+            names = RunNames()
+        self._names = names if self._called is None else names._replace(symbols=_SymbolNames(self._called))
+
+
+class _SymbolNames(Mapping[str, Sequence[str]]):
+    """The names of the values of all variables."""
+
+    def __init__(self, called: ValueLabel) -> None:
+        self._called = called
+
+    def __getitem__(self, variable: str) -> Sequence[str]:
+        return _ValueNames(self._called, variable)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+class _ValueNames(Sequence[str]):
+    """The names of the values of one variable: item n is the name of the value n (n >= 0)."""
+
+    def __init__(self, called: ValueLabel, variable: str) -> None:
+        self._called, self._variable = called, variable
+
+    @overload
+    def __getitem__(self, place: int) -> str: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[str]: ...
+    def __getitem__(self, place: int | slice) -> str | Sequence[str]:
+        if isinstance(place, slice):
+            raise TypeError("values are looked up one by one")
+        return self._called(self._variable, place)
+
+    def __len__(self) -> int:
+        return 2**62
+
 
 _MAX_CHARACTERS = 1000
 _MAX_VALUE_CHARACTERS = 60
@@ -27,9 +119,9 @@ def sentence(kind: str, content: Mapping[str, Any], words: Wording, message_type
 
     Args:
         kind: The name of its type.
-        content: Its fields by name, as a journal holds them.
+        content: Its recorded fields by name.
         words: Its sender and receiver, and the names of the team.
-        message_type: Its class; None: the protocol is not installed, or has no such message.
+        message_type: Its class; None if the protocol is not installed or does not have this type.
     """
     said = _in_words(content, words, message_type) if message_type else ""
     text = f"{words.sender} says: {said}" if said else _by_fields(kind, content, words.sender, message_type)

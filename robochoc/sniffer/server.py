@@ -1,8 +1,8 @@
-"""The sniffer's server: the page, and the data that it draws, for this machine alone.
+"""The sniffer's server: the page and its data, for browsers on this machine only.
 
-The page lives under a path that cannot be guessed, as others may use this machine too. What a browser is told unasked
-is small and replaced by what is newer before it is sent: a slow or stopped one makes nothing wait, and nothing grow.
-All that knows the trace happens in one thread, in small pieces; what robots knew is worked out in another.
+The path of the page cannot be guessed, since others may also use this machine. News to a browser are small, and only
+the newest are sent, so that a slow or stopped browser blocks nothing and needs no buffer. One thread uses the trace, in
+small pieces of work; another thread computes robots' states.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
 POLL_S = 0.1
-"""The interval between looks at a file that had nothing new."""
+"""The interval between reads of a file without new content."""
 NEWS_S = 0.2
-"""Between two news to the same page, at least."""
+"""The shortest interval between two news to the same page."""
 _PIECE = 1 << 16
-"""Bytes of a journal that are sent in one go."""
+"""The number of bytes of a journal that are sent at once."""
 _MOST_DIGITS = 10
 _HEAD_PATIENCE_S = 20.0
-"""So long a page that asks waits for the first block of the journal."""
+"""The longest time for which a request waits for the first block of the journal."""
 
 R = TypeVar("R")
 
@@ -42,10 +42,10 @@ def serve_sniffer(
 ) -> None:
     """Serve `session` to browsers of this machine, until interrupted (Ctrl-C); then return.
 
-    Port 0 selects any free port. `ready` is called with the URL once it can be opened.
+    Port 0 selects any free port. `ready` is called with the URL when it can be opened.
 
     Raises:
-        OSError: if the port is taken.
+        OSError: if the port is in use.
     """
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(session, port, ready, open_browser=open_browser))
@@ -82,7 +82,7 @@ class Server:
         self._wanted = asyncio.Event()
         self._changed = asyncio.Event()
         self.version = 0
-        """Another one whenever there is something new."""
+        """Changes whenever there is something new."""
         self.trouble: str | None = None
 
     async def serve(self) -> None:
@@ -97,10 +97,10 @@ class Server:
             self._reader.shutdown(wait=False, cancel_futures=True)
             self._states_thread.shutdown(wait=False, cancel_futures=True)
 
-    # What handlers ask
+    # Requests of handlers
 
     async def read(self, answer: Callable[[], R]) -> R:
-        """Run `answer` in the thread that owns the trace, once there is one; return its result."""
+        """Run `answer` in the thread of the trace, as soon as there is a trace; return its result."""
         self.connected()
         loop = asyncio.get_running_loop()
         while self.trouble is None:
@@ -112,7 +112,7 @@ class Server:
                 await self.change(version)
         raise BadRequestError(self.trouble)
 
-    async def look_into(self, answer: Callable[[], R]) -> R:
+    async def compute(self, answer: Callable[[], R]) -> R:
         """Run `answer` in the thread for slow requests; return its result."""
         return await asyncio.get_running_loop().run_in_executor(self._states_thread, answer)
 
@@ -136,17 +136,17 @@ class Server:
         while True:
             try:
                 more = await loop.run_in_executor(self._reader, self.session.advance)
-            except Exception as error:  # noqa: BLE001 - of a stranger's file; whoever waits for it is to know
+            except Exception as error:  # noqa: BLE001 - the file is untrusted; the error is shown on waiting pages
                 self.trouble = str(error) or type(error).__name__
-                self._tell()
+                self._notify()
                 return
             if more or self.session.begun != begun:
                 begun = self.session.begun
-                self._tell()
+                self._notify()
             if not more:
                 await asyncio.sleep(POLL_S)
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self.version += 1
         changed, self._changed = self._changed, asyncio.Event()
         changed.set()
@@ -157,15 +157,15 @@ class Server:
         return application(
             [
                 (r"/([^/]*)/", SecretPage, whole),
-                (r"/([^/]*)/news", _News, known),
-                (r"/([^/]*)/journal", _Journal, known),
-                (r"/([^/]*)/(about|columns|steps|decisions|details|states|scene)", _Answer, known),
+                (r"/([^/]*)/news", _NewsSocket, known),
+                (r"/([^/]*)/journal", _JournalHandler, known),
+                (r"/([^/]*)/(about|columns|steps|decisions|details|states|scene)", _AnswerHandler, known),
             ],
             compress=True,
         )
 
 
-class _Known(SecretHandler):
+class _TokenHandler(SecretHandler):
     """Accepts requests with the right token, and refuses pages of other sites."""
 
     def initialize(self, server: Server) -> None:
@@ -173,7 +173,7 @@ class _Known(SecretHandler):
         self.secret = server.token
 
 
-class _Answer(_Known):
+class _AnswerHandler(_TokenHandler):
     """Sends one answer to the page."""
 
     async def get(self, _token: str, what: str) -> None:
@@ -182,7 +182,7 @@ class _Answer(_Known):
         except BadRequestError as wrong:
             self._refuse(400, str(wrong))
         except TimeoutError:
-            self._refuse(503, "the run has not begun yet")
+            self._refuse(503, "the run has not started yet")
         else:
             binary = what in {"columns", "steps"}
             self.set_header("Content-Type", "application/octet-stream" if binary else "application/json")
@@ -202,7 +202,7 @@ class _Answer(_Known):
             case "states":
                 robot, chunk = self._number("robot"), self._number("chunk")
                 name = await server.read(lambda: session.robot(robot))
-                return await server.look_into(lambda: session.states(name, chunk))
+                return await server.compute(lambda: session.states(name, chunk))
             case _:
                 first, end = self._number("from"), self._number("to")
                 return await server.read(lambda: session.rows(what, first, end))
@@ -212,7 +212,7 @@ class _Answer(_Known):
         if text is None and default is not None:
             return default
         if text is None or not text.isdecimal() or len(text) > _MOST_DIGITS:
-            raise BadRequestError(f"{name} is to be a number")
+            raise BadRequestError(f"{name} must be a number")
         return int(text)
 
     def _refuse(self, status: int, why: str) -> None:
@@ -221,7 +221,7 @@ class _Answer(_Known):
         self.write(why)
 
 
-class _Journal(_Known):
+class _JournalHandler(_TokenHandler):
     """Sends the journal's file in its present state."""
 
     def head(self, _token: str) -> None:
@@ -246,7 +246,7 @@ class _Journal(_Known):
         return size
 
 
-class _News(SecretSocket):
+class _NewsSocket(SecretSocket):
     """Sends a page the progress; changes during sending go into the next message."""
 
     def initialize(self, server: Server) -> None:
@@ -255,9 +255,9 @@ class _News(SecretSocket):
 
     def open(self, *_: str) -> None:
         self.server.connected()
-        self._telling = asyncio.create_task(self._tell())
+        self._sending = asyncio.create_task(self._send())
 
-    async def _tell(self) -> None:
+    async def _send(self) -> None:
         encode = msgspec.json.encode
         last = ""
         try:
@@ -266,11 +266,11 @@ class _News(SecretSocket):
                 news = encode(await self.server.read(self.server.session.news)).decode()
                 if news != last:
                     last = news
-                    await self.write_message(news)  # returns when it has left: the next news is as new as it can be
+                    await self.write_message(news)  # returns when it is sent, so that the next news are the newest
                 await asyncio.sleep(NEWS_S)
                 await self.server.change(version)
         except (WebSocketClosedError, BadRequestError, TimeoutError):
             self.close()
 
     def on_close(self) -> None:
-        self._telling.cancel()
+        self._sending.cancel()

@@ -1,4 +1,4 @@
-"""The data of the server: one journal's file, its trace so far, and the answers about it."""
+"""The data of the server: a journal's file, its trace so far, and the answers about it."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _KEPT_BYTES = 1 << 26
 
 
 class NotBegunError(BadRequestError):
-    """A session without a trace: the journal has no header yet, or another journal has replaced it."""
+    """There is no trace: the journal has no header yet, or was replaced by another journal."""
 
 
 class SnifferSession:
-    """One journal: `source` is its path, or a descriptor of the file, which may still be written.
+    """A journal. `source`: its path, or a descriptor of its file, which may still be written.
 
-    `chosen` are names or patterns of the robots to show at first, `robots` those whose files are known besides the
-    journal. All methods except `states` must be called in one thread.
+    `chosen`: names or patterns of the robots to show at first; `robots`: robots whose files are known from elsewhere.
+    All methods except `states` must be called in one thread.
 
     Raises:
         OSError: if the file cannot be read.
@@ -58,15 +58,15 @@ class SnifferSession:
 
     @property
     def begun(self) -> bool:
-        """Whether there is something to show."""
+        """True if there is something to show."""
         return self._live_trace.presentable
 
     def advance(self) -> bool:
-        """Read a piece; return False if there was none. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
+        """Read a small part; return False if there was none. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
         return self._live_trace.advance() or self._replaced()
 
     def begin(self) -> None:
-        """Read until the header is known, if it is there. Raises as `advance` does."""
+        """Read up to the header, if there is one. Raises as `advance`."""
         while self._live_trace.trace is None and self._live_trace.advance():
             pass
 
@@ -79,7 +79,7 @@ class SnifferSession:
                 return False
             descriptor = open_to_read(self._path)
             file = GrowingFile(descriptor)
-        except OSError:  # it has been taken away: what was read is still there
+        except OSError:  # the file was removed: the content read so far is still shown
             return False
         self._robot_states = None
         os.close(self._descriptor)
@@ -119,7 +119,7 @@ class SnifferSession:
     def _trace(self) -> Trace:
         trace = self._live_trace.trace
         if trace is None:
-            raise NotBegunError("the journal has not begun")
+            raise NotBegunError("the journal has no header yet")
         return trace
 
     def about(self) -> bytes:
@@ -155,12 +155,12 @@ class SnifferSession:
         """Return the name of a robot. Raises `BadRequestError`."""
         robots = self._trace.robots
         if number >= len(robots):
-            raise BadRequestError(f"there is no robot {number}, only {len(robots)}")
+            raise BadRequestError(f"robot {number} does not exist; there are {len(robots)}")
         return robots[number]
 
     def states(self, robot: str, chunk: int) -> bytes:
         """Return the robot's states after its steps of a chunk as JSON. This is slow. Raises `BadRequestError`."""
-        from robochoc.sniffer.robot_states import RobotStates  # noqa: PLC0415 - the page comes first
+        from robochoc.sniffer.robot_states import RobotStates  # noqa: PLC0415 - slow, and the page is shown first
 
         self._robot_states = self._robot_states or RobotStates()
         return self._robot_states.chunk(self._file, robot, chunk, final=self._live_trace.settled)
@@ -168,10 +168,7 @@ class SnifferSession:
     # The scene
 
     def scene(self, first: int = 0) -> bytes:
-        """Return the drones, and their moves for the decisions from `first` on, as JSON.
-
-        It is `null` if there is nothing to show, now or later.
-        """
+        """Return the drones, and their moves for the decisions from `first`, as JSON; `null` if there will be none."""
         from robochoc.sniffer.scene import TraceScene, robots_given  # noqa: PLC0415 - as above
 
         trace = self._trace
@@ -198,5 +195,5 @@ class SnifferSession:
         return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "._-") else "_" for sign in name)[:100]
 
     def bytes_at(self, place: int, most: int) -> bytes:
-        """Return up to `most` bytes of the file from `place` on."""
+        """Return up to `most` bytes of the file, from the position `place`."""
         return os.pread(self._descriptor, most, place)

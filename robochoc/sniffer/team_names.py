@@ -1,4 +1,4 @@
-"""Names for messages in words, from a journal: the order of the robots, and the names of their variables."""
+"""Names for messages in words, from a journal: the order of the robots, their variables, and symbols."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from robochoc.sniffer.trace import Trace
 
 
 class RunNames(NamedTuple):
-    """The names that a run's messages need; empty where the team is not known.
+    """The names for the messages of a run; empty if the team is not known.
 
     Attributes:
         order: All robots, the highest priority first.
-        interfaces: By robot, the variables whose values its messages hold.
-        symbols: By symbolic variable, the names that its values stand for.
-        tree: The pseudo-tree that the order induces, where the protocol works on it.
+        interfaces: The variables whose values are in a robot's messages, by robot.
+        symbols: The names of the values of a symbolic variable, by variable.
+        tree: The pseudo-tree induced by the order, if the protocol uses it.
     """
 
     order: tuple[str, ...] = ()
@@ -30,7 +30,7 @@ class RunNames(NamedTuple):
     tree: PseudoTree | None = None
 
     def wording(self, sender: str, receiver: str, *, on_tree: bool) -> Wording:
-        """Return the words for a message; `on_tree`: the protocol works on the order's pseudo-tree."""
+        """Return the words for a message. `on_tree`: whether the protocol uses the order's pseudo-tree."""
         branch = self.order
         if on_tree:
             known = self.tree if self.tree and sender in self.tree.parents else None
@@ -49,8 +49,8 @@ def run_names(team: Team, *, on_tree: bool) -> RunNames:
     return RunNames(tuple(team.order), interfaces, symbols, tree)
 
 
-class _Seen(Mapping[str, tuple[str, ...]]):
-    """The decided variables of robots, as far as the journal has been read."""
+class _DecidedVariables(Mapping[str, tuple[str, ...]]):
+    """The variables that each robot has decided in the part of the journal read so far."""
 
     def __init__(self, variables: Mapping[str, Mapping[str, None]]) -> None:
         self._variables = variables
@@ -68,8 +68,8 @@ class _Seen(Mapping[str, tuple[str, ...]]):
 class TeamNames:
     """The known names of the robots and their variables in each run of `trace`.
 
-    They come from the files that the robots were given. If a journal has none, the variables that a robot decided are
-    assumed to be those in its messages. This is right for robots without private variables.
+    They are from the robots' files. If the journal has no files, the variables decided by a robot are assumed to be
+    those in its messages, which is correct for robots without private variables.
     """
 
     def __init__(self, trace: Trace, protocols: RunProtocols) -> None:
@@ -91,11 +91,11 @@ class TeamNames:
         """Return the words for a message of a run."""
         names = self._of_run(run)
         if not names.interfaces:
-            names = names._replace(interfaces=_Seen(self._trace.variables))
-        return names.wording(sender, receiver, on_tree=self._works_on_tree(run))
+            names = names._replace(interfaces=_DecidedVariables(self._trace.variables))
+        return names.wording(sender, receiver, on_tree=self._uses_tree(run))
 
     def labelled(self, values: Mapping[str, int]) -> Mapping[str, int | str]:
-        """Return decided values, with the names of symbols as far as the last run that is known tells them."""
+        """Return decided values, with the names of symbols that are known from the last run."""
         symbols = self._of_run(len(self._trace.runs) - 1).symbols if self._trace.runs else {}
         if not symbols:
             return values
@@ -104,7 +104,7 @@ class TeamNames:
             for name, value in values.items()
         }
 
-    def _works_on_tree(self, run: int) -> bool:
+    def _uses_tree(self, run: int) -> bool:
         found = self._protocols.of_run(run)
         return found is not None and found[1].traits.tree
 
@@ -113,11 +113,11 @@ class TeamNames:
             team = self._team(number)
             if team is None:
                 return RunNames()
-            self._known[number] = run_names(team, on_tree=self._works_on_tree(number))
+            self._known[number] = run_names(team, on_tree=self._uses_tree(number))
         return self._known[number]
 
     def _team(self, number: int) -> Team | None:
-        """Return the team of a run; each run only records the robots that changed."""
+        """Return the team of a run. Each run records only the changed robots."""
         runs = self._trace.runs
         while len(self._teams) <= number:
             given = runs[len(self._teams)].given

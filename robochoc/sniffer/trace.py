@@ -1,4 +1,4 @@
-"""The trace: a run as columns of numbers, for pages that draw it, and for questions about causes.
+"""The trace: runs as columns of numbers, for drawing them in a page, and for the causes of messages.
 
 A trace is built from events. A robot's step is the processing of one packet: receiving messages, changing state, and
 sending messages. Steps are numbered in the order of their ends, and the messages of a step are consecutive, so the
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import heapq
 from collections import deque
-from collections.abc import Iterable
-from typing import Any, Self
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple, Self
 
 import msgspec
 from msgspec import UNSET
@@ -21,9 +21,14 @@ from robochoc.journal.events import (
     Began,
     Concluded,
     Decided,
+    DroppedOut,
     Given,
+    Granted,
     Heard,
+    Improved,
+    Lost,
     Received,
+    Refused,
     Registered,
     Sent,
     Settled,
@@ -33,10 +38,87 @@ from robochoc.journal.journal import Header, Journal
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.columns import NOT_YET, Contents, floats, longs, shorts
-from robochoc.sniffer.trace_tables import Messages, Note, RunRecord, Steps, note_of
+
+
+class RunRecord(msgspec.Struct, frozen=True):
+    """A run, or epoch: its first message and step, and the robots' problems (`given`; None: unknown).
+
+    `files`: the robots' XML files by name, also those from earlier runs.
+    """
+
+    number: int
+    protocol: str
+    epoch: int | None
+    opened_by: str | None
+    message: int
+    step: int
+    given: Given | None = None
+    files: Mapping[str, str] = {}
+
+
+class TraceNote(msgspec.Struct, frozen=True):
+    """An event other than messages and decisions. `step`: the number of its step of `robot`.
+
+    For events outside of steps, such as losses and refusals, `step` is the number of the next step.
+    """
+
+    t: float
+    step: int
+    kind: str
+    robot: str
+    text: str
+
+
+class MessageTable(NamedTuple):
+    """The columns of the messages; see `columns.py` for their kinds.
+
+    `taken`: the step that received the message, or `NOT_YET`, which may change. `sequence`: the number of the message
+    among those of its sender in a run, from 1.
+    """
+
+    t: Any
+    clock: Any
+    step: Any
+    bytes: Any
+    sender: Any
+    receiver: Any
+    kind: Any
+    run: Any
+    taken: Any
+    sequence: Any
+
+
+class StepTable(NamedTuple):
+    """The columns of the steps. `packet_end` and `said_end` count the messages received and sent up to a step's end."""
+
+    t: Any
+    clock: Any
+    checks: Any
+    packet_end: Any
+    robot: Any
+    run: Any
+    said_end: Any
+
+
+def note_of(event: AnyEvent, step: int) -> TraceNote | None:
+    """Return the note for an event other than a message; None if the event has no note."""
+    match event:
+        case Improved():
+            return TraceNote(event.t, step, "improved", "", f"the best cost so far is {cost_shown(event.cost)}")
+        case DroppedOut():
+            return TraceNote(event.t, step, "lost", event.robot, f"{event.robot} has dropped out: {event.why}")
+        case Lost():
+            return TraceNote(event.t, step, "lost", event.robot, f"{event.robot} was lost: {event.why}")
+        case Refused():
+            return TraceNote(event.t, step, "refused", event.who, f"{event.who} was refused {event.what}: {event.why}")
+        case Granted():
+            return TraceNote(event.t, step, "granted", event.who, f"{event.who} was granted {event.what}")
+        case _:
+            return None
+
 
 MOST_NAMES = 0xFFFF
-"""Robots, types of messages, or runs: they are numbered by two bytes."""
+"""The maximum number of robots, types of messages, and runs, which are numbered by two bytes."""
 
 
 MOST_COUNTED = 1 << 53
@@ -47,9 +129,9 @@ class TraceTooLargeError(ValueError):
 
 
 class PendingChannel:
-    """The sent and not yet received messages from one robot to another, in one run.
+    """The messages in transit from one robot to another in a run.
 
-    `owed` counts received messages whose sending is not in the journal yet.
+    `owed`: the number of received messages whose sending is not recorded yet.
     """
 
     __slots__ = ("in_transit", "owed")
@@ -60,7 +142,7 @@ class PendingChannel:
 
 
 class PendingStep:
-    """A step that has not ended, or waits for the sending of messages that it received."""
+    """A step that has not ended, or waits for the recorded sending of messages that it received."""
 
     __slots__ = ("checks", "clock", "decided", "notes", "packet", "received", "sent", "t")
 
@@ -73,8 +155,8 @@ class PendingStep:
         self.t = 0.0
         self.clock = self.checks = 0
 
-    def taken_in(self) -> bool:
-        """Return whether all received messages are known; move the known ones to the step's packet."""
+    def is_complete(self) -> bool:
+        """Move known received messages to the step's packet; return whether all received messages are known."""
         while self.received:
             if not self.received[0].in_transit:
                 return False
@@ -83,9 +165,9 @@ class PendingStep:
 
 
 class Trace:
-    """The events of all runs of one journal. Columns, lists and numbers only grow.
+    """The events of all runs of a journal. Columns, lists and numbers only grow.
 
-    `generation` distinguishes traces with different numbering: a trace that was made again has the next one.
+    `generation` distinguishes traces with different numberings: a rebuilt trace has the next one.
     """
 
     def __init__(self, header: Header, generation: int = 0) -> None:
@@ -94,22 +176,22 @@ class Trace:
         self.robots: list[str] = []
         self.kinds: list[str] = []
         self.runs: list[RunRecord] = []
-        self.messages = Messages(
+        self.messages = MessageTable(
             floats(), floats(), longs(), longs(), shorts(), shorts(), shorts(), shorts(), longs(), longs()
         )
-        self.steps = Steps(floats(), floats(), floats(), longs(), shorts(), shorts(), longs())
+        self.steps = StepTable(floats(), floats(), floats(), longs(), shorts(), shorts(), longs())
         self.packets = longs()
         self.decisions: list[tuple[int, dict[str, int]]] = []
-        self.notes: list[Note] = []
+        self.notes: list[TraceNote] = []
         self.variables: dict[str, dict[str, None]] = {}
-        """By robot: the variables that it was seen to decide, in that order."""
+        """The variables that each robot has decided, in the order of their first decisions, by robot."""
         self.over = False
         self.outcome: Outcome | None = None
         self.damage: str | None = None
         self.unseen = 0
-        """The number of received messages whose sending was not seen."""
+        """The number of received messages whose sending is not recorded."""
         self.outdated = False
-        """Whether the sending of a message counted as unseen was seen later: a trace made again would be better."""
+        """True if the sending of an unseen message was recorded later: a rebuilt trace would be more complete."""
         self._contents = Contents()
         self._number_of_robot: dict[str, int] = {}
         self._number_of_kind: dict[str, int] = {}
@@ -117,7 +199,7 @@ class Trace:
 
     @classmethod
     def of(cls, journal: Journal, generation: int = 0) -> Self:
-        """Return the trace of a whole journal. Raises `TraceTooLargeError`."""
+        """Return the trace of a complete journal. Raises `TraceTooLargeError`."""
         trace = cls(journal.header, generation)
         trace.add(journal.events)
         trace.end(journal.outcome, journal.damage)
@@ -138,7 +220,7 @@ class Trace:
                     self._add_rare(event)
 
     def flush(self) -> None:
-        """Stop waiting: received messages whose sending was not seen are counted as unseen."""
+        """Stop waiting: received messages whose sending is not recorded are counted as unseen."""
         waiting = [(queue[0].t, robot) for robot, queue in self._waiting.items()]
         heapq.heapify(waiting)
         while waiting:
@@ -147,7 +229,7 @@ class Trace:
             if not queue:
                 continue
             self._give_up(queue[0])
-            self._go_on([robot])
+            self._write_ready([robot])
             if queue:
                 heapq.heappush(waiting, (queue[0].t, robot))
 
@@ -161,7 +243,7 @@ class Trace:
         return self._contents[message]
 
     def packet(self, step: int) -> list[int]:
-        """Return the messages that a step received, in that order."""
+        """Return the messages that a step received, in their order."""
         first = self.steps.packet_end[step - 1] if step else 0
         return list(self.packets[first : self.steps.packet_end[step]])
 
@@ -170,11 +252,11 @@ class Trace:
         return range(self.steps.said_end[step - 1] if step else 0, self.steps.said_end[step])
 
     def causes(self, message: int) -> list[int]:
-        """Return the messages received by the step that sent this one; none: it was sent at the start."""
+        """Return the messages received by the step that sent this message; none if it was sent at the start."""
         return self.packet(self.messages.step[message])
 
     def consequences(self, message: int) -> range:
-        """Return the messages that were sent in the step that received this one."""
+        """Return the messages sent by the step that received this message."""
         taken = self.messages.taken[message]
         return range(0) if taken == NOT_YET else self.sent_in(taken)
 
@@ -214,8 +296,8 @@ class Trace:
             )
         )
 
-    def _give(self, given: Given) -> None:
-        """Record what the robots of this run were given, and number them in their order."""
+    def _set_given(self, given: Given) -> None:
+        """Record the robots' problems of this run, and number the robots in their order."""
         if not self.runs:
             self._new_run(Began(t=given.t, protocol=self.header.protocol))
         known = self.runs[-2].files if len(self.runs) > 1 else {}
@@ -252,12 +334,12 @@ class Trace:
                 self._open_step(event.robot, event).notes.append(note)
             case Heard():
                 cost = told_by(self.runs[-1].given, event.cost) if self.runs else event.cost
-                note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {cost_shown(cost)}")
+                note = (event.t, "heard", f"{event.robot} knows an assignment with cost {cost_shown(cost)}")
                 self._open_step(event.robot, event).notes.append(note)
             case Began():
                 self._new_run(event)
             case Given():
-                self._give(event)
+                self._set_given(event)
             case Registered():
                 self.number_of(event.robot)
             case _:
@@ -277,25 +359,25 @@ class Trace:
         self._ready(robot, step)
 
     def _ready(self, robot: str, step: PendingStep) -> None:
-        """Write down an ended step, or store it until the messages it received have been sent."""
+        """Write an ended step, or store it until the sending of its received messages is recorded."""
         self._open.pop(robot, None)
         queue = self._waiting.get(robot)
         if queue is not None:
             queue.append(step)
-        elif step.taken_in():
+        elif step.is_complete():
             self._write(robot, step)
             if self._waiting and step.sent:
-                self._go_on(dict.fromkeys(sent.receiver for sent in step.sent))
+                self._write_ready(dict.fromkeys(sent.receiver for sent in step.sent))
         else:
             self._waiting[robot] = deque([step])
 
-    def _go_on(self, robots: Iterable[str]) -> None:
-        """Write down steps that need not wait any longer: of `robots`, and of receivers of their messages."""
+    def _write_ready(self, robots: Iterable[str]) -> None:
+        """Write the complete stored steps of `robots`, and of receivers of their messages."""
         ready = list(robots)
         while ready:
             robot = ready.pop()
             queue = self._waiting.get(robot)
-            while queue and queue[0].taken_in():
+            while queue and queue[0].is_complete():
                 step = queue.popleft()
                 self._write(robot, step)
                 ready.extend(dict.fromkeys(sent.receiver for sent in step.sent if sent.receiver in self._waiting))
@@ -303,20 +385,20 @@ class Trace:
                 del self._waiting[robot]
 
     def _give_up(self, step: PendingStep) -> None:
-        """Count the messages that `step` still waits for as unseen."""
-        while not step.taken_in():
+        """Count the messages for which `step` still waits as unseen."""
+        while not step.is_complete():
             step.received.popleft().owed += 1
             self.unseen += 1
 
     def _write(self, robot: str, step: PendingStep) -> None:
-        """Write the step as a row, and each of its messages as a row."""
+        """Write the step and each of its messages as rows."""
         steps, number = self.steps, len(self.steps.t)
         run = len(self.runs) - 1
         for message in step.packet:
             self.messages.taken[message] = number
         self.packets.extend(step.packet)
         for t, kind, text in step.notes:
-            self.notes.append(Note(t, number, kind, robot, text))
+            self.notes.append(TraceNote(t, number, kind, robot, text))
         if step.decided is not None:
             self.decisions.append((number, step.decided))
             self.variables.setdefault(robot, {}).update(dict.fromkeys(step.decided))
@@ -358,12 +440,12 @@ def _number(name: str, numbers: dict[str, int], names: list[str]) -> int:
     number = numbers.get(name)
     if number is None:
         if len(names) == MOST_NAMES:
-            raise TraceTooLargeError(f"the journal has more than {MOST_NAMES} names of robots, or types of messages")
+            raise TraceTooLargeError(f"the journal has more than {MOST_NAMES} robots or types of messages")
         number = numbers[name] = len(names)
         names.append(name)
     return number
 
 
 def _counted(number: int) -> int:
-    """Return a count, limited to what a float holds exactly; a journal may contain any number."""
+    """Return a count, limited to integers that a float represents exactly; a journal may contain any number."""
     return min(max(number, 0), MOST_COUNTED)

@@ -1,8 +1,8 @@
-"""A viewer: a separate process that serves the page of a run, so that viewing never slows the robots.
+"""A viewer: a separate process that serves the page of a run, so that viewing does not slow down the robots.
 
-It is started before the robots, with the journal's file and the socket at which browsers will ask; the URL stands
-before it has even begun. Robots and viewer share nothing but the file, which the viewer reads when a page is there. It
-ends when its parent hangs up, or dies.
+It is started before the robots, with the journal's file and a listening socket, so that its URL is known at once. The
+robots and the viewer share only the file, which the viewer reads when a page has connected. It ends when its parent
+closes the pipe or ends.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.redirect import RedirectFile
 
 _PATIENCE_S = 2.0
-"""So long a viewer may take to end."""
+"""The time limit for the end of the process."""
 _MOST_CHOSEN = 1000
 _PROGRAM = "robochoc.sniffer.viewer_process"
 
@@ -29,11 +29,11 @@ _PROGRAM = "robochoc.sniffer.viewer_process"
 class Viewer:
     """The viewer of the journal in the file `journal` (a descriptor, open for reading).
 
-    `chosen` are names or patterns of robots to show at first. Port 0 selects any free port. With `open_browser`, the
-    page is opened in the user's browser.
+    `chosen`: names or patterns of robots to show at first. Port 0 selects any free port. With `open_browser`, the page
+    is opened in the user's browser.
 
     Raises:
-        OSError: if the port is taken, or the process cannot be started.
+        OSError: if the port is in use, or the process cannot be started.
     """
 
     def __init__(self, journal: int, chosen: Sequence[str] = (), port: int = 0, *, open_browser: bool = False) -> None:
@@ -56,10 +56,10 @@ class Viewer:
                 os.close(theirs_in)
                 os.close(theirs_out)
         self._heard, self._lifeline = heard, lifeline
-        # Not as arguments: those can be read by everybody on this machine.
+        # Not as arguments, which are visible to all users of this machine.
         shown = self._redirect.url if self._redirect else None
         settings = json.dumps({"token": token, "chosen": [*chosen][:_MOST_CHOSEN], "shown": shown}).encode()
-        with suppress(BrokenPipeError):  # it has ended already, which is reported later
+        with suppress(BrokenPipeError):  # the process has already ended, which is reported later
             os.write(lifeline, settings + b"\n")
 
     def __enter__(self) -> Self:
@@ -83,7 +83,7 @@ class Viewer:
 
     @property
     def is_gone(self) -> bool:
-        """Whether the viewer's process has ended by itself."""
+        """True if the viewer's process has ended."""
         return self._process.poll() is not None
 
     def wait(self) -> None:
@@ -108,7 +108,7 @@ class Viewer:
 
 def _started(listening: int, journal: int, theirs_in: int, theirs_out: int) -> subprocess.Popen[bytes]:
     """Start the viewer's process with these descriptors, and return it."""
-    with signals_held():  # until it has said itself what they do: Ctrl-C reaches it, too
+    with signals_held():  # until the process handles them: Ctrl-C is also sent to it
         return subprocess.Popen(  # noqa: S603 - our own module
             [sys.executable, "-P", "-m", _PROGRAM, str(listening), str(journal)],
             stdin=theirs_in,

@@ -1,8 +1,8 @@
 """The main program of a viewer's process: `python -m robochoc.sniffer.viewer_process SOCKET JOURNAL` (descriptors).
 
-The first line of standard input says what else there is to know, a byte after it that nothing more will be written,
-and its end is the end of the parent. A byte on standard output says that a page has connected. Until the first browser
-asks, it costs no more than Python does.
+The first line of standard input has the settings, a further byte means that the journal is complete, and the end of
+the input means that the parent has ended. A byte on standard output means that a page has connected. Before the first
+request, the process imports nothing else, so it needs little memory.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Parent(NamedTuple):
     output: int
 
     def line(self) -> bytes:
-        """Return the first line, and no further byte; empty if the parent has ended."""
+        """Read the first line, and no further byte; return it, or empty if the parent has ended."""
         line = b""
         while not line.endswith(b"\n"):
             sign = os.read(self.input, 1)
@@ -70,7 +70,7 @@ def main() -> None:
 async def _serve(
     listening: socket.socket, journal: int, settings: dict[str, list[str]], parent: _Parent, *, over: bool
 ) -> None:
-    from robochoc.sniffer.server import Server  # noqa: PLC0415 - when somebody looks
+    from robochoc.sniffer.server import Server  # noqa: PLC0415 - only after the first request
     from robochoc.sniffer.session import SnifferSession  # noqa: PLC0415
 
     session = SnifferSession(journal, live=True, chosen=settings["chosen"])
@@ -78,22 +78,22 @@ async def _serve(
         session.finish()
     serving = asyncio.create_task(Server(session, listening, str(settings["token"]), parent.notify).serve())
 
-    def hear() -> None:
+    def read_parent() -> None:
         if os.read(parent.input, 1):
             session.finish()
         else:
             serving.cancel()
 
-    asyncio.get_running_loop().add_reader(parent.input, hear)
+    asyncio.get_running_loop().add_reader(parent.input, read_parent)
     with suppress(asyncio.CancelledError):
         await serving
-    os._exit(0)  # what a thread still works out, nobody asks for any more
+    os._exit(0)  # without waiting for computations in threads
 
 
 def _parent() -> _Parent:
     """Return the pipes from and to the parent, moved so that a started browser does not inherit them."""
     parent = _Parent(os.dup(0), os.dup(1))
-    with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - the name is no path of ours
+    with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - not a path of this project
         os.dup2(nothing.fileno(), 0)
     os.dup2(2, 1)
     return parent

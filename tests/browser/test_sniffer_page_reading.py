@@ -212,7 +212,7 @@ def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Pag
         page.goto(server.url)
         text_is(page, "#nothing", "Waiting for the robots")
         file.write_bytes(b"".join(list(lines_of(JOURNAL))[:600]))
-        until(lambda: "The run goes on." in page.inner_text("#verdict"), "it has not begun")
+        until(lambda: "The run continues." in page.inner_text("#verdict"), "it has not begun")
         until(lambda: not page.locator("#nothing").is_visible(), "it still waits")
     text_is(page, "#verdict", "The run's end was not seen.")
     page.close()

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from robochoc.journal.journal import lines_of
-from robochoc.sniffer.embedded import embedded_answers
+from robochoc.sniffer.export import embedded_answers
 from robochoc.sniffer.page import sniffer_page as page_of
 from robochoc.sniffer.session import SnifferSession
 from tests.support.browser_pages import Browser, Page

@@ -79,8 +79,8 @@ def test_show_tells_of_an_end_that_is_missing_and_keeps_names_on_their_lines(tmp
     assert r"x\n\x1b[2Jy" in shown
     assert r"1: a\nb" in shown
     assert "order listed" in shown
-    assert "The run broke off before an outcome." in shown
-    assert "not possible: the journal does not say what the robots were given" in shown
+    assert "The run ended without an outcome." in shown
+    assert "not possible: the journal does not contain the robots' problems" in shown
 
 
 def test_a_table_comes_back_as_the_trace(file: Path) -> None:
@@ -207,7 +207,7 @@ def test_a_diagram_that_nobody_could_read_is_refused(tmp_path: Path) -> None:
     path.write_bytes(content_of(recorded("mgm")))
     result = journal("export", path, "--format", "mermaid")
     assert result.exit_code == USAGE
-    assert f"at most {MOST_ARROWS} (select fewer with --robots" in result.output
+    assert f"the maximum is {MOST_ARROWS} (select fewer with --robots" in result.output
 
 
 @pytest.mark.parametrize("chosen", [(), ("--types", "*", "--from", "7", "--conversation", "1")])
@@ -267,12 +267,12 @@ def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: p
 def test_a_choice_that_fits_nothing_is_told(file: Path) -> None:
     with cases() as each:
         for arguments, words in [
-            (("--types", "Okay"), "no type of message is called 'Okay'; there are AddLink, Nogood, Ok"),
-            (("--robots", "Robot1.1,X*"), "no robot is called 'X*'; there are Robot1.1, "),
-            (("--conversation", "2"), "there is no conversation 2, only 1 to 1"),
+            (("--types", "Okay"), "no type of message matches 'Okay'; known names: AddLink, Nogood, Ok"),
+            (("--robots", "Robot1.1,X*"), "no robot matches 'X*'; known names: Robot1.1, "),
+            (("--conversation", "2"), "there is no conversation 2; conversations are 1 to 1"),
             (("--from", "-1"), "'-1' is not a whole number of at least 0"),
-            (("--from", "5", "--to", "3"), "there is no message from 5 to 3, only 0 to "),
-            (("--from", "999999"), "there is no message from 999999 on, only 0 to "),
+            (("--from", "5", "--to", "3"), "there is no message from 5 to 3; messages are 0 to "),
+            (("--from", "999999"), "there is no message from 999999 on; messages are 0 to "),
         ]:
             with each(arguments):
                 result = journal("export", file, "--format", "csv", *arguments)

@@ -113,8 +113,8 @@ def test_no_process_shows_the_secret_address_to_others(
 
 def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path) -> None:
     for content, said in [
-        (b"what is this?", "it does not begin as a journal does"),
-        (b"<html>" * 1000, "it does not begin as a journal does"),
+        (b"what is this?", "the file does not start like a journal"),
+        (b"<html>" * 1000, "the file does not start like a journal"),
         (b'{"event":"Journal"}\n', "is missing"),
     ]:
         file = tmp_path / "file"

@@ -53,7 +53,7 @@ def test_who_may_has_the_masters_own_journal_whenever_it_comes(site: Deployment)
     wait_until(lambda: "Registered" in heard(site, "Late"), lambda: late.errors)
     assert refused.status() == 4
     assert (
-        "does not let Spy sniff: it does not have the right: grant it by robochoc authority enrol Spy --may sniff"
+        "does not allow Spy to sniff: it does not have the right: grant it by robochoc authority enrol Spy --may sniff"
         in one_line(refused)
     )
     assert not copy_of(site, "Spy").exists()
@@ -88,7 +88,7 @@ def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Deployment
     programs["Killed"].kill()
     site.authority("revoke", "Revoked")
     assert programs["Revoked"].status() == 4
-    assert "sniff no more" in programs["Revoked"].errors
+    assert "to sniff any more" in programs["Revoked"].errors
     assert master.status() == 3, master.errors
     ended(robots, status=3)
     assert " is lost" not in master.errors
@@ -113,7 +113,7 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     robot = site.robot(files / "RA.xml", "--token", tokens["RA"], "--patience", 3600)
     wait_until(lambda: "Registered" in heard(site, "Sniffer"), lambda: sniffer.errors)
     master.kill()
-    sniffer.hurry_until(lambda: "is gone, or lets Sniffer sniff no more" in sniffer.errors)
+    sniffer.hurry_until(lambda: "has ended, or does not allow Sniffer to sniff any more" in sniffer.errors)
     sniffer.wait_to_say("stays until Ctrl-C")
     assert robot.hurried_status() == 4
     url = re.search(r"http://127\S+/", sniffer.errors)

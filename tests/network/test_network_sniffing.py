@@ -30,7 +30,7 @@ from robochoc.journal.blocks import BEGINNING, PREAMBLE, frame_block
 from robochoc.model.outcome import Verdict
 from robochoc.run.networked.address import Address
 from robochoc.run.networked.directory_query import NoAnswerError
-from robochoc.sniffer.remote import Followed, receive
+from robochoc.sniffer.remote import FollowResult, receive
 from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun
 
@@ -99,7 +99,7 @@ class Sniffing:
 
     def __init__(self, run: NetworkRun, name: str) -> None:
         self.content = bytearray()
-        self.ending: Followed | None = None
+        self.ending: FollowResult | None = None
         self.error: Exception | None = None
         self.granted = threading.Event()
         self._run = run
@@ -122,7 +122,7 @@ class Sniffing:
         except (NoAnswerError, CannotConnectError) as error:
             self.error = error
 
-    def ended(self) -> Followed | Exception | None:
+    def ended(self) -> FollowResult | Exception | None:
         """How it ended, as soon as it has."""
         self._run.wait_until(lambda: not self._thread.is_alive(), "it follows on")
         return self.ending or self.error
@@ -186,7 +186,7 @@ def test_who_may_has_all_of_it_whenever_it_comes_and_who_may_not_nothing(
         publication.write(each)
     run.wait_until(lambda: early.content == whole, "it has not got all")
     spy = sniffing("Spy").ended()
-    assert re.search(r"does not let Spy sniff: .* by robochoc authority enrol Spy --may sniff", str(spy)), spy
+    assert re.search(r"does not allow Spy to sniff: .* by robochoc authority enrol Spy --may sniff", str(spy)), spy
     run.wait_for_refusal("Spy", "sniff", "it does not have the right")
 
     run.household.enrol("Late", sniffs=True)  # after a hundred blocks
@@ -198,7 +198,7 @@ def test_who_may_has_all_of_it_whenever_it_comes_and_who_may_not_nothing(
     publication.end()
     assert run.let_go().verdict is Verdict.SOLUTION
     for one in (early, late):
-        assert one.ended() == Followed(over=True, why="the run is over")
+        assert one.ended() == FollowResult(over=True, why="the run is over")
         assert bytes(one.content) == whole + last
 
 
@@ -241,8 +241,8 @@ def test_revoked_in_mid_run(
     clock.by_s = 2 * HANG_S
     for one in (eye, ear):
         ending = one.ended()
-        assert isinstance(ending, Followed)
-        assert (ending.over, "sniff no more" in ending.why) == (False, True), ending
+        assert isinstance(ending, FollowResult)
+        assert (ending.over, "to sniff any more" in ending.why) == (False, True), ending
         assert bytes(one.content) == BLOCKS[0]
     publication.write(BLOCKS[1])
     run.wait_for_progress()

@@ -12,7 +12,7 @@ from robochoc.protocols.satisfaction.abt_messages import Ok
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.services.identifier import AgentIdentifier
 from robochoc.sniffer.acl import ACLMessage, parse, text
-from robochoc.sniffer.conversation import Conversation
+from robochoc.sniffer.acl_messages import Conversation
 
 PLATFORM = "192.168.1.14:7447/robochoc"
 BUNDLED_PROTOCOLS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]

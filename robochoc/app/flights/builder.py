@@ -98,17 +98,17 @@ class FlightBuilder:
 
     @property
     def has_answer(self) -> bool:
-        """Whether the team has an answer that can be flown: at the end, or before an event."""
+        """True if the team has an answer that can be flown: at the end, or before an event."""
         return self.run.result is not None and self.run.result.has_decided
 
     @property
     def has_flight(self) -> bool:
-        """Whether there is a flight to show, when it is built."""
+        """True if there is a flight to show, when it is built."""
         return self.has_answer and flies(self.run) and BuildStage.FLIGHT not in self.troubles
 
     @property
     def has_conversation(self) -> bool:
-        """Whether there are messages to show."""
+        """True if there are messages to show."""
         return self.run.artefact(JOURNAL) is not None and BuildStage.CONVERSATION not in self.troubles
 
     @property
@@ -128,7 +128,7 @@ class FlightBuilder:
 
     @property
     def is_cut(self) -> bool:
-        """Whether only the first messages are shown."""
+        """True if only the first messages are shown."""
         return self.run.result is not None and self.run.result.messages > MOST_MESSAGES
 
     def request(self, on_stage: Callable[[], None]) -> Callable[[], None]:

@@ -28,7 +28,7 @@ class RunChange(msgspec.Struct):
 
     @property
     def is_sound(self) -> bool:
-        """Whether the change is within the limits, since its file may be untrusted."""
+        """True if the change is within the limits, since its file may be untrusted."""
         return is_sound(self.after) and len(self.anew) + sum(map(len, self.happened)) <= _MOST_TOLD
 
 

@@ -90,7 +90,7 @@ class Job(Generic[T]):
         self.stopped_at: float | None = None
         """The time of the request to stop, on the monotonic clock."""
         self.is_ended = False
-        """Whether the job was ended."""
+        """True if the job was ended."""
 
     @property
     def pid(self) -> int | None:
@@ -100,7 +100,7 @@ class Job(Generic[T]):
 
     @property
     def is_alive(self) -> bool:
-        """Whether the job's thread is running."""
+        """True if the job's thread is running."""
         return self._thread.is_alive()
 
     def start(self) -> Self:

@@ -93,7 +93,7 @@ class GroupProcess:
 
     @property
     def has_ended(self) -> bool:
-        """Whether the process has ended. Its id is not reused before `finish`."""
+        """True if the process has ended. Its id is not reused before `finish`."""
         try:
             return os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
         except ChildProcessError:

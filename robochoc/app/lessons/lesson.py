@@ -130,7 +130,7 @@ class LessonStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     @property
     def is_spoken(self) -> bool:
-        """Whether the question is about the actions and messages of the robot of the next turn."""
+        """True if the question is about the actions and messages of the robot of the next turn."""
         return self.about == "next" or self.about.startswith("told ")
 
     @property

@@ -16,7 +16,7 @@ from robochoc.journal.events import Began, Bounded, Decided, Heard, Sent
 from robochoc.journal.reader import Follower
 from robochoc.model.cost_units import Cost
 from robochoc.run.known_costs import KnownCosts
-from robochoc.sniffer.spoken import Called, Spoken
+from robochoc.sniffer.sentences import JournalSentences, ValueLabel
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0
@@ -79,7 +79,7 @@ class LiveReader:
         live: Live,
         label: Callable[[str, int], Value],
         objective: Objective | None = None,
-        called: Called | None = None,
+        called: ValueLabel | None = None,
     ) -> None:
         self._file = file
         self._live = live
@@ -87,7 +87,7 @@ class LiveReader:
         self._known = KnownCosts(objective) if objective else None
         self._robots = frozenset(objective.interfaces) if objective else None
         self._minimised = objective is not None and objective.told(0) < objective.told(1)
-        self._spoken = Spoken(called)
+        self._spoken = JournalSentences(called)
         self._open: BinaryIO | None = None
         self._follower: Follower | None = None
         self._began = time.monotonic()

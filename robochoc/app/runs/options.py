@@ -54,7 +54,7 @@ class RunOptions(msgspec.Struct, frozen=True):
 
     @property
     def are_known(self) -> bool:
-        """Whether the application could have set these options: an opened file may have any others."""
+        """True if the application could have set these options: an opened file may have any others."""
         return (
             self.protocol in {AUTO, *protocol_names()}
             and self.runtime in {Runtime.SIMULATOR, Runtime.PROCESSES}

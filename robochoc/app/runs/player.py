@@ -38,7 +38,7 @@ class Player:
 
     @property
     def ended(self) -> bool:
-        """Whether the last moment is shown."""
+        """True if the last moment is shown."""
         return self.moment == self.count - 1
 
     def toggle(self) -> None:

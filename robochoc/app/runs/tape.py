@@ -16,7 +16,7 @@ from robochoc.journal.events import Began, Decided, Received, Sent, Settled
 from robochoc.journal.reader import Follower
 from robochoc.sniffer.growing_file import GrowingFile, open_to_read
 from robochoc.sniffer.live_trace import entries_of, next_entries, sorted_by_time
-from robochoc.sniffer.spoken import Called, Spoken
+from robochoc.sniffer.sentences import JournalSentences, ValueLabel
 
 MOST_MOMENTS = 200
 """With twice as many moments, pairs of moments are joined."""
@@ -40,7 +40,7 @@ class MessageWords(NamedTuple):
     words: str
 
 
-def in_words(sent: Sent, spoken: Spoken) -> MessageWords:
+def in_words(sent: Sent, spoken: JournalSentences) -> MessageWords:
     """Return a message in words, without the name of its sender; long texts are shortened."""
     words = spoken.sentence(sent).removeprefix(f"{sent.sender} says: ").removeprefix(f"{sent.sender} says ")
     short = words if len(words) <= MOST_LETTERS else f"{words[: MOST_LETTERS - 1]}…"
@@ -91,13 +91,13 @@ class Tape:
         is_whole: Whether these are all messages; otherwise they are the first ones.
     """
 
-    def __init__(self, robots: Collection[str], label: Callable[[str, int], Value], called: Called) -> None:
+    def __init__(self, robots: Collection[str], label: Callable[[str, int], Value], called: ValueLabel) -> None:
         self.moments = [Moment()]
         self.messages = 0
         self.is_whole = True
         self._robots = frozenset(robots)
         self._label = label
-        self._spoken = Spoken(called)
+        self._spoken = JournalSentences(called)
         self._last: deque[Sent] = deque(maxlen=WORDS_KEPT)
         self._size = 1
         self._settled: dict[str, int] = {}

@@ -56,7 +56,7 @@ class RuleLink:
 
     @property
     def says_values(self) -> bool:
-        """Whether it can be said by the values that it leaves to its robot."""
+        """True if it can be said by the values that it leaves to its robot."""
         return len(self.robots) == 1 and self.rule.cost is None and not PALETTE[self.rule.kind].graded
 
     def allows(self, value: Value) -> bool:

@@ -160,12 +160,12 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def is_ranked(self) -> bool:
-        """Whether robots have ranks."""
+        """True if robots have ranks."""
         return any(robot.rank for robot in self.robots)
 
     @property
     def flies(self) -> bool:
-        """Whether some decisions are positions of robots: levels or places."""
+        """True if some decisions are positions of robots: levels or places."""
         return any(decision.kind in {DecisionKind.LEVEL, DecisionKind.PLACE} for decision in self.decisions)
 
     def robot(self, name: str) -> SketchRobot | None:

@@ -63,7 +63,7 @@ class Trouble(msgspec.Struct, frozen=True):
 
     @property
     def is_error(self) -> bool:
-        """Whether the sketch cannot be converted to a team."""
+        """True if the sketch cannot be converted to a team."""
         return self.severity == Severity.ERROR
 
 

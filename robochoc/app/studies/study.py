@@ -86,7 +86,7 @@ class TeamStudy:
 
     @property
     def running(self) -> bool:
-        """Whether the study is running."""
+        """True if the study is running."""
         return self.facts is not None and self.facts.stage not in ENDED
 
     @property

@@ -117,9 +117,9 @@ def _pieces(
 ) -> Iterable[bytes]:
     """Return the export, piece by piece."""
     from robochoc.journal.journal import lines_of
-    from robochoc.sniffer.excerpt import excerpt_of
     from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, mermaid, table
     from robochoc.sniffer.page_data import PageData
+    from robochoc.sniffer.selection import excerpt_of
 
     is_complete = len(messages) == len(trace.messages.t)
     match form:
@@ -167,7 +167,7 @@ def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
             f"{count:,} messages are too many for one page: at most {MOST_IN_PAGE:,}"
             " (use 'robochoc sniff', or export another format)",
         )
-    from robochoc.sniffer.embedded import embedded_answers
+    from robochoc.sniffer.export import embedded_answers
     from robochoc.sniffer.page import sniffer_page
     from robochoc.sniffer.page_data import PageData
     from robochoc.sniffer.scene import whole_scene

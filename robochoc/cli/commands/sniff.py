@@ -26,7 +26,7 @@ from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid
 if TYPE_CHECKING:
     from robochoc.authority.identity import Identity
     from robochoc.run.networked.address import Address
-    from robochoc.sniffer.remote import Followed
+    from robochoc.sniffer.remote import FollowResult
     from robochoc.sniffer.session import SnifferSession
     from robochoc.sniffer.viewer import Viewer
 
@@ -214,7 +214,7 @@ def _identity(
     return identity_of(name, place, identity, token, patience_s)
 
 
-def _receive(place: Address, identity: Identity, patience_s: float, target: _JournalTarget) -> Followed:
+def _receive(place: Address, identity: Identity, patience_s: float, target: _JournalTarget) -> FollowResult:
     from robochoc.sniffer.remote import receive
 
     try:

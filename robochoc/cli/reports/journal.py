@@ -9,8 +9,7 @@ from msgspec import UNSET
 
 from robochoc.formats import on_one_line
 from robochoc.sniffer.page_data import PageData
-from robochoc.sniffer.trace import Trace
-from robochoc.sniffer.trace_tables import RunRecord
+from robochoc.sniffer.trace import RunRecord, Trace
 
 _MOST_RUNS = 20
 _MOST_ROBOTS = 12

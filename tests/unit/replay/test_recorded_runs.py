@@ -26,7 +26,7 @@ from robochoc.replay.steps import runs_of
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.options import ScheduleName
 from robochoc.run.registry import protocol_named, protocol_names
-from robochoc.sniffer.embedded import embedded_answers
+from robochoc.sniffer.export import embedded_answers
 from robochoc.sniffer.page_data import STATES, PageData
 from robochoc.sniffer.session import SnifferSession
 from robochoc.sniffer.trace import Trace

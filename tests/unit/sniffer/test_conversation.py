@@ -18,7 +18,7 @@ from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.services.identifier import AgentIdentifier
 from robochoc.sniffer.acl import ACLError, ACLMessage
-from robochoc.sniffer.conversation import MAX_JSON, Conversation
+from robochoc.sniffer.acl_messages import MAX_JSON, Conversation
 from tests.support.acl_conversations import (
     OK,
     PLATFORM,
@@ -46,23 +46,23 @@ def test_an_envelope_has_all_parameters_that_apply() -> None:
 
 
 FORGED: list[tuple[dict[str, Any], str]] = [
-    ({"performative": Performative.REQUEST}, "Ok is inform, not request"),
+    ({"performative": Performative.REQUEST}, "the performative is request; that of Ok is inform"),
     ({"sender": None}, "one sender and one receiver"),
     ({"sender": AgentIdentifier("Robot3.1@elsewhere")}, "not on the platform"),
     ({"receiver": ()}, "one sender and one receiver"),
     ({"receiver": (AgentIdentifier(PLATFORM),)}, "not on the platform"),
-    ({"ontology": None}, "ontology None is to be 'robochoc'"),
-    ({"protocol": "afc"}, "protocol 'afc' is to be 'abt'"),
-    ({"conversation_id": "run-2"}, "conversation-id 'run-2'"),
-    ({"user": ()}, "x-clock ''"),
-    ({"user": (("x-clock", "-1"),)}, "x-clock '-1'"),
+    ({"ontology": None}, "ontology is None; it must be 'robochoc'"),
+    ({"protocol": "afc"}, "protocol is 'afc'; it must be 'abt'"),
+    ({"conversation_id": "run-2"}, "conversation-id is 'run-2'"),
+    ({"user": ()}, "x-clock is ''"),
+    ({"user": (("x-clock", "-1"),)}, "x-clock is '-1'"),
     ({"language": "fipa-sl"}, "json in utf-8 or msgpack in base64"),
     ({"language": "msgpack", "encoding": "base64"}, "not valid base64"),
     ({"language": "msgpack", "encoding": "base64", "content": "AAAA"}, "not a message of abt"),
     ({"content": None}, "not JSON like"),
     ({"content": "{}"}, "not JSON like"),
-    ({"content": '["Fly",{}]'}, "there is no message 'Fly', only Ok, Nogood, AddLink"),
-    ({"content": '["Ok",{"price":[3]}]'}, "Ok has the fields ['value'], not ['price']"),
+    ({"content": '["Fly",{}]'}, "the message type 'Fly' is unknown; known types: Ok, Nogood, AddLink"),
+    ({"content": '["Ok",{"price":[3]}]'}, "the fields of Ok are ['value'], but this message has ['price']"),
     ({"content": '["Ok",{"value":["a"]}]'}, "not a message of abt"),
     ({"content": '["Ok",{"value":[36893488147419103232]}]'}, "not JSON like"),
     ({"content": '["Ok",{"value":{"base64":"?"}}]'}, "not JSON like"),
@@ -78,7 +78,7 @@ def test_what_no_robot_would_send_is_no_envelope() -> None:
     with cases() as each:
         long: list[tuple[dict[str, str], str]] = [
             ({"content": "[" * 1_000_000}, "not JSON like"),
-            ({"content": "[" + " " * MAX_JSON + "]"}, "too long"),
+            ({"content": "[" + " " * MAX_JSON + "]"}, "characters, more than"),
         ]
         for changed, message in (*FORGED, *long):
             with each(message):

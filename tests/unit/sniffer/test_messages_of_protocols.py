@@ -23,8 +23,7 @@ from robochoc.protocols.satisfaction.mediation import Table
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.acl import parse
-from robochoc.sniffer.acl_messages import PLATFORM
-from robochoc.sniffer.conversation import Conversation
+from robochoc.sniffer.acl_messages import PLATFORM, Conversation
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.acl_conversations import BUNDLED_PROTOCOLS, assert_others_read, conversation, returned, types_of
 from tests.support.allocation_problems import simple_allocation_team

@@ -21,7 +21,7 @@ from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
-from robochoc.sniffer.embedded import embedded_answers
+from robochoc.sniffer.export import embedded_answers
 from robochoc.sniffer.page_data import (
     DETAILS,
     MOST_EPOCHS,
@@ -86,12 +86,12 @@ def test_rows_that_are_not_there_or_too_many_are_refused() -> None:
     feed = feed_of("abt")
     for answer in (feed.columns, feed.steps, feed.decisions):
         for first, end in ((0, 1 << 40), (5, 4), (-1, 3), (1 << 40, 1 << 41)):
-            with pytest.raises(BadRequestError, match="there are no rows"):
+            with pytest.raises(BadRequestError, match=r"rows .* do not exist"):
                 answer(first, end)
     events = (Settled(t=0, robot="a", clock=0, checks=0) for _ in range(MOST_ROWS + 1))
     large = PageData(Trace.of(Journal(Header(team="", protocol="", runtime="", seed=0), tuple(events), None)))
     large.steps(1, MOST_ROWS + 1)
-    with pytest.raises(BadRequestError, match="too many at once"):
+    with pytest.raises(BadRequestError, match="too many for one request"):
         large.steps(0, MOST_ROWS + 1)
 
 
@@ -100,7 +100,7 @@ def test_details_come_in_chunks() -> None:
     assert len(told(feed.details(0))) == DETAILS
     assert [one["content"] for one in told(feed.details(1))] == [{"n": DETAILS + more} for more in range(3)]
     for chunk in (2, -1, 1 << 60):
-        with pytest.raises(BadRequestError, match="no chunk"):
+        with pytest.raises(BadRequestError, match=r"chunk .* does not exist"):
             feed.details(chunk)
 
 
@@ -111,7 +111,7 @@ def test_notes_are_bounded_and_losses_are_not_crowded_out() -> None:
     notes = told(feed.about())["notes"]
     assert len(notes) == 2 * MOST_NOTES
     assert notes[MOST_NOTES - 1]["text"] == f"a was lost: {MOST_NOTES + 4}"
-    assert notes[-1]["text"] == f"the cheapest so far costs {MOST_NOTES + 4:,}"
+    assert notes[-1]["text"] == f"the best cost so far is {MOST_NOTES + 4:,}"
 
 
 def test_a_protocol_that_is_not_installed_has_details_all_the_same() -> None:
@@ -135,7 +135,7 @@ def test_without_files_robots_are_known_by_what_they_decide() -> None:
     assert feed.words(0) == "Robot1.1 says: V1.1 = 1 from now on"
     about = told(feed.about())
     assert about["robots"][0] == {"name": "Robot1.1", "variables": ["V1.1"]}
-    assert about["replay"] == "the journal does not say what the robots were given"
+    assert about["replay"] == "the journal does not contain the robots' problems"
     unknown = of_strangers({"value": [3]}, protocol="abt", kind="Ok")
     assert unknown.words(0) == "a says: a = 3 from now on"
 

@@ -14,7 +14,7 @@ from robochoc.communication.network.journal_server import PIECE_BYTES, Piece
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, frame_block
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
-from robochoc.sniffer.remote import Followed, IncomingJournal, WholeBlocks
+from robochoc.sniffer.remote import FollowResult, IncomingJournal, WholeBlocks
 
 RUN = "run"
 
@@ -53,7 +53,7 @@ def test_whole_blocks_however_the_bytes_come(cuts: list[int]) -> None:
     for start, end in zip([0, *sorted(cuts)], [*sorted(cuts), len(WHOLE)], strict=True):
         assert kept.journal.take(told(start, WHOLE[start:end])) is None
         assert kept.content == WHOLE[: max(place for place in ENDS if place <= end)]
-    assert kept.journal.take(told(len(WHOLE), b"", over=True)) == Followed(over=True, why="the run is over")
+    assert kept.journal.take(told(len(WHOLE), b"", over=True)) == FollowResult(over=True, why="the run is over")
     assert kept.content == WHOLE
 
 
@@ -76,8 +76,8 @@ def test_a_block_that_is_missing_doubled_or_cut() -> None:
             WholeBlocks().take(content)
     kept = Kept()
     ending = kept.journal.take(told(0, WHOLE[:-1], over=True))
-    assert ending == Followed(
-        over=False, why=f"the run is over, but of its journal byte {ENDS[-2]:,}: it ends within a block"
+    assert ending == FollowResult(
+        over=False, why=f"the run is over, but its journal is incomplete: byte {ENDS[-2]:,}: it ends within a block"
     )
     assert kept.content == WHOLE[: ENDS[-2]]
     with pytest.raises(JournalError):
@@ -93,4 +93,4 @@ def test_pieces_of_others_and_of_another_run() -> None:
         assert ending
         assert "sent an invalid journal" in ending.why
     ending = kept.journal.take(told(0, WHOLE, run="another"))
-    assert ending == Followed(over=False, why="the master at master:7447 was restarted")
+    assert ending == FollowResult(over=False, why="the master at master:7447 was restarted")

@@ -330,11 +330,11 @@ def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(
         return full
 
     monkeypatch.setattr(server, "NEWS_S", 0)
-    monkeypatch.setattr(server._News, "write_message", write_message)  # noqa: SLF001
+    monkeypatch.setattr(server._NewsSocket, "write_message", write_message)  # noqa: SLF001
     socket = connected(page)
     wait_until(lambda: len(written) == 1, "there are no news")
     for _ in range(100):
-        page.loop.call_soon_threadsafe(page.server._tell)  # noqa: SLF001
+        page.loop.call_soon_threadsafe(page.server._notify)  # noqa: SLF001
     assert page.json("about")["over"]
     assert len(written) == 1
     in_the_loop(page, lambda: _close(socket))

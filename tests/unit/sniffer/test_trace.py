@@ -273,7 +273,7 @@ def replace_clock(event: Sent, number: int) -> Sent:
 def test_more_names_than_can_be_told_apart_are_refused() -> None:
     trace = Trace(HEADER)
     trace.add(settled(f"r{number}") for number in range(MOST_NAMES))
-    with pytest.raises(TraceTooLargeError, match="65535 names of robots"):
+    with pytest.raises(TraceTooLargeError, match="65535 robots or types"):
         trace.add([settled("one more")])
 
 

@@ -70,7 +70,7 @@ class ConversationPlayer:
 
     @property
     def playing(self) -> bool:
-        """Whether the playback is running."""
+        """True if the playback is running."""
         return self._player.playing
 
     def show_live(self, said: Sequence[MessageWords]) -> None:

@@ -57,7 +57,7 @@ class TeamDecision:
 
     @property
     def solved(self) -> bool:
-        """Whether there is an answer."""
+        """True if there is an answer."""
         return self.verdict in _SOLVED
 
 

@@ -157,7 +157,7 @@ class Story:
 
     @property
     def running(self) -> bool:
-        """Whether a run is in progress."""
+        """True if a run is in progress."""
         return self.preparing or any(run.state == RunState.RUNNING for run in (self.run, self.beside) if run)
 
     async def decide(self) -> None:
