@@ -74,13 +74,13 @@ def test_import_of_a_folder_makes_a_team_of_each_problem(problem: Path, tmp_path
     done = robochoc_within("import", folder, "-o", teams)
     assert done.returncode == 1
     assert done.stdout.endswith("3 of 4 problems imported\n")
-    assert "broken.xml:4: 'x' is no integer" in done.stderr
+    assert "broken.xml:4: 'x' is not an integer" in done.stderr
     assert sorted(str(path.relative_to(teams)) for path in teams.rglob("names.json")) == [
         "below/names.json",
         "one-xml/names.json",
         "one/names.json",
     ]
-    assert "is of no format" not in done.stderr
+    assert "has an unknown format" not in done.stderr
     nothing = robochoc_within("import", teams, "-o", tmp_path / "more")
     assert "no file with a known format (a team's folder needs no import" in nothing.stderr
 
@@ -93,9 +93,9 @@ def test_wrong_usage(problem: Path, tmp_path: Path) -> None:
     unknown = tmp_path / "notes.txt"
     unknown.write_text("notes")
     told = robochoc_within("import", unknown, "-o", tmp_path / "team")
-    assert (told.returncode, "is of no format that is read here" in told.stderr) == (1, True)
+    assert (told.returncode, "has an unknown format" in told.stderr) == (1, True)
     checked = robochoc_within("validate", unknown)
-    assert (checked.returncode, "is of no format that is read here" in checked.stdout) == (1, True)
+    assert (checked.returncode, "has an unknown format" in checked.stdout) == (1, True)
     for command in ("import", "validate", "solve"):
         missing = robochoc_within(command, tmp_path / "nothing.yaml")
         assert (missing.returncode, "does not exist (check its name)" in missing.stdout + missing.stderr) == (1, True)
@@ -155,7 +155,7 @@ def test_solve_and_validate_read_a_file_in_the_format_that_is_named(tmp_path: Pa
     file.write_text("robots: {ann: {at: [0, 0]}, bob: {}}\ntasks: {dig: {at: [1, 1], worth: 3}}\n")
     for command in ("solve", "validate"):
         unknown = robochoc_within(command, file)
-        assert (unknown.returncode, "is of no format" in unknown.stdout + unknown.stderr) == (1, True)
+        assert (unknown.returncode, "has an unknown format" in unknown.stdout + unknown.stderr) == (1, True)
     done = robochoc_within("validate", file, "--format", "tasks", "--json")
     assert json.loads(done.stdout)["format"] == "tasks"
     words = ["--format", "tasks", "--protocol", "dpop", "--runtime", "simulator", "--json"]
@@ -219,7 +219,7 @@ def test_a_file_that_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
                     PYDCOP.replace("min", "Minimise").encode(),
                     "{file}:2: has the objective 'Minimise' (write objective: min)",
                 ),
-                (b"print()\n", "{file}: is of no format that is read here ("),
+                (b"print()\n", "{file}: has an unknown format ("),
             ]:
                 with each((command, message)):
                     file = tmp_path / ("program.py" if content.startswith(b"print") else "pairs.yaml")
@@ -236,14 +236,14 @@ NETWORK = """{"problem": {"name": "b", "mustbe": "<8.0"}, "variables": {"x": 2, 
 def test_what_would_be_another_problem_is_told_by_all_who_read_the_file(tmp_path: Path) -> None:
     file = tmp_path / "b.cfn"
     file.write_text(NETWORK)
-    changed = (" truncated: costs are cut to 1 decimal place as mustbe has", " bound: toulbar2 accepts only sums")
+    changed = (" truncated: costs are cut to 1 decimal place, those of mustbe", " bound: toulbar2 accepts only costs")
     for words in (["solve", file, "--runtime", "simulator"], ["validate", file]):
         done = robochoc_within(*words)
         assert done.returncode == 0
         told = done.stderr if words[0] == "solve" else done.stdout
         assert all(one in told for one in changed)
         assert "owner" not in told
-    assert "owner: the format knows no owners" in robochoc_within("import", file, "-o", tmp_path / "team").stdout
+    assert "owner: the format has no owners" in robochoc_within("import", file, "-o", tmp_path / "team").stdout
     told = json.loads(robochoc_within("validate", file, "--json").stdout)
     kinds = ["truncated", "bound", "owner"]
     assert [note["kind"] for note in told["notes"]] == kinds
@@ -360,7 +360,7 @@ def test_validate_says_what_a_file_is(problem: Path) -> None:
     assert "convert it to a team" in robochoc_within("validate", problem.parent).stdout
     wrong = problem.with_suffix(".xcsp")
     wrong.write_text(wrong.read_text().replace("3 1", "3 x"))
-    assert "problem.xcsp:4: 'x' is no integer" in robochoc_within("validate", wrong).stdout
+    assert "problem.xcsp:4: 'x' is not an integer" in robochoc_within("validate", wrong).stdout
 
 
 @pytest.mark.parametrize("kind", WRITTEN)

@@ -1,6 +1,7 @@
-"""toulbar2's `.cfn`: JSON with fewer signs (toulbar2's documentation, "CFN format").
+"""toulbar2's `.cfn`: a relaxed form of JSON (toulbar2's documentation, "CFN format").
 
-Quotes, commas and colons only separate; braces and brackets are the same; without tags the order says what is what.
+Quotes, commas and colons are only separators; braces and brackets are equivalent; without tags the order of the parts
+determines their meaning.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _TOKEN = re.compile(r'[{}\[\]]|[^{}\[\]\s":,]+')
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
-    """Return whether a file is toulbar2's, by its name and its first sign."""
+    """Return whether a file is toulbar2's, by its name and its first character."""
     return has_suffix(path, ".cfn") and beginning.lstrip()[:1] in (b"{", b"[", b"#", b"\x1f", b"\xfd")
 
 
@@ -79,13 +80,13 @@ class _CfnReader:
         self._open("the functions")
         while not _closes(word := self._in.word("a function, or '}'")):
             self._read_function(word)
-        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 may omit it
-            self._in.refuse(f"'{shortened(last)}' where the problem should end", "write } or ]")
-        for place, wanted in self._shared:
-            self._functions[place] = self._with_shared_costs(self._functions[place], wanted)
+        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 may omit the last bracket
+            self._in.refuse(f"expected the end of the problem, found '{shortened(last)}'", "write } or ]")
+        for place, source in self._shared:
+            self._functions[place] = self._with_shared_costs(self._functions[place], source)
         notes: tuple[ConversionNote, ...] = ()
         if self._truncated:
-            text = f"costs are cut to {counted(self._places, 'decimal place')} as mustbe has, which toulbar2 does too"
+            text = f"costs are cut to {counted(self._places, 'decimal place')}, those of mustbe, as toulbar2 does"
             notes = (ConversionNote("truncated", text),)
         return CostFunctionNetwork(_title(name, self._stem), self._variables, self._functions, bound, maximize, notes)
 
@@ -96,13 +97,14 @@ class _CfnReader:
             self._tagged = True
             word = self._in.word("'{'")
         if not _opens(word):
-            self._in.refuse(f"'{shortened(word)}' where '{{' should stand", 'write { "problem": { "name": ...')
+            self._in.refuse(f"expected '{{', found '{shortened(word)}'", 'write { "problem": { "name": ...')
         self._tag("name")
         name = self._in.word("the problem's name")
         self._tag("mustbe")
         word = self._in.word("the bound")
         if word[0] not in "<>" or word[1:] == "inf":
-            self._in.refuse(f"the bound '{shortened(word)}'", "write <100.00 to minimise, or >-100.00 to maximise")
+            what = f"the bound '{shortened(word)}' is not valid"
+            self._in.refuse(what, "write <100.00 to minimise, or >-100.00 to maximise")
         self._places = len(word.partition(".")[2])
         bound = self._in.amount(word[1:])
         self._close("the problem")
@@ -117,7 +119,7 @@ class _CfnReader:
             else:
                 name, word = word, self._in.word("a domain")
             if name in self._variables:
-                self._in.refuse(f"a second variable '{shortened(name)}'", "names are unique: rename one of them")
+                self._in.refuse(f"duplicate variable '{shortened(name)}'", "rename one of them")
             self._variables[name] = self._domain(word)
             self._known[name] = len(self._names)
             self._names.append(name)
@@ -128,15 +130,15 @@ class _CfnReader:
         if not _opens(word):
             size = abs(self._in.as_integer(word, "a domain or its size"))
             if not 0 < size <= MAX_VALUES:
-                self._in.refuse(f"a domain of {size} values", f"from 1 to {MAX_VALUES}")
+                self._in.refuse(f"the domain has {size} values", f"use from 1 to {MAX_VALUES} values")
             return size
         values: dict[str, None] = {}
         while not _closes(one := self._in.word("a value")):
             if one in values or _opens(one):
-                self._in.refuse(f"'{shortened(one)}' where another value should stand", "name each value once")
+                self._in.refuse(f"expected a new value, found '{shortened(one)}'", "write each value once")
             values[one] = None
         if not values:
-            self._in.refuse("a domain without values", "write [a b c], or how many there are")
+            self._in.refuse("the domain has no values", "write [a b c], or the number of values")
         return tuple(values)
 
     def _read_function(self, word: str) -> None:
@@ -153,7 +155,7 @@ class _CfnReader:
             self._refuse_type(self._in.word("a type"))
         if self._tagged:
             if word != "costs":
-                self._in.refuse(f"'{shortened(word)}' where 'costs' should stand", 'write "costs": [...]')
+                self._in.refuse(f"expected 'costs', found '{shortened(word)}'", 'write "costs": [...]')
             word = self._in.word("costs")
         if _opens(word):
             rows = self._dense(scope, sized) if default is None else self._sparse(scope)
@@ -167,10 +169,10 @@ class _CfnReader:
         if _opens(closing) and not self._tagged:
             self._refuse_type(word)
         if not _closes(closing):
-            self._in.refuse(f"'{shortened(closing)}' where the function should end", "close it")
+            self._in.refuse(f"expected the end of the function, found '{shortened(closing)}'", "write } or ]")
 
     def _default(self) -> tuple[Amount | None, str]:
-        """Return the default cost, if there is one, and the word behind it."""
+        """Return the default cost, if there is one, and the next word."""
         word = self._in.word("costs")
         if self._tagged and word == "defaultcost":
             return self._cost(self._in.word("a cost")), self._in.word("'costs'")
@@ -186,40 +188,40 @@ class _CfnReader:
             place = self._in.as_integer(word, "a variable") if counted else self._known.get(word, -1)
             if not 0 <= place < len(self._names):
                 self._in.refuse(
-                    f"the scope has '{shortened(word)}', which is no variable",
+                    f"the scope contains '{shortened(word)}', which is not a variable",
                     suggestion(word, self._names, "variables"),
                 )
             if place in scope:
-                self._in.refuse(f"the scope has '{shortened(word)}' twice", "name each variable once")
+                self._in.refuse(f"the scope contains '{shortened(word)}' twice", "name each variable once")
             scope.append(place)
         return tuple(scope)
 
     def _dense(self, scope: Sequence[int], size: int) -> dict[tuple[int, ...], Amount]:
-        """Return the costs of all tuples, which stand in lexicographic order."""
+        """Return the costs of all tuples, listed in lexicographic order of the tuples."""
         if size > MAX_TUPLES:
-            self._in.refuse(f"a function of {size} tuples", f"at most {MAX_TUPLES} are read")
+            self._in.refuse(f"the function has {size} tuples", f"use at most {MAX_TUPLES} tuples")
         rows: dict[tuple[int, ...], Amount] = {}
         for values in itertools.product(*[range(self._size(place)) for place in scope]):
             word = self._in.word("a cost")
             if _closes(word):
-                self._in.refuse(f"{len(rows)} costs instead of {size}", "write one for each tuple")
+                self._in.refuse(f"the function has {len(rows)} costs instead of {size}", "write one for each tuple")
             rows[values] = self._cost(word)
         if not _closes(self._in.word("']'")):
-            self._in.refuse(f"more than {size} costs", "write one for each tuple")
+            self._in.refuse(f"the function has more than {size} costs", "write one for each tuple")
         return rows
 
     def _sparse(self, scope: Sequence[int]) -> dict[tuple[int, ...], Amount]:
         rows: dict[tuple[int, ...], Amount] = {}
         while not _closes(word := self._in.word("a tuple")):
             if not scope:
-                self._in.refuse("a default cost and another one", "a constant has one cost")
+                self._in.refuse("a constant has a default cost and another cost", "write one cost")
             values = [self._value(scope[0], word)]
             values += [self._value(place, self._in.word("a value")) for place in scope[1:]]
             cost = self._cost(self._in.word("a cost"))
             if rows.setdefault(tuple(values), cost) != cost:
-                self._in.refuse("a tuple with two costs", "delete one of them")
+                self._in.refuse("a tuple has two different costs", "delete one of them")
             if len(rows) > MAX_TUPLES:
-                self._in.refuse(f"a function of more than {MAX_TUPLES} tuples", "make it smaller")
+                self._in.refuse(f"the function has more than {MAX_TUPLES} tuples", "use smaller domains or scopes")
         return rows
 
     def _value(self, place: int, word: str) -> int:
@@ -231,8 +233,8 @@ class _CfnReader:
         else:
             number = domain.index(word) if word in domain else -1
         if not 0 <= number < self._size(place):
-            what = f"the value '{shortened(word)}', which {shortened(self._names[place])} has not"
-            self._in.refuse(what, "values are named, or counted from 0 on")
+            what = f"the variable {shortened(self._names[place])} has no value '{shortened(word)}'"
+            self._in.refuse(what, "write the name of a value, or its index from 0")
         return number
 
     def _size(self, place: int) -> int:
@@ -240,7 +242,7 @@ class _CfnReader:
         return domain if isinstance(domain, int) else len(domain)
 
     def _cost(self, word: str) -> Amount:
-        """Return a cost, cut to the places of `mustbe`."""
+        """Return a cost, cut to the decimal places of `mustbe`."""
         amount = self._in.amount(word)
         if not isinstance(amount, Fraction) or amount == INFINITE:
             return amount
@@ -248,29 +250,33 @@ class _CfnReader:
         self._truncated |= cut != amount
         return cut
 
-    def _with_shared_costs(self, function: CostFunction, wanted: str) -> CostFunction:
+    def _with_shared_costs(self, function: CostFunction, source: str) -> CostFunction:
         self._in.line = function.line
-        table = self._tables.get(wanted)
+        table = self._tables.get(source)
         if table is None:
-            self._in.refuse(f"the costs of '{shortened(wanted)}', which is no function", "write costs: [...]")
+            what = f"the costs are those of '{shortened(source)}', which is not a function"
+            self._in.refuse(what, "write the name of a function, or costs: [...]")
         if table.size != function.table.size or {len(values) for values in table.rows} - {len(function.scope)}:
-            self._in.refuse(f"the costs of '{shortened(wanted)}', which has other domains", "write costs: [...]")
+            what = f"the costs are those of '{shortened(source)}', which has different domains"
+            self._in.refuse(what, "write costs: [...]")
         return replace(function, table=replace(table, name=function.table.name))
 
     def _refuse_type(self, name: str) -> Iterator[None]:
-        self._in.refuse(f"the global cost function '{shortened(name)}'", "only tables of costs are read")
+        what = f"the global cost function '{shortened(name)}' is not supported"
+        self._in.refuse(what, "write it as a table of costs")
 
-    def _tag(self, wanted: str) -> None:
-        if self._tagged and (word := self._in.word(f"'{wanted}'")) != wanted:
-            self._in.refuse(f"'{shortened(word)}' where '{wanted}' should stand", "tags stand in their order")
+    def _tag(self, expected: str) -> None:
+        if self._tagged and (word := self._in.word(f"'{expected}'")) != expected:
+            what = f"expected '{expected}', found '{shortened(word)}'"
+            self._in.refuse(what, "write the tags in the order of the CFN format")
 
     def _open(self, what: str) -> None:
         if not _opens(word := self._in.word("'{'")):
-            self._in.refuse(f"'{shortened(word)}' where {what} should begin", "write { or [")
+            self._in.refuse(f"expected the beginning of {what}, found '{shortened(word)}'", "write { or [")
 
     def _close(self, what: str) -> None:
         if not _closes(word := self._in.word("'}'")):
-            self._in.refuse(f"'{shortened(word)}' where {what} should end", "write } or ]")
+            self._in.refuse(f"expected the end of {what}, found '{shortened(word)}'", "write } or ]")
 
 
 def _title(name: str, stem: str) -> str:
@@ -286,10 +292,10 @@ def _closes(word: str) -> bool:
 
 
 def write(team: Team, options: ExportOptions) -> ExportResult:
-    """Return the `.cfn` of `team`. Its bound is one that no finite sum reaches.
+    """Return the `.cfn` of `team`, with a bound that no sum of finite costs reaches.
 
-    Forbidden tuples cost three times the bound, since toulbar2 1.1 does not read `inf`: even with the least cost of all
-    other functions, such a sum reaches the bound.
+    Forbidden tuples cost three times the bound, since toulbar2 1.1 does not read `inf`: a sum with such a cost reaches
+    the bound even with the least cost of all other functions.
 
     Raises:
         UnsupportedError: if costs or a constraint's table are too large, or the team changes over time.
@@ -336,7 +342,7 @@ def _is_zero_based(domain: Domain) -> bool:
 
 
 def _names(domain: Domain) -> dict[int, str]:
-    """Return what the values are called: names begin with no digit and no sign."""
+    """Return the names of the values; a name begins with a letter or an underscore."""
     if _is_zero_based(domain):
         return {value: str(value) for value in domain}
     names = {}

@@ -1,9 +1,9 @@
-"""The part of XDisCSP 1.0 that DCOPSolver reads; other readers of XDisCSP read it, too.
+"""The part of XDisCSP 1.0 that DCOPSolver supports; other readers of XDisCSP read it, too.
 
-Its parser (czy920/DCOPSolverOld) reads one variable an agent, domains from 1 to n, and one relation of two variables
-for each pair of neighbours, in which each tuple has an integer cost. It has no infinity, and its protocols require a
-connected graph. So costs of one variable are added to those of a pair, and forbidden tuples cost more than everything
-else together, as the attribute `maximalCost` of XCSP 2.1 says.
+Its parser (czy920/DCOPSolverOld) supports one variable for each agent, domains from 1 to n, and one relation of two
+variables for each pair of neighbours, in which each tuple has an integer cost. It has no infinity, and its protocols
+require a connected graph. So costs of one variable are added to those of a pair, and a forbidden tuple costs more than
+all other costs together; this cost is the attribute `maximalCost` of XCSP 2.1.
 """
 
 from __future__ import annotations
@@ -51,11 +51,15 @@ def _write(team: Team, options: ExportOptions) -> ExportResult:
     _check(team)
     tables, constant = tabulate(team)
     if any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in {constant, *amounts(tables)}):
-        raise UnsupportedError(f"{TITLE} requires integer costs of 0 or more; --format frodo and pydcop allow others")
+        raise UnsupportedError(
+            f"{TITLE} requires integer costs of 0 or more: use --format frodo or --format pydcop for other costs"
+        )
     bound = magnitude(tables, constant)
     by_pair = _by_pair(team, tables)
     if bound * len(by_pair) >= LIMIT:
-        raise UnsupportedError(f"{TITLE}: costs of up to {bound:,} are too large for integers of 32 bits")
+        raise UnsupportedError(
+            f"{TITLE}: costs of up to {bound:,} are too large for integers of 32 bits: use smaller costs"
+        )
     costs = {pair: _costs(team, pair, parts) for pair, parts in by_pair.items()}
     first = next(iter(costs))
     costs[first] = {values: cost + int(constant) for values, cost in costs[first].items()}
@@ -64,7 +68,7 @@ def _write(team: Team, options: ExportOptions) -> ExportResult:
 
 def _check(team: Team) -> None:
     if team.dynamic:
-        raise UnsupportedError(f"{TITLE} does not support problems that change over time: leave scenario.xml out")
+        raise UnsupportedError(f"{TITLE} does not support problems that change over time: remove scenario.xml")
     if is_maximised(team):
         raise UnsupportedError(f"{TITLE} does not support utilities: costs are minimised")
     for robot in team.robots:
@@ -77,7 +81,7 @@ def _check(team: Team) -> None:
 
 
 def _by_pair(team: Team, tables: list[TabulatedConstraint]) -> dict[_Pair, list[TabulatedConstraint]]:
-    """Return the tables of each pair of variables in the order of the agents; all variables are connected by pairs."""
+    """Return the tables of each pair of variables in the order of the agents; the pairs connect all variables."""
     place = {name: number for number, name in enumerate(team.variables)}
     pairs: dict[_Pair, list[TabulatedConstraint]] = defaultdict(list)
     unary = []
@@ -99,7 +103,7 @@ def _by_pair(team: Team, tables: list[TabulatedConstraint]) -> dict[_Pair, list[
 
 
 def _missing_links(team: Team, pairs: Mapping[_Pair, object]) -> Iterator[_Pair]:
-    """Yield pairs of the first variable and one of each part of the graph that is not connected with it."""
+    """Yield, for each part of the graph without the first variable, the first variable and one of that part."""
     near: dict[str, list[str]] = defaultdict(list)
     for one, other in pairs:
         near[one].append(other)
@@ -178,7 +182,7 @@ def _is_renamed(team: Team, name: str) -> bool:
 
 def _notes(team: Team) -> Iterator[ConversionNote]:
     if renamed := [name for name in team.variables if _is_renamed(team, name)]:
-        text = f"the values of {len(renamed)} variables are numbered from 1 on; comments in the file name them"
+        text = f"the values of {len(renamed)} variables are numbered from 1; comments in the file name the originals"
         yield ConversionNote("values", text)
     if any(one.private_part for one in held_constraints(team)):
         yield ConversionNote(
@@ -187,7 +191,7 @@ def _notes(team: Team) -> Iterator[ConversionNote]:
 
 
 def _recognises(path: Path, beginning: bytes) -> bool:
-    """Return False, since such a file is recognised as XDisCSP."""
+    """Return False: such a file is recognised as XDisCSP."""
     del path, beginning
     return False
 

@@ -1,4 +1,4 @@
-"""The interface of a dialect: the options of an import, its result, and its notes; and names that are allowed here."""
+"""The interface of a dialect, and what all dialects need: options, results, notes, valid names, owners by name."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ class ImportOptions:
     """The options of an import.
 
     Attributes:
-        infinity: Costs of at least so much forbid; of at most minus so much when maximising. None: none do.
+        infinity: Costs of at least this are hard; when maximising, costs of at most its negative. None: no finite cost
+            is hard.
         owner: A regular expression; variables whose names have the same first group (or match) belong to one robot.
-        allow_code: Whether Python files that a problem names may be executed.
-        name: The name of the team. None: that of the file, or of its problem.
+        allow_code: Whether Python files named by a problem may be executed.
+        name: The name of the team. None: the name of the file, or of its problem.
     """
 
     infinity: int | None = None
@@ -36,7 +37,7 @@ class ImportOptions:
 
 
 class ConversionNote(NamedTuple):
-    """A change that an import has made: a keyword for scripts, and a sentence for people."""
+    """A difference between a file and a team: a keyword for scripts, and a sentence for people."""
 
     kind: str
     text: str
@@ -46,7 +47,7 @@ OTHER_PROBLEM = {
     "bound", "count", "default", "dropped", "external", "infinity", "left out", "repeated", "rounded", "scenario",
     "truncated",
 }  # fmt: skip
-"""Kinds of notes on what the team says otherwise than the file, or not at all; the others are on how it says it."""
+"""Kinds of notes that report a different problem; the other kinds report a different form of the same problem."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,10 @@ class ImportResult:
     Attributes:
         team: The team.
         dialect: The name of the dialect.
-        names: The original names of robots and variables, by the team's, where they differ.
-        notes: What has been mapped: `renamed`, `scale`, `shared variable`, ...
-        bound: A sum that the format takes for no solution, as it takes greater ones (maximising: smaller ones), and
-            that the team can reach. None: there is none.
+        names: The original names of robots and variables, by their names in the team, where the two differ.
+        notes: The differences from the files: `renamed`, `scale`, `shared variable`, ...
+        bound: The cost from which on the format counts an assignment as no solution (maximising: down from which).
+            None: the format has no such bound, or the team cannot reach it.
     """
 
     team: Team
@@ -74,7 +75,7 @@ class ExportOptions:
     """The options of an export.
 
     Attributes:
-        intension: Whether predicates and functions are kept where a format has them, rather than tabulated.
+        intension: Whether predicates and functions are written as such where the format has them, not as tables.
     """
 
     intension: bool = False
@@ -84,8 +85,8 @@ class ExportResult(NamedTuple):
     """A team in the format of another tool.
 
     Attributes:
-        files: The contents of the files by name, beginning with the problem.
-        notes: Differences between the files and the team, and options that the other tool needs.
+        files: The contents of the files by name; the problem is the first.
+        notes: Differences between the files and the team, and options that the other tool requires.
     """
 
     files: Mapping[str, bytes]
@@ -99,12 +100,12 @@ class Dialect:
     Attributes:
         name: Its name on the command line, such as `frodo`.
         title: Its name in messages, such as `FRODO's XCSP 2.1`.
-        recognises: Returns whether the file at a path, which begins with some bytes, is in it.
-        read: Returns the problem in some files. Raises `InvalidInputError`.
-        write: Returns the files of a team in it. Raises `UnsupportedError` where the team has what the dialect has
-            not. None: it is only read.
-        is_part: Returns whether the file at a path, which begins with some bytes, is one of several of a problem:
-            those in its folder are read together. None: none is.
+        recognises: Returns whether a file is in this format, from its path and its first bytes.
+        read: Returns the problem in the given files. Raises `InvalidInputError`.
+        write: Returns the files of a team. Raises `UnsupportedError` if the format lacks a feature of the team. None:
+            the format is only read.
+        is_part: Returns whether a file is one of several files of a problem, from its path and its first bytes; such
+            files of a folder are read together. None: a problem is one file.
     """
 
     name: str
@@ -116,14 +117,14 @@ class Dialect:
 
 
 class NameMap:
-    """Names that are allowed here, for names of other tools: the same one where it is allowed, and each only once."""
+    """Maps names of other tools to unique names that are valid in a team. A valid name stays as it is."""
 
     def __init__(self) -> None:
         self._taken: dict[str, str] = {}
         self._given: dict[str, str] = {}
 
     def allowed(self, original: str) -> str:
-        """Return the name for `original`. The same original always gets the same one."""
+        """Return the valid name for `original`, always the same one for the same original."""
         if original not in self._given:
             self._given[original] = self._free(original)
             self._taken[self._given[original]] = original
@@ -131,7 +132,7 @@ class NameMap:
 
     @property
     def changed(self) -> dict[str, str]:
-        """The originals, by the names that they got, where these differ."""
+        """The original names by their valid names, where the two differ."""
         return {name: original for name, original in self._taken.items() if name != original}
 
     def _free(self, original: str) -> str:
@@ -145,33 +146,33 @@ class NameMap:
 
 
 def owners_by(pattern: str, names: Iterable[str]) -> dict[str, str]:
-    """Return the owner of each of `names`: what `pattern` finds in it, its first group or all of its match.
+    """Return the owner of each of `names`: the first group of the match of `pattern`, or the whole match.
 
     Raises:
-        MistakeError: if `pattern` is no regular expression, or finds nothing in a name.
+        MistakeError: if `pattern` is not a regular expression, or does not match a name.
     """
     try:
         expression = re.compile(pattern)
     except re.error as error:
-        what = f"the owner '{shortened(pattern)}' is no regular expression: {error}"
-        raise MistakeError(what, "mend it") from None
+        what = f"--owner '{shortened(pattern)}' is not a valid regular expression: {error}"
+        raise MistakeError(what, "correct it, for example --owner '^[a-z]+'") from None
     owners = {}
     for name in names:
         match = expression.search(name)
         if match is None:
-            what = f"the owner '{shortened(pattern)}' finds nothing in the variable '{shortened(name)}'"
-            raise MistakeError(what, "let it find something in every variable's name")
+            what = f"--owner '{shortened(pattern)}' does not match the variable '{shortened(name)}'"
+            raise MistakeError(what, "use a regular expression that matches the name of every variable")
         owners[name] = match[1] if expression.groups and match[1] else match[0]
     return owners
 
 
 def notes_on_names(changed: Collection[tuple[str, str]]) -> list[ConversionNote]:
-    """Return a note for each pair of a name and its original."""
+    """Return a note for each pair of a name in the team and its original name."""
     return [ConversionNote("renamed", f"{original} is {name}") for name, original in changed]
 
 
 def notes_on_absence(team: Team) -> list[ConversionNote]:
-    """Return a note on the chosen meanings of constraints for absent robots, which other formats do not have."""
+    """Return a note on `when_absent` of constraints, which no other format has; no note if none is set."""
     first, *more = [*dict.fromkeys(one.name for one in team.constraints() if one.when_absent is not None), ""]
     others = f" and {counted(len(more) - 1, 'other constraint')}" if len(more) > 1 else ""
     return (

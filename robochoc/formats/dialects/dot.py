@@ -51,7 +51,7 @@ def _quoted(name: str) -> str:
 
 def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     del options
-    raise UnsupportedError(f"{paths[0]}: graphs are written, not read")
+    raise UnsupportedError(f"{paths[0]}: Graphviz files can be exported but not imported")
 
 
 def _recognises(path: Path, beginning: bytes) -> bool:

@@ -1,4 +1,4 @@
-"""Exact costs of other tools as integers in a team's unit, and tables of them as relations."""
+"""Exact costs as other tools write them, and their conversion to relations with integer costs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.model.constraint import INFINITE, Relation, Semantics
 from robochoc.model.cost_units import MAX_PLACES
 
 Amount = int | Fraction | float
-"""A cost as it was written, exactly; the only float is `INFINITE`, which forbids."""
+"""An exact cost; the only float is `INFINITE`, the cost of a forbidden tuple."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class ExactCostTable:
 
     Attributes:
         name: Its name.
-        rows: The costs of some tuples.
-        default: The cost of all others.
-        size: The number of all tuples.
+        rows: The costs of the listed tuples.
+        default: The cost of all other tuples.
+        size: The number of all tuples, listed or not.
     """
 
     name: str
@@ -36,7 +36,7 @@ class ExactCostTable:
     size: int
 
     def amounts(self) -> Iterable[Amount]:
-        """Return the costs that occur."""
+        """Return the different costs in the table."""
         return {*self.rows.values()} | ({self.default} if len(self.rows) < self.size else set())
 
     @property
@@ -46,7 +46,7 @@ class ExactCostTable:
 
 
 class Scale:
-    """The decimal places that some costs need, at most nine; costs that need more are rounded."""
+    """The decimal places that a team's costs require, at most nine; costs with more are rounded."""
 
     def __init__(self, amounts: Iterable[Amount]) -> None:
         needed = [decimal_places(amount) for amount in amounts if isinstance(amount, Fraction)]
@@ -54,18 +54,18 @@ class Scale:
         self.places = MAX_PLACES if self.rounds else max((places or 0 for places in needed), default=0)
 
     def units(self, amount: Amount) -> float:
-        """Return `amount` as an integer number of units. Raises `MistakeError` where that is too large."""
+        """Return `amount` as an integer number of units. Raises `MistakeError` if the number is too large."""
         if amount == INFINITE:
             return INFINITE
         whole: int = round(Fraction(amount) * 10**self.places)
         if not -BEYOND < whole < BEYOND:
-            what = f"a cost of {shortened(str(int(amount)))} with {self.places} decimal places"
-            raise MistakeError(what, "costs have at most 18 digits, decimal places included")
+            what = f"the cost {shortened(str(int(amount)))} is too large with {self.places} decimal places"
+            raise MistakeError(what, "use costs of at most 18 digits, decimal places included")
         return whole
 
 
 def decimal_places(number: Fraction) -> int | None:
-    """Return how many decimal places `number` has. None: it has no end."""
+    """Return the number of decimal places of `number`. None: it has no finite decimal form."""
     rest, twos, fives = number.denominator, 0, 0
     while rest % 2 == 0:
         rest, twos = rest // 2, twos + 1
@@ -75,7 +75,7 @@ def decimal_places(number: Fraction) -> int | None:
 
 
 def relation(table: ExactCostTable, arity: int, scale: Scale) -> Relation | int:
-    """Return `table` as a relation, as short as it goes; an integer where all costs are this one, and not infinite.
+    """Return `table` as a relation with as few tuples as possible; an integer if all its costs are this finite one.
 
     Raises:
         MistakeError: if a cost or the table is too large.
@@ -88,9 +88,10 @@ def relation(table: ExactCostTable, arity: int, scale: Scale) -> Relation | int:
     if not listed and default != INFINITE:
         return int(default)
     if len(listed) > MAX_TUPLES:
-        raise MistakeError(f"{len(listed)} tuples are more than {MAX_TUPLES}", "make domains or scopes smaller")
+        what = f"the table has {len(listed)} tuples, more than the limit of {MAX_TUPLES}"
+        raise MistakeError(what, "make domains or scopes smaller")
     name = definition_name(table.name)
-    if not listed:  # everything is forbidden: the first variable says so for all
+    if not listed:  # all tuples are forbidden: a relation over the first variable is enough
         return Relation(name, min(1, arity), Semantics.SUPPORTS, ())
     if {*listed.values(), default} <= {0, INFINITE}:
         semantics = Semantics.CONFLICTS if default == 0 else Semantics.SUPPORTS
@@ -99,30 +100,30 @@ def relation(table: ExactCostTable, arity: int, scale: Scale) -> Relation | int:
 
 
 def xml_name(name: str) -> str:
-    """Return `name` as it can stand as a constraint's: without blanks and signs that no XML file can hold."""
+    """Return `name` as a valid name of a constraint: without blanks and characters that XML does not allow."""
     return re.sub(r"[^!-~\u00a1-\ud7ff\ue000-\ufffd]", "_", name) or "_"
 
 
 def definition_name(name: str) -> str:
-    """Return `name` as it can stand as a relation's, a predicate's or a function's."""
+    """Return `name` as a valid name of a relation, predicate or function."""
     plain = xml_name(name)
     return f"{plain}_" if plain in PREDEFINED or plain.startswith("global:") else plain
 
 
 def apply_infinity(amount: Amount, infinity: int | None, *, maximize: bool) -> Amount:
-    """Return `amount`, or `INFINITE` where it forbids.
+    """Return `amount`, or `INFINITE` if it is the cost of a forbidden tuple.
 
     Args:
-        amount: A cost as it was written; it may be an infinity of either sign.
-        infinity: Costs of at least so much forbid, or of at most minus so much when maximising. None: only infinities.
+        amount: A cost; it may be an infinity of either sign.
+        infinity: Costs of at least this are infinite; when maximising, costs of at most its negative. None: no finite
+            cost is.
         maximize: Whether costs are maximised.
 
     Raises:
-        MistakeError: for the infinity that would be the best of all costs.
+        MistakeError: if `amount` is the infinity that would be the best of all costs.
     """
     bad = -amount if maximize else amount
     if bad == -math.inf:
-        raise MistakeError(
-            f"the cost {'infinity' if maximize else '-infinity'}", "only what forbids can be infinite: write a number"
-        )
+        what = f"the cost {'infinity' if maximize else '-infinity'} would be better than all others"
+        raise MistakeError(what, f"write a number; only {'-infinity' if maximize else 'infinity'} is allowed")
     return INFINITE if bad == math.inf or (infinity is not None and bad >= infinity) else amount

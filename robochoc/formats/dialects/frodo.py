@@ -1,6 +1,10 @@
 """FRODO's XCSP 2.1 (`format="XCSP 2.1_FRODO"`), in one file or in one for each agent, and plain XCSP 2.0 and 2.1.
 
-Facts: FRODO's manual, Appendix A, and its schemas; Roussel and Lecoutre, arXiv 0902.2362.
+Sources: FRODO's manual, Appendix A, and its schemas; Roussel and Lecoutre, arXiv 0902.2362.
+
+As shipped, FRODO ignores constraints in intension (only its JaCoP parser reads them), and its costs have 32 bits. So
+constraints are written as relations, and decimal costs as integers of a smaller unit, which the file names. FRODO's
+default parser ignores the `agent` of a constraint, or charges only that agent, so the attribute is not written.
 """
 
 from __future__ import annotations
@@ -66,7 +70,7 @@ _FORMS = {
     "element": re.compile(rf"X\d+ \[ (?:{_TERM} )+\] {_TERM}"),
     "cumulative": re.compile(rf"\[ (?:{{ {_TERM} {_TERM} {_TERM} }} )+\] <le/> {_TERM}"),
 }
-"""How FRODO reads the parameters of each."""
+"""The parameters of each global constraint that FRODO reads."""
 
 
 def _recognises(_path: Path, beginning: bytes) -> bool:
@@ -93,10 +97,10 @@ def _private_agent(element: ElementView, _instance: Instance) -> str:
 
 
 def merge(instances: Sequence[Instance]) -> Instance:
-    """Return the problem of all files of a team of agents.
+    """Return the problem in the files of all agents, such as FRODO's `-split` writes.
 
-    Constraints of the same name, scope and contents in several files are one. Variables that several files hold are
-    one, too, and must have the same domain and owner.
+    Constraints with the same name, scope and contents in several files are one constraint. Variables in several files
+    are one variable, and must have the same domain and owner.
 
     Raises:
         InvalidInputError: if the files do not belong together, or one is missing.
@@ -120,16 +124,16 @@ def merge(instances: Sequence[Instance]) -> Instance:
                 result.constraints.append(constraint)
             elif not _same(first, constraint):
                 if not (is_hard(first) and is_hard(constraint)):
-                    hint = f"constraints of one name are copies; it also stands in {first.file}:{first.line}"
+                    hint = f"rename it, or write the costs of {first.file}:{first.line}"
                     refuse(
-                        one.file, constraint.line, f"constraint '{shortened(constraint.name)}' costs otherwise", hint
+                        one.file, constraint.line, f"the constraint '{shortened(constraint.name)}' has different costs", hint
                     )
                 result.constraints.append(constraint)
     return result
 
 
 def is_hard(constraint: ForeignConstraint) -> bool:
-    """Return whether a constraint only allows and forbids."""
+    """Return whether all costs of a constraint are 0 or infinite."""
     match constraint.content:
         case ForeignTable(costs=costs, default=default):
             return {default, *costs.values()} <= {0, INFINITE}
@@ -143,32 +147,36 @@ def _check_members(instances: Sequence[Instance]) -> None:
     selves = {one.self_agent: one for one in instances}
     for one in instances:
         if not one.self_agent:
-            refuse(one.file, 0, "is a whole problem by itself", "import one such file at a time, or their folder")
+            refuse(one.file, 0, "is a complete problem", "import one complete problem at a time")
         if selves[one.self_agent] is not one:
             other = selves[one.self_agent].file
-            refuse(one.file, 0, f"is the file of agent {shortened(one.self_agent)}, and so is {other}", "leave one out")
+            what = f"is a second file of agent {shortened(one.self_agent)}; the first is {other}"
+            refuse(one.file, 0, what, "import one of the two")
         if one.maximize != instances[0].maximize:
-            refuse(one.file, 0, f"does not maximize or minimize as {instances[0].file} does", "let them agree")
+            here, there = ("maximises", "minimises") if one.maximize else ("minimises", "maximises")
+            what = f"{here} the costs, but {instances[0].file} {there} them"
+            refuse(one.file, 0, what, 'write the same value of maximize="..." in all files')
 
 
 def _check_complete(instances: Sequence[Instance]) -> None:
-    """Raise `InvalidInputError` when an agent has variables, and its file is not there."""
+    """Raise `InvalidInputError` if the file of an agent with variables is missing."""
     selves = {one.self_agent for one in instances if one.self_agent}
     if not selves:
         return
     for one in instances:
         for variable in one.variables.values():
             if variable.owner and variable.owner not in selves:
-                what = f"is what agent {shortened(one.self_agent)} knows, and the file of {shortened(variable.owner)}"
-                refuse(one.file, variable.line, f"{what} is not here", "give all agents' files, or their folder")
+                what = f"is the file of agent {shortened(one.self_agent)} only; the file of agent"
+                what = f"{what} {shortened(variable.owner)}, which owns {shortened(variable.name)}, is missing"
+                refuse(one.file, variable.line, what, "import the files of all agents, or their folder")
 
 
 def _add_variables(result: Instance, one: Instance) -> None:
     for variable in one.variables.values():
         first = result.variables.setdefault(variable.name, variable)
         if (first.ranges, first.owner) != (variable.ranges, variable.owner):
-            what = f"variable '{shortened(variable.name)}' has another domain or agent than in another file"
-            refuse(one.file, variable.line, what, "let the files agree")
+            what = f"the variable '{shortened(variable.name)}' has a different domain or agent in another file"
+            refuse(one.file, variable.line, what, "write the same domain and agent in all files")
 
 
 def _same(one: ForeignConstraint, other: ForeignConstraint) -> bool:
@@ -189,10 +197,10 @@ def _same(one: ForeignConstraint, other: ForeignConstraint) -> bool:
 
 
 def _write(team: Team, options: ExportOptions) -> ExportResult:
-    """Return the file, in which all agents of a constraint's variables know it.
+    """Return the file, in which all agents of a constraint's variables know the constraint.
 
     Raises:
-        UnsupportedError: if the team has what FRODO has not.
+        UnsupportedError: if FRODO lacks a feature of the team.
     """
     writer = _FrodoWriter(FlatTeam(team, TITLE), intension=options.intension)
     return ExportResult({f"{team.name}.xml": writer.content()}, tuple(writer.notes()))
@@ -243,7 +251,7 @@ class _FrodoWriter:
                 "scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits"
             )
         if any(one.private_part for one in self._flat.held):
-            text = "all agents of a constraint know it: FRODO cannot keep partially known (PKC) constraints apart"
+            text = "all agents of a constraint know it: FRODO does not support partially known constraints (PKC)"
             yield ConversionNote("known to more", text)
         if kept := sum(not isinstance(content, TabulatedConstraint) for content in self._contents):
             text = f"{counted(kept, 'constraint')} in intension, which only FRODO's JaCoP parser reads"
@@ -257,15 +265,15 @@ class _FrodoWriter:
         if most >= LIMIT:
             unit = f" in units of {self._unit}" if self._places else ""
             what = f"costs may add up to {most:,}{unit}"
-            raise UnsupportedError(f"{TITLE}: {what}, but FRODO's integers end at {LIMIT:,}: use smaller costs")
+            raise UnsupportedError(f"{TITLE}: {what}, but FRODO's integers are below {LIMIT:,}: use smaller costs")
         for name, variable in self._flat.team.variables.items():
             far = max(variable.domain, key=abs)
             if abs(far) >= LIMIT:
-                what = f"the value {far:,} of {name} is beyond FRODO's integers, which end at {LIMIT:,}"
+                what = f"the value {far:,} of {name} is too large: FRODO's integers are below {LIMIT:,}"
                 raise UnsupportedError(f"{TITLE}: {what}")
 
     def _in_intension(self, one: HeldConstraint) -> Predicate | Function | None:
-        """Return the definition of a constraint by FRODO's operators. None: it should be a relation."""
+        """Return the definition of a constraint in FRODO's operators. None: write the constraint as a relation."""
         definition, cost = one.constraint.definition, one.constraint.cost
         if isinstance(definition, Relation):
             return None
@@ -279,7 +287,7 @@ class _FrodoWriter:
         return self._as_function(one, definition, body)
 
     def _as_function(self, one: HeldConstraint, definition: Predicate | Function, body: Expression) -> Function | None:
-        """Return a definition whose costs are finite as a function. None: it should be a relation."""
+        """Return a definition whose costs are finite as a function. None: write the constraint as a relation."""
         if any(robot.costs.places for robot in self._flat.team.robots):  # the costs of a function have no unit
             return None
         if isinstance(definition, Predicate):
@@ -299,7 +307,7 @@ class _FrodoWriter:
         etree.SubElement(element, "parameters").text = " ".join(map(str, constraint.parameters))
 
     def _add(self, table: TabulatedConstraint) -> None:
-        """Write a soft relation, the only kind that all of FRODO reads."""
+        """Write a soft relation, the only kind that all parts of FRODO read."""
         key = id(table.table)
         if key not in self._references:
             self._references[key] = self._relation(table)

@@ -10,7 +10,7 @@ from robochoc.model.problem import Team
 
 
 def shared_constraints(team: Team) -> Counter[tuple[str, str]]:
-    """Return how many constraints each pair of variables shares, parts of partially known ones included."""
+    """Return the number of constraints that each pair of variables shares, including the parts of PKC constraints."""
     place = {name: number for number, name in enumerate(team.variables)}
     pairs: Counter[tuple[str, str]] = Counter()
     for constraint in {id(one): one for one in team.constraints()}.values():
@@ -20,9 +20,9 @@ def shared_constraints(team: Team) -> Counter[tuple[str, str]]:
 
 
 def pseudo_tree(team: Team) -> dict[str, str | None]:
-    """Return each robot's parent in the pseudo-tree of a depth-first search; None: it is a root.
+    """Return each robot's parent in the pseudo-tree of a depth-first search; None for a root.
 
-    The search begins with the robot that has the most neighbours, and goes on to the neighbour that has the most.
+    The search starts at the robot with the most neighbours and visits neighbours with more neighbours first.
     """
     graph = constraint_graph(team)
     order = compute_order(team, Order.DFS)

@@ -37,7 +37,7 @@ def _write(team: Team, options: ExportOptions) -> ExportResult:
 
 def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     del options
-    raise UnsupportedError(f"{paths[0]}: graphs are written, not read")
+    raise UnsupportedError(f"{paths[0]}: GraphML files can be exported but not imported")
 
 
 def _recognises(path: Path, beginning: bytes) -> bool:

@@ -1,6 +1,6 @@
-"""The dialects by name, and which of them a file is in.
+"""Find a dialect by its name, or by the contents of a file.
 
-Each is a module of this package that ends in `DIALECT = Dialect(...)`. It is imported when it is asked for.
+Each dialect is a module of this package that ends in `DIALECT = Dialect(...)`. It is imported on first use.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodabl
 from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, ImportOptions, ImportResult
 
 NAMES = ("frodo", "xdiscsp", "dcopsolver", "tasks", "pydcop", "xcsp3", "cfn", "wcsp", "dot", "graphml")
-"""The names of all dialects, in the order in which they are asked whether a file is in them."""
+"""The names of all dialects, in the order in which they are tried on a file."""
 
 _BEGINNING = 64 * 1024
-"""The bytes of a file by which it is recognised."""
+"""The number of bytes at the beginning of a file by which it is recognised."""
 
 
 def find_dialect(name: str) -> Dialect | None:
-    """Return the dialect called `name`. None: this version has none of that name."""
+    """Return the dialect called `name`. None: there is no such dialect in this version."""
     module = f"{__package__}.{name}"
     if name not in NAMES:
         return None
@@ -44,7 +44,7 @@ def dialects() -> Iterator[Dialect]:
 
 
 def recognise(path: Path) -> Dialect | None:
-    """Return the dialect that the file at `path` is in. None: it is in none, or is no file that can be read."""
+    """Return the dialect of the file at `path`. None: the format is unknown, or the file cannot be read."""
     beginning = first_bytes(path)
     if beginning is None:
         return None
@@ -56,11 +56,11 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
 
     Args:
         paths: The files of one problem.
-        options: What the import is asked.
+        options: The options of the import.
         name: The name of the dialect. None: it is recognised.
 
     Raises:
-        InvalidInputError: if a file is in no dialect that is read here, the files are in several, or they are invalid.
+        InvalidInputError: if a file's format is unknown, the files have different formats, or they are invalid.
     """
     found = [find_dialect(name) if name else recognise(path) for path in paths]
     for path, dialect in zip(paths, found, strict=True):
@@ -68,16 +68,17 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
             raise unknown_format_error(path)
         if dialect is not found[0]:
             first = found[0].title if found[0] else ""
-            raise _invalid(path, f"is {dialect.title}, and {paths[0]} is {first}", "import them one by one")
+            message = f"is in the format {dialect.title}, but {paths[0]} is in {first}"
+            raise _invalid(path, message, "import files of one format at a time")
         if path.stat().st_size > MAX_FILE:
             raise _invalid(path, f"is larger than {MAX_FILE // 2**20} MiB", "import a smaller problem")
     if not found or found[0] is None:
-        raise ValueError("no file")
+        raise ValueError("read_foreign requires at least one file")
     return found[0].read(paths, options)
 
 
 def first_bytes(path: Path) -> bytes | None:
-    """Return the first bytes of a regular file; None where there is none. A FIFO is not waited for."""
+    """Return the first bytes of a regular file; None if there is no such file. Does not block on a FIFO."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     except OSError:
@@ -91,10 +92,10 @@ def first_bytes(path: Path) -> bytes | None:
 
 
 def recognise_or_raise(path: Path) -> Dialect | None:
-    """Return the dialect that the file at `path` is in. None: it is no file, or may be that of a robot.
+    """Return the dialect of the file at `path`. None: it is not a file, or may be a robot's file.
 
     Raises:
-        InvalidInputError: if it is a file, and neither.
+        InvalidInputError: if it is a file of an unknown format.
     """
     dialect = recognise(path)
     if dialect is None and path.is_file() and (_is_wide(path) or path.suffix.lower() not in {"", ".xml"}):
@@ -103,18 +104,18 @@ def recognise_or_raise(path: Path) -> Dialect | None:
 
 
 def _is_wide(path: Path) -> bool:
-    """Return whether a file begins as a text in UTF-16 or UTF-32 does: by its mark, or with zeros."""
+    """Return whether a file looks like UTF-16 or UTF-32: a byte order mark, or zeros among its first bytes."""
     first = (first_bytes(path) or b"")[:4]
     return first.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in first
 
 
 def unknown_format_error(path: Path) -> InvalidInputError:
-    """Return the error of a file that is in no dialect, or not there."""
+    """Return the error for a file whose format is unknown, or that does not exist."""
     if not path.exists():
         return _invalid(path, "does not exist", "check its name")
     if _is_wide(path):
         return _invalid(path, "is not UTF-8: it looks like UTF-16", "save it in UTF-8")
-    return _invalid(path, "is of no format that is read here", "'robochoc import --help' lists those that are")
+    return _invalid(path, "has an unknown format", "'robochoc import --help' lists the supported formats")
 
 
 def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:

@@ -1,4 +1,4 @@
-"""A team's constraints as tables of costs in the user's numbers, as formats of other tools need them."""
+"""Write a team's constraints as tables of costs in the user's numbers, as other tools require."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from robochoc.model.problem import Robot, Team
 from robochoc.solver.errors import UnsupportedError
 
 CONSTANT = "constant"
-"""The name of a constraint for the constant cost."""
+"""The name of the constraint that has the constant cost."""
 
 
 class HeldConstraint(NamedTuple):
-    """A constraint, the robot that holds it, and whether only this robot knows it."""
+    """A constraint, the robot whose file contains it, and whether only this robot knows it."""
 
     constraint: Constraint
     robot: Robot
@@ -38,12 +38,12 @@ class HeldConstraint(NamedTuple):
 
 @dataclass(frozen=True)
 class TabulatedConstraint:
-    """The costs of some variables.
+    """A constraint as a table of costs.
 
     Attributes:
         name: The name of the constraint.
-        scope: The variables.
-        table: The costs of tuples of their values, the same object for constraints that differ only in variables.
+        scope: Its variables.
+        table: The costs of their values, the same object for constraints that differ only in variables.
     """
 
     name: str
@@ -52,7 +52,7 @@ class TabulatedConstraint:
 
 
 def held_constraints(team: Team) -> Iterator[HeldConstraint]:
-    """Yield the constraints of `team`, each part of a partially known one by itself."""
+    """Yield the constraints of `team`; a partially known constraint (PKC) yields each of its parts."""
     for robot in team.robots:
         for constraint in (*robot.private, *robot.shared):
             yield HeldConstraint(constraint, robot, constraint.model == ConstraintModel.PKC)
@@ -69,7 +69,7 @@ class Tabulator:
         self._known: dict[object, ExactCostTable] = {}
 
     def table(self, one: HeldConstraint, name: str = "", most: int = MAX_TUPLES) -> TabulatedConstraint | None:
-        """Return the costs of a constraint. None: they need more than `most` tuples."""
+        """Return a constraint as a table. None: the table would have more than `most` tuples."""
         constraint = one.constraint
         scope, definition = constraint.variables, constraint.definition
         domains = [self._domains[variable] for variable in scope]
@@ -89,13 +89,13 @@ class Tabulator:
 
 
 def tabulate(team: Team) -> tuple[list[TabulatedConstraint], Fraction]:
-    """Return the costs of a team that has not been normalised, and the constant among them.
+    """Return the constraints of a team that has not been normalised as tables, and its constant cost.
 
     Raises:
         UnsupportedError: if a constraint is too large for a table.
     """
     tabulator = Tabulator(team)
-    taken = {*team.variables, CONSTANT}  # pyDCOP has one set of names for both
+    taken = {*team.variables, CONSTANT}  # in pyDCOP, variables and constraints share one set of names
     found = []
     for one in held_constraints(team):
         table = tabulator.table(one, free_name(one.constraint.name, taken))
@@ -121,13 +121,13 @@ def constant_of(team: Team) -> Fraction:
 
 
 def constant_table(team: Team, constant: Fraction) -> TabulatedConstraint:
-    """Return a constant cost as the cost of all values of the first variable."""
+    """Return a constraint on the first variable whose values all have the constant cost."""
     variable = next(iter(team.variables.values()))
     return TabulatedConstraint(CONSTANT, (variable.name,), ExactCostTable(CONSTANT, {}, constant, len(variable.domain)))
 
 
 def too_large(team: Team, constraint: Constraint) -> str:
-    """Return the error text for a constraint that is too large for a table."""
+    """Return the error message for a constraint that is too large for a table."""
     size = math.prod(len(team.variables[name].domain) for name in constraint.variables)
     what = f"the constraint {constraint.name} over {' '.join(constraint.variables)} has {size:,} combinations of values"
     return f"{what}; a table has at most {MAX_TUPLES:,}"
@@ -139,7 +139,7 @@ def is_maximised(team: Team) -> bool:
 
 
 def magnitude(tables: Sequence[TabulatedConstraint], constant: Fraction) -> int:
-    """Return an integer that no sum of finite costs reaches, nor its negative."""
+    """Return an integer that is greater than the absolute value of every sum of finite costs."""
     distinct = {id(one.table): one.table for one in tables}
     most = {
         key: max((abs(Fraction(cost)) for cost in table.amounts() if cost != INFINITE), default=Fraction(0))
@@ -149,12 +149,12 @@ def magnitude(tables: Sequence[TabulatedConstraint], constant: Fraction) -> int:
 
 
 def amounts(tables: Sequence[TabulatedConstraint]) -> set[Amount]:
-    """Return the costs that occur in tables."""
+    """Return the different costs in `tables`."""
     return set().union(*(table.amounts() for table in {id(one.table): one.table for one in tables}.values()))
 
 
 def decimal(amount: Amount, places: int | None = None) -> str:
-    """Return a finite cost as a decimal without an exponent; with `places`, with so many of them."""
+    """Return a finite cost as a decimal without an exponent, with `places` decimal places if given."""
     if isinstance(amount, int) and not places:
         return str(amount)
     whole = Fraction(amount)
@@ -167,7 +167,7 @@ def decimal(amount: Amount, places: int | None = None) -> str:
 
 
 _Pattern = tuple[int | tuple[int], ...]
-"""The terms of a scope: a variable's place among the distinct variables, or a constant in a tuple of its own."""
+"""The terms of a scope: the index of a variable among the distinct variables, or a constant in a tuple of one."""
 
 
 def _price(definition: Predicate | Function, cost: float, places: int) -> Callable[[Sequence[int]], Amount]:
@@ -192,7 +192,7 @@ def _evaluated_table(
 def _relation_table(
     relation: Relation, pattern: _Pattern, domains: Sequence[Domain], places: int, size: int
 ) -> ExactCostTable:
-    """Return the table of a relation over its distinct variables; tuples with values outside domains are left out."""
+    """Return the table of a relation over its distinct variables, without tuples that have values outside domains."""
     listed, other = relation.prices
     known = [frozenset(domain) for domain in domains]
     rows: dict[tuple[int, ...], Amount] = {}

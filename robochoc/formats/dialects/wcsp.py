@@ -1,4 +1,4 @@
-"""toulbar2's `.wcsp`: numbers in a row (toulbar2's documentation, "wcsp format")."""
+"""toulbar2's `.wcsp`: a sequence of numbers (toulbar2's documentation, "wcsp format")."""
 
 from __future__ import annotations
 
@@ -68,18 +68,18 @@ class _WcspReader:
         functions = self._count("the number of cost functions")
         bound = self._in.integer("the upper bound")
         if count < 1:
-            self._in.refuse("there are no variables", "a problem has one or more")
+            self._in.refuse("there are no variables", "write at least one variable")
         for _ in range(count):
             size = abs(self._in.integer("the size of a domain"))
             if not 0 < size <= MAX_VALUES:
-                self._in.refuse(f"a domain of {size} values", f"from 1 to {MAX_VALUES}")
+                self._in.refuse(f"the domain has {size} values", f"use from 1 to {MAX_VALUES} values")
             self._sizes.append(size)
         found: list[CostFunction] = []
         notes: tuple[ConversionNote, ...] = ()
         for number in range(functions):
             word = self._in.more()
             if word is None:
-                text = f"the file announces {functions} cost functions, and has {number}"
+                text = f"the file declares {functions} cost functions, but has {number}"
                 notes = (ConversionNote("count", text),)
                 break
             found.append(self._function(self._in.as_integer(word, "the arity of a function"), number))
@@ -89,18 +89,20 @@ class _WcspReader:
     def _count(self, what: str) -> int:
         number = self._in.integer(what)
         if not 0 <= number <= MAX_VARIABLES:
-            self._in.refuse(f"{what} is {number}", f"from 0 to {MAX_VARIABLES}")
+            self._in.refuse(f"{what} is {number}", f"use a number from 0 to {MAX_VARIABLES}")
         return number
 
     def _function(self, arity: int, number: int) -> CostFunction:
         line, shared = self._in.line, arity < 0
         scope = tuple(self._place() for _ in range(min(abs(arity), len(self._sizes) + 1)))
         if len(set(scope)) < abs(arity):
-            self._in.refuse(f"the scope '{shortened(' '.join(map(str, scope)))}'", "name each variable once")
+            what = f"the scope '{shortened(' '.join(map(str, scope)))}' contains a variable twice"
+            self._in.refuse(what, "name each variable once")
         default = self._in.integer("a default cost")
         if default == -1:
             name = self._in.word("the name of a function")
-            self._in.refuse(f"the named cost function '{shortened(name)}'", "only tables of costs are read")
+            what = f"the named cost function '{shortened(name)}' is not supported"
+            self._in.refuse(what, "write it as a table of costs")
         table = self._table(f"f{number}", scope, default)
         if shared:
             self._shared.append(table)
@@ -111,36 +113,41 @@ class _WcspReader:
         count = self._in.integer("the number of tuples")
         if count < 0:
             if -count > len(self._shared):
-                self._in.refuse(f"the shared function {-count}, which is not there yet", "shared ones count from 1")
+                what = f"the tuples are those of the shared function {-count}, which is not defined above"
+                self._in.refuse(what, "write the number of a shared function above, from 1")
             table = self._shared[-count - 1]
             if table.size != size or {len(values) for values in table.rows} - {len(scope)}:
-                self._in.refuse(f"the shared function {-count}, which has other domains", "write the tuples")
+                what = f"the tuples are those of the shared function {-count}, which has different domains"
+                self._in.refuse(what, "write the tuples")
             return replace(table, name=name)
         if count > MAX_TUPLES:
-            self._in.refuse(f"a function of {count} tuples", f"at most {MAX_TUPLES} are read")
+            self._in.refuse(f"the function has {count} tuples", f"use at most {MAX_TUPLES} tuples")
         rows: dict[tuple[int, ...], Amount] = {}
         for _ in range(count):
             values = tuple([self._value(place) for place in scope])
             cost = self._cost(self._in.integer("a cost"))
             if rows.setdefault(values, cost) != cost:
-                self._in.refuse(f"the tuple {' '.join(map(str, values))} with two costs", "delete one of them")
+                what = f"the tuple {' '.join(map(str, values))} has two different costs"
+                self._in.refuse(what, "delete one of them")
         return ExactCostTable(name, rows, self._cost(default), size)
 
     def _place(self) -> int:
         place = self._in.integer("a variable")
         if not 0 <= place < len(self._sizes):
-            self._in.refuse(f"the variable {place}", f"variables count from 0 to {len(self._sizes) - 1}")
+            what = f"there is no variable {place}"
+            self._in.refuse(what, f"write the index of a variable, from 0 to {len(self._sizes) - 1}")
         return place
 
     def _value(self, place: int) -> int:
         value = self._in.integer("a value")
         if not 0 <= value < self._sizes[place]:
-            self._in.refuse(f"the value {value} of the variable {place}", f"it has {self._sizes[place]}, from 0 on")
+            what = f"the variable {place} has no value {value}"
+            self._in.refuse(what, f"write a value from 0 to {self._sizes[place] - 1}")
         return value
 
     def _cost(self, cost: int) -> int:
         if cost < 0:
-            self._in.refuse(f"the cost {cost}", "costs are 0 or more")
+            self._in.refuse(f"the cost {cost} is negative", "write costs of 0 or more")
         return cost
 
 
@@ -155,7 +162,7 @@ def write(team: Team, options: ExportOptions) -> ExportResult:
     network = team_costs(team)
     costs = {network.constant, *amounts(network.tables)}
     if is_maximised(team) or any(cost < 0 or (cost != INFINITE and Fraction(cost) % 1) for cost in costs):
-        raise UnsupportedError("a wcsp has integer costs of 0 or more that are minimised; a cfn can say this one")
+        raise UnsupportedError("a wcsp has only integer costs of 0 or more, minimised: use --format cfn for this team")
     return ExportResult({f"{team.name}.wcsp": ("\n".join(_wcsp(team, network)) + "\n").encode()})
 
 

@@ -1,7 +1,7 @@
 """XDisCSP 1.0, the files of DisChoco 2 and of DCOPSolver: DisCSP, DCOP, MaxDisCSP, and ADCOP with two costs a tuple.
 
-Facts: the names in DisChoco's parser, and the files that come with DCOPSolver. The variant with one file for each agent
-is this platform's own format.
+Sources: the names in DisChoco's parser, and the files shipped with DCOPSolver. The variant with one file for each agent
+is robochoc's own format.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _recognises(_path: Path, beginning: bytes) -> bool:
 
 def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     if len(paths) > 1:
-        refuse(paths[1], 0, "is a whole problem by itself", "import one such file at a time, or their folder")
+        refuse(paths[1], 0, "is a second problem", "import one XDisCSP file at a time")
     instance = read_instance(paths[0], options, _private_agent)
     instance.name = paths[0].stem
     if instance.type == MAX_DISCSP:
@@ -60,7 +60,7 @@ def _read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
 
 
 def _private_agent(element: ElementView, instance: Instance) -> str:
-    """Return the agent that alone knows a constraint. Raises `MistakeError` where a partially known one names none."""
+    """Return the only agent that knows a constraint. Raises `MistakeError` if a PKC constraint has no `ownerId`."""
     model = element.attribute("model") or instance.constraint_model
     owner = element.attribute("ownerId")
     if model != "PKC":
@@ -72,7 +72,7 @@ def _private_agent(element: ElementView, instance: Instance) -> str:
 
 
 def _cost_one(instance: Instance) -> None:
-    """Let every hard constraint cost 1 where it is violated."""
+    """Replace hard constraints by soft ones that cost 1 when violated."""
     tables: dict[int, ForeignTable] = {}
 
     def costing_one(one: ForeignConstraint) -> ForeignConstraint:
@@ -93,10 +93,10 @@ def _with_ones(table: ForeignTable) -> ForeignTable:
 
 
 def _write(team: Team, options: ExportOptions) -> ExportResult:
-    """Return the file: a DisCSP, a DCOP, or an ADCOP where two robots have costs of their own for one constraint.
+    """Return the file: a DisCSP, a DCOP, or an ADCOP if two robots have different costs for one constraint.
 
     Raises:
-        UnsupportedError: if the team has what XDisCSP has not: utilities, decimal or negative costs, a scenario.
+        UnsupportedError: if the team has utilities, decimal or negative costs, or a scenario, which XDisCSP lacks.
     """
     del options
     return ExportResult({f"{team.name}.xml": _XdiscspWriter(FlatTeam(team, FORMAT)).content()})
@@ -106,14 +106,14 @@ class _XdiscspWriter:
     def __init__(self, flat: FlatTeam) -> None:
         self._flat = flat
         if flat.maximize:
-            raise UnsupportedError(f"{FORMAT} has no utilities: costs are minimised")
+            raise UnsupportedError(f"{FORMAT} does not support utilities: costs are minimised")
         self._asymmetric = flat.is_weighted and any(one.private_part for one in flat.held)
         kind = "ADCOP" if self._asymmetric else "DCOP" if flat.is_weighted else "DisCSP"
         partly = any(one.private_part for one in flat.held)
         presentation = {
             "name": flat.team.name,
             "type": kind,
-            "benchmark": "RandomDCOP",  # DCOPSolver fails without a name here, and takes this one for any problem
+            "benchmark": "RandomDCOP",  # DCOPSolver requires a name here, and accepts this one for any problem
             "model": "Complex" if any(len(robot.variables) > 1 for robot in flat.team.robots) else "Simple",
             "constraintModel": "PKC" if partly else "TKC",
             "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),
@@ -167,7 +167,7 @@ class _XdiscspWriter:
         return self._document.relation(tabulated, attributes, tuples)
 
     def _is_side(self, one: HeldConstraint) -> bool:
-        """Return whether a constraint becomes one side of an asymmetric one. Raises `UnsupportedError`."""
+        """Return whether a constraint becomes one side of an asymmetric constraint. Raises `UnsupportedError`."""
         scope = one.constraint.variables
         if not self._asymmetric or not one.private_part or len({self._flat.team.owner[name] for name in scope}) == 1:
             return False

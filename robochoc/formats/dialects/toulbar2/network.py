@@ -1,4 +1,4 @@
-"""A cost function network, whichever format it is in, and the team that it makes."""
+"""Cost function networks, which `.cfn` and `.wcsp` share: from a network to a team, and from a team to its costs."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.errors import UnsupportedError
 
 LIMIT = 2**53
-"""The limit of costs in their unit: toulbar2 1.1 reads costs in a cfn as floating-point numbers."""
+"""The limit of costs in units of their last decimal place: toulbar2 1.1 reads the costs of a cfn as floats."""
 
 
 @dataclass(frozen=True)
 class CostFunction:
-    """A cost function: its variables by their places, and the costs of tuples of places of values."""
+    """A cost function over indexes of variables, with the costs of tuples of indexes of values."""
 
     scope: tuple[int, ...]
     table: ExactCostTable
@@ -44,11 +44,11 @@ class CostFunctionNetwork:
 
     Attributes:
         name: Its name.
-        variables: Its variables by name: how many values each has, or their names.
+        variables: Its variables by name: the number of their values, or the names of these.
         functions: Its cost functions. A scope may be empty.
-        bound: All costs are below it; above, when maximising.
+        bound: The total cost of a solution is below this bound; above, when maximising.
         maximize: Whether costs are maximised.
-        notes: What reading it has changed.
+        notes: The changes made when reading the file.
     """
 
     name: str
@@ -84,7 +84,7 @@ def to_team(network: CostFunctionNetwork, options: ImportOptions, dialect: str) 
     notes = [*network.notes, *_notes(network, scale, reaches=reaches)]
     notes += notes_on_names([*names.changed.items(), *symbols.changed.items()])
     if options.owner is None:
-        notes.append(ConversionNote("owner", "the format knows no owners: each variable is a robot's of its own"))
+        notes.append(ConversionNote("owner", "the format has no owners: each variable gets its own robot"))
     title = options.name or network.name
     if constant or any(_is_soft(one) for one in constraints):
         units = CostUnits(network.maximize, scale.places, constant)
@@ -132,15 +132,15 @@ def _relation(function: CostFunction, scale: Scale, codes: Sequence[Sequence[int
     except MistakeError as mistake:
         raise MistakeError(mistake.message, mistake.hint, function.line) from None
     if not isinstance(made, int) and not function.scope:
-        what = "the constant forbids everything"
-        raise MistakeError(what, "delete it, and the problem has a solution", function.line)
+        what = "the constant forbids all assignments"
+        raise MistakeError(what, "delete it, or write a finite cost", function.line)
     return made
 
 
 def _with_hard_tuples(network: CostFunctionNetwork, infinity: int | None) -> Iterator[CostFunction]:
-    """Yield the functions; what no solution below the bound can have is forbidden in them.
+    """Yield the functions, in which tuples that no solution below the bound contains are forbidden.
 
-    A tuple is, if even with the least cost of all other functions the sum reaches the bound.
+    A tuple is forbidden if its cost plus the least costs of all other functions reaches the bound.
     """
     sign = -1 if network.maximize else 1
 
@@ -178,7 +178,7 @@ def _with_costs(function: CostFunction, change: object) -> CostFunction:
 
 
 def _reaches_the_bound(network: CostFunctionNetwork, functions: Iterable[CostFunction]) -> bool:
-    """Return whether a sum of finite costs may reach the bound, as far as the greatest cost of each function says."""
+    """Return whether the sum of the greatest finite costs of all functions reaches the bound."""
     sign = -1 if network.maximize else 1
     most: Amount = 0
     for one in functions:
@@ -194,8 +194,8 @@ def _notes(network: CostFunctionNetwork, scale: Scale, *, reaches: bool) -> Iter
         )
     if reaches:
         side = "above" if network.maximize else "below"
-        text = f"toulbar2 accepts only sums {side} {float(network.bound):g}; here what reaches it is a solution, too"
-        yield ConversionNote("bound", f"{text}, and its cost tells")
+        text = f"toulbar2 accepts only costs {side} {float(network.bound):g}; here an assignment that reaches this"
+        yield ConversionNote("bound", f"{text} bound is a solution, too: compare its cost with the bound")
 
 
 class TeamCosts(NamedTuple):
@@ -214,7 +214,7 @@ def team_costs(team: Team) -> TeamCosts:
         UnsupportedError: if costs or a constraint's table are too large, or the team changes over time.
     """
     if team.scenario:
-        raise UnsupportedError("toulbar2's formats have no scenario")
+        raise UnsupportedError("toulbar2's formats do not support scenarios: remove scenario.xml")
     tables, constant = tabulate(team)
     places, bound = Scale([constant, *amounts(tables)]).places, magnitude(tables, constant)
     if bound * 10**places >= LIMIT:

@@ -1,4 +1,4 @@
-"""The words of toulbar2's files, with their lines; compressed files are read up to a bound."""
+"""Reading toulbar2's files word by word, with the line of each word; compressed files up to a maximum size."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.model.constraint import INFINITE
 
 MAX_TEXT = 256 * 1024 * 1024
-"""The maximum number of bytes of a file, unpacked."""
+"""The maximum size of an uncompressed file, in bytes."""
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _DECIMAL = re.compile(r"[+-]?(?=[.0-9])[0-9]{0,18}(?:\.[0-9]{0,60})?")
@@ -28,22 +28,22 @@ Words = Iterator[tuple[int, str]]
 
 
 class WordReader:
-    """Takes one word after the other."""
+    """Reads the words of a file one by one, and remembers the line of the last word."""
 
     def __init__(self, words: Words) -> None:
         self._words = words
         self.line = 1
 
     def word(self, what: str) -> str:
-        """Return the next word, which is to be `what`. Raises `MistakeError` where the file ends."""
+        """Return the next word. Raises `MistakeError`, which names `what`, at the end of the file."""
         found = next(self._words, None)
         if found is None:
-            raise MistakeError(f"the file ends where {what} should stand", "is it complete?", self.line)
+            raise MistakeError(f"expected {what}, found the end of the file", "check that it is complete", self.line)
         self.line, word = found
         return word
 
     def more(self) -> str | None:
-        """Return the next word. None: there is none."""
+        """Return the next word; None at the end of the file."""
         found = next(self._words, None)
         if found is None:
             return None
@@ -57,7 +57,7 @@ class WordReader:
     def as_integer(self, word: str, what: str) -> int:
         """Return `word` as an integer. Raises `MistakeError`."""
         if not _INTEGER.fullmatch(word):
-            self.refuse(f"'{shortened(word)}' where {what} should stand", "write an integer")
+            self.refuse(f"expected {what}, found '{shortened(word)}'", "write an integer")
         return int(word)
 
     def amount(self, word: str) -> Amount:
@@ -65,11 +65,11 @@ class WordReader:
         if word == "inf":
             return INFINITE
         if not _DECIMAL.fullmatch(word) or word.strip("+-") == ".":
-            self.refuse(f"'{shortened(word)}' where a cost should stand", "write a number such as 1.25, or inf")
+            self.refuse(f"expected a cost, found '{shortened(word)}'", "write a number such as 1.25, or inf")
         return Fraction(word) if "." in word else int(word)
 
     def refuse(self, message: str, hint: str) -> NoReturn:
-        """Raise `MistakeError` for the line of the word that was read last."""
+        """Raise `MistakeError` with the line of the last word."""
         raise MistakeError(message, hint, self.line)
 
 
@@ -79,22 +79,23 @@ def read_words(words: Words, read: Callable[[WordReader], Found]) -> Found:
     found = read(source)
     left = source.more()
     if left is not None:
-        source.refuse(f"'{shortened(left)}' after the end of the problem", "delete it, or check the numbers before it")
+        what = f"unexpected '{shortened(left)}' after the end of the problem"
+        source.refuse(what, "delete it, or check the numbers before it")
     return found
 
 
 def read_file(
     paths: Sequence[Path], options: ImportOptions, read: Callable[[str, str, ImportOptions], ImportResult]
 ) -> ImportResult:
-    """Return what `read` makes of the text of the one file in `paths`, its stem and `options`.
+    """Return the result of `read` for the text of the only file in `paths`, the stem of its name, and `options`.
 
     Raises:
-        InvalidInputError: with the file and the line of its mistake.
+        InvalidInputError: with the file and the line of the mistake.
     """
     path = paths[0]
     if len(paths) > 1:
-        hint = "a network is one file: import them one by one"
-        raise InvalidInputError([Diagnostic(encodable(str(paths[1])), 0, "is a second file", hint)])
+        hint = "import one file at a time: a network is one file"
+        raise InvalidInputError([Diagnostic(encodable(str(paths[1])), 0, "is a second network", hint)])
     try:
         return read(_text(path), path.name.split(".")[0], options)
     except MistakeError as mistake:
@@ -103,7 +104,7 @@ def read_file(
 
 
 def has_suffix(path: Path, suffix: str) -> bool:
-    """Return whether a file is called `*SUFFIX`, compressed or not."""
+    """Return whether the name of a file ends in `suffix`, or in `suffix` and `.gz` or `.xz`."""
     return path.name.lower().endswith((suffix, f"{suffix}.gz", f"{suffix}.xz"))
 
 

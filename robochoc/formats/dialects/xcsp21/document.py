@@ -1,4 +1,4 @@
-"""Writing XCSP 2.1: elements that FRODO's and DisChoco's files share."""
+"""Write XCSP 2.1: a team as one problem, its expressions in XCSP 2.1's operators, and the common XML elements."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.errors import UnsupportedError
 
 MAX_LISTED = 10_000
-"""The maximum number of tuples of a predicate or function that is written as a relation although it need not be."""
+"""The maximum number of tuples of a predicate that is written as a relation although it could be a function."""
 
 
 class FlatTeam:
-    """A team, seen as one problem.
+    """A team as one problem, without the links between robots' files.
 
     Raises:
-        UnsupportedError: if it changes over time.
+        UnsupportedError: if the team changes over time.
     """
 
     def __init__(self, team: Team, title: str) -> None:
         if team.dynamic:
-            raise UnsupportedError(f"{title} has no problems that change over time: leave scenario.xml out")
+            raise UnsupportedError(f"{title} does not support problems that change over time: remove scenario.xml")
         self.team = team
         self.title = title
         self.maximize = is_maximised(team)
@@ -51,7 +51,7 @@ class FlatTeam:
         """Return a constraint as a table.
 
         Raises:
-            UnsupportedError: if it is too large for one; the message ends in `hint`.
+            UnsupportedError: if the constraint is too large for a table; the message ends in `hint`.
         """
         table = self._tabulator.table(one)
         if table is None:
@@ -59,12 +59,12 @@ class FlatTeam:
         return table
 
     def small_table(self, one: HeldConstraint) -> TabulatedConstraint | None:
-        """Return a constraint as a table. None: it is so large that a predicate or function should be kept."""
+        """Return a constraint as a table. None: it would have more than `MAX_LISTED` tuples."""
         return self._tabulator.table(one, most=MAX_LISTED)
 
 
 def _domains(team: Team) -> tuple[dict[str, Domain], dict[str, str]]:
-    """Return domains by names that are unique in the team, and the name of each variable's."""
+    """Return the domains by names that are unique in the team, and the name of each variable's domain."""
     known: dict[str, Domain] = {}
     name_of = {}
     for variable in team.variables.values():
@@ -77,9 +77,10 @@ def _domains(team: Team) -> tuple[dict[str, Domain], dict[str, str]]:
 
 
 def in_xcsp21_operators(expression: Expression) -> Expression | None:
-    """Return `expression` by XCSP 2.1's operators alone, each with the arguments that it has there.
+    """Return `expression` in XCSP 2.1's operators, each with its number of arguments there.
 
-    None: an operator has no counterpart.
+    Returns:
+        The expression. None: an operator has no counterpart.
     """
     if not isinstance(expression, Apply):
         return expression
@@ -92,7 +93,7 @@ def in_xcsp21_operators(expression: Expression) -> Expression | None:
 
 
 def _folded(operator: str, arguments: Sequence[Expression]) -> Expression:
-    """Return the arguments, two by two: a balanced tree, which is as flat as can be."""
+    """Return the arguments as a balanced binary tree, which has the least depth."""
     if len(arguments) == 1:
         return arguments[0]
     half = len(arguments) // 2
@@ -111,7 +112,7 @@ _RULES: dict[str, Callable[[str, tuple[Expression, ...]], Expression]] = {
     "imp": lambda _, two: Apply("or", (Apply("not", two[:1]), two[1])),
     "sqr": lambda _, one: Apply("mul", one * 2),
 }
-"""XCSP 2.1's forms of operators."""
+"""The translation of each operator to XCSP 2.1's operators."""
 
 
 def with_formals(definition: Predicate | Function, body: Expression) -> tuple[tuple[str, ...], Expression]:
@@ -131,7 +132,7 @@ def with_formals(definition: Predicate | Function, body: Expression) -> tuple[tu
 
 
 class Document:
-    """An XML document that fills up. Equal relations, predicates and functions stand once.
+    """An XML document under construction. Equal relations, predicates and functions are written once.
 
     Args:
         team: The team.
@@ -152,7 +153,7 @@ class Document:
         self._names: set[str] = set()
 
     def content(self) -> bytes:
-        """Return the document, with the counts that its sections lack."""
+        """Return the document, with the number of elements of each section."""
         for section in list(self.root):
             if section.tag == "presentation":
                 continue
@@ -165,7 +166,7 @@ class Document:
         return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
 
     def relation(self, table: TabulatedConstraint, attributes: Mapping[str, str], tuples: str) -> str:
-        """Return the name of a relation with these tuples, which is added if there is none."""
+        """Return the name of a relation with these tuples; add it if it is new."""
         key = "relation", tuple(attributes.items()), tuples, len(table.scope)
         if key not in self._known:
             sizes = {"arity": str(len(table.scope)), "nbTuples": str(len(table.table.rows))}
@@ -174,7 +175,7 @@ class Document:
         return self._known[key]
 
     def formula(self, definition: Predicate | Function, body: Expression) -> str:
-        """Return the name of a predicate or function with this body, which is added if there is none."""
+        """Return the name of a predicate or function with this body; add it if it is new."""
         formals, renamed = with_formals(definition, body)
         kind = "function" if isinstance(definition, Function) else "predicate"
         key = kind, formals, renamed
@@ -218,5 +219,5 @@ def _range(part: range) -> str:
 
 
 def cost_text(cost: Amount, *, forbidden: str = "infinity") -> str:
-    """Return a cost as it is written."""
+    """Return a cost as text."""
     return forbidden if cost == INFINITE else decimal(cost)

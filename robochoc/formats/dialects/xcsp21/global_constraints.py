@@ -1,7 +1,7 @@
-"""Global constraints of XCSP 2.1: those that are the same here, and others as predicates.
+"""Global constraints of XCSP 2.1: unchanged if robochoc has the same constraint, else as predicates.
 
 Syntax: Roussel and Lecoutre, "XML representation of constraint networks: format XCSP 2.1" (arXiv 0902.2362), and the
-manual of FRODO, which has `diff2`, and intervals in `element`.
+manual of FRODO, which adds `diff2`, and intervals in `element`.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ Term = str | int
 MAX_TERMS = 500
 """The maximum number of variables and constants of a global constraint."""
 MAX_BOXES = 100
-"""The maximum number of rectangles: each is compared with each."""
+"""The maximum number of rectangles: there is one predicate for each pair."""
 
 _TOKEN = re.compile(r"[][{}]|<\w+>|[^][{}<\s]+")
 _ZERO = Constant(0)
 
 
 def expand_global(name: str, element: ElementView, scope: Sequence[str]) -> list[Formula]:
-    """Return what a global constraint says, as predicates.
+    """Return a global constraint as predicates.
 
     Args:
         name: Its name, without `global:`.
@@ -39,11 +39,12 @@ def expand_global(name: str, element: ElementView, scope: Sequence[str]) -> list
         scope: The variables of its scope.
 
     Raises:
-        MistakeError: if it is of another kind, or its parameters are not as they should be.
+        MistakeError: if the constraint is not supported, or its parameters are invalid.
     """
     if name not in _EXPANSIONS:
         known = " ".join(_EXPANSIONS)
-        raise MistakeError(f"the global constraint '{shortened(name)}'", f"known are {known}: state it by others")
+        what = f"the global constraint '{shortened(name)}' is not supported"
+        raise MistakeError(what, f"use one of {known}")
     tokens = _Tokens(element.child("parameters"), name)
     formulas = list(_EXPANSIONS[name](tokens, scope))
     tokens.end()
@@ -51,7 +52,7 @@ def expand_global(name: str, element: ElementView, scope: Sequence[str]) -> list
 
 
 def _unchanged(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
-    """Yield a constraint that is the same here."""
+    """Yield a constraint that robochoc has, too."""
     formals: dict[str, str] = {}
     form = []
     for word in tokens.rest():
@@ -73,7 +74,8 @@ class _Tokens:
         self._words = _TOKEN.findall(text)
         self._next = 0
         if len(self._words) > 10 * MAX_TERMS:
-            raise MistakeError(f"global:{name} has too many parameters", f"{MAX_TERMS} variables are allowed: split it")
+            what = f"global:{name} has too many parameters"
+            raise MistakeError(what, f"split it into constraints of at most {MAX_TERMS} variables")
 
     def __bool__(self) -> bool:
         return self._next < len(self._words)
@@ -88,11 +90,11 @@ class _Tokens:
         return word
 
     def has(self, part: str) -> bool:
-        """Return whether a word has that part."""
+        """Return whether a word contains `part`."""
         return any(part in word for word in self._words)
 
     def rest(self) -> list[str]:
-        """Return all words that are left."""
+        """Return all remaining words."""
         words = self._words[self._next :]
         self._next = len(self._words)
         return words
@@ -110,7 +112,7 @@ class _Tokens:
         return integer(word) if is_integer(word) else word
 
     def terms(self, opening: str, closing: str) -> list[Term]:
-        """Return what stands between two brackets."""
+        """Return the terms between two brackets."""
         self.expect(opening)
         found = []
         while self.peek != closing:
@@ -124,13 +126,12 @@ class _Tokens:
 
     def fail(self, expected: str) -> NoReturn:
         there = shortened(self.peek) or "the end"
-        raise MistakeError(
-            f"in the parameters of global:{self.name}: '{there}' where {expected} should stand", "mend it"
-        )
+        what = f"the parameters of global:{self.name} have '{there}', expected {expected}"
+        raise MistakeError(what, "see the syntax of this constraint in XCSP 2.1")
 
 
 class _Body:
-    """An expression over terms, whose variables become formal parameters."""
+    """Builds an expression over terms, whose variables become formal parameters."""
 
     def __init__(self) -> None:
         self._formals: dict[str, str] = {}
@@ -145,17 +146,18 @@ class _Body:
 
 
 def _all_different(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
-    """Yield one predicate for each pair: protocols and filters for two robots take these."""
+    """Yield one predicate for each pair, since protocols and filters for binary constraints accept these."""
     terms = tokens.terms("[", "]") if tokens else list(scope)
     if len(terms) > MAX_TERMS:
-        raise MistakeError(f"global:allDifferent over {len(terms)} terms", f"{MAX_TERMS} are allowed: split it")
+        what = f"global:allDifferent has {len(terms)} terms"
+        raise MistakeError(what, f"split it into constraints of at most {MAX_TERMS} terms")
     for one, other in itertools.combinations(terms, 2):
         body = _Body()
         yield body.formula("different", Apply("ne", (body.term_expression(one), body.term_expression(other))))
 
 
 def _element(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
-    """The index counts from 1. FRODO's intervals stand for any value in them."""
+    """Yield `element`, whose index starts at 1. One of FRODO's intervals allows each of its values."""
     if not tokens.has(".."):
         yield from _unchanged(tokens, scope)
         return
@@ -184,7 +186,7 @@ def _element(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
 
 
 def _diff2(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
-    """Yield one predicate for each pair of rectangles: one lies beside the other. An empty one is nowhere."""
+    """Yield one predicate for each pair of rectangles: they do not overlap. An empty rectangle overlaps with none."""
     rectangles = []
     tokens.expect("[")
     while tokens.peek != "]":
@@ -192,7 +194,8 @@ def _diff2(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
         rectangle = [*tokens.terms("{", "}"), *tokens.terms("{", "}")]
         tokens.expect("]")
         if len(rectangle) != 4:  # noqa: PLR2004 - two dimensions
-            raise MistakeError("a rectangle of global:diff2 without two origins and two sizes", "[{x y} {dx dy}]")
+            what = "a rectangle of global:diff2 requires two coordinates and two sizes"
+            raise MistakeError(what, "write [{x y} {dx dy}]")
         rectangles.append(rectangle)
     tokens.expect("]")
     _check_count(rectangles, tokens.name)
@@ -215,7 +218,8 @@ def _diff2(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
 
 def _check_count(boxes: Sequence[object], name: str) -> None:
     if len(boxes) > MAX_BOXES:
-        raise MistakeError(f"global:{name} over {len(boxes)} of them", f"{MAX_BOXES} are allowed: split it")
+        what = f"global:{name} has {len(boxes)} rectangles"
+        raise MistakeError(what, f"split it into constraints of at most {MAX_BOXES} rectangles")
 
 
 def _joined(operator: str, terms: Sequence[Expression]) -> Expression:

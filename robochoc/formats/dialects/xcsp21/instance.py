@@ -1,4 +1,4 @@
-"""An instance of XCSP 2.1 with agents, as data: the names of its file, and exact costs."""
+"""An instance of XCSP 2.1 with agents, as data: with the names of its file, and exact costs."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from robochoc.formats.dialects.dialect import ConversionNote
 from robochoc.model.constraint import Function, Predicate
 
 UNIT = "unit of costs"
-"""The name of the `stats` element of a presentation with the value of a cost of 1, such as 0.01."""
+"""The name of the `stats` element of the presentation that states the value of a cost of 1, such as 0.01."""
 
 Price = Decimal | float
-"""A cost: exact, or `INFINITE` for what is forbidden."""
+"""A cost: exact, or `INFINITE` for a forbidden tuple."""
 
 
 @dataclass(frozen=True)
 class ForeignTable:
-    """A relation: the cost of each tuple, and of those that are not listed."""
+    """A relation: the costs of the listed tuples, and the cost of all others."""
 
     name: str
     arity: int
@@ -39,12 +39,12 @@ class AsymmetricTable:
 
 @dataclass(frozen=True)
 class Formula:
-    """A predicate or function, and what it is applied to: variables by their names in the file, and integers.
+    """A predicate or function applied to terms: variables by their names in the file, and integers.
 
     Attributes:
         definition: The predicate or function.
         terms: Its actual parameters.
-        cost: What breaking a predicate costs. None: it may not be broken.
+        cost: The cost of violating a predicate. None: the predicate is hard.
     """
 
     definition: Predicate | Function
@@ -65,7 +65,7 @@ class ForeignVariable:
 
 @dataclass(frozen=True)
 class ForeignConstraint:
-    """A constraint: the agent that alone knows it, if there is one, and what it says."""
+    """A constraint; `private_agent` is the only agent that knows it, or empty if all agents of its scope do."""
 
     name: str
     scope: tuple[str, ...]
@@ -84,15 +84,15 @@ class Instance:
         name: The name of the problem.
         maximize: Whether the costs are utilities.
         agents: The agents, the highest first.
-        self_agent: The agent whose file it is, where each has its own.
+        self_agent: The agent whose file this is, if each agent has its own file.
         variables: The variables, by their names.
         constraints: The constraints.
-        constant: What is added to all costs.
-        maximal_cost: Costs of at least so much forbid. None: none do.
+        constant: The constant added to the cost.
+        maximal_cost: Costs of at least this are infinite. None: no finite cost is.
         ids: The agents by their `id`.
         type: The kind of problem that the file states.
-        constraint_model: How much agents know of constraints that do not say it: TKC or PKC.
-        notes: What has been mapped.
+        constraint_model: The constraint model of constraints without the attribute `model`: TKC or PKC.
+        notes: The differences from the file.
     """
 
     file: Path

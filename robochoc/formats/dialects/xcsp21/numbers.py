@@ -1,4 +1,4 @@
-"""Words of XCSP 2.1's texts: integers, ranges, costs, tuples. Digits are counted before Python reads them."""
+"""Integers, ranges, costs and tuples in texts of XCSP 2.1. The number of digits is checked before conversion."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ _DIGITS = 18
 
 
 def is_integer(word: str) -> bool:
-    """Return whether `word` is an integer that is read here."""
+    """Return whether `word` is an integer of at most 18 digits."""
     return _INTEGER.fullmatch(word) is not None
 
 
 def integer(word: str) -> int:
-    """Return the integer that `word` is. Raises `MistakeError`."""
+    """Return `word` as an integer. Raises `MistakeError`."""
     if not is_integer(word):
         if _COST.fullmatch(word) or _INFINITY.fullmatch(word):
-            raise MistakeError(f"the value {shortened(word)} is no integer", "domains here are integers: scale them")
-        raise MistakeError(f"'{shortened(word)}' is no integer", "at most 18 digits, and a sign")
+            raise MistakeError(f"the value {shortened(word)} is not an integer", "scale the values to integers")
+        raise MistakeError(f"'{shortened(word)}' is not an integer", "write at most 18 digits, with or without a sign")
     return int(word)
 
 
 def ranges(text: str) -> tuple[range, ...]:
-    """Return the ranges in a domain's text, ascending; values may stand in any order. Raises `MistakeError`."""
+    """Return the ranges in a domain's text, which may be unordered, in ascending order. Raises `MistakeError`."""
     found = sorted(map(_range, text.split()), key=lambda part: part.start)
     if sum(part.stop - part.start for part in found) > MAX_VALUES:
-        raise MistakeError(f"a domain of more than {MAX_VALUES} values", "make it smaller")
+        raise MistakeError(f"the domain has more than {MAX_VALUES} values", "use a smaller domain")
     apart: list[range] = []
     for part in found:
         if apart and part.start <= apart[-1].stop:
@@ -61,20 +61,21 @@ def _range(word: str) -> range:
 def finite_cost(word: str, places: int = 0) -> Decimal:
     """Return the cost in `word`, in units of 10 to the power of minus `places`. Raises `MistakeError`."""
     if not _COST.fullmatch(word):
-        raise MistakeError(f"'{shortened(word)}' is no cost", "a number, 'infinity' or '-infinity'")
+        raise MistakeError(f"'{shortened(word)}' is not a cost", "write a number, 'infinity' or '-infinity'")
     cost = Decimal(word).scaleb(-places).normalize()
     if not cost:
         return Decimal(0)
     digits, exponent = len(cost.as_tuple().digits), int(cost.as_tuple().exponent)
     if -exponent > MAX_PLACES:
-        raise MistakeError(f"the cost {shortened(word)} has {-exponent} decimal places", f"{MAX_PLACES} are allowed")
+        what = f"the cost {shortened(word)} has {-exponent} decimal places"
+        raise MistakeError(what, f"write at most {MAX_PLACES} decimal places")
     if digits + exponent > _DIGITS:
-        raise MistakeError(f"the cost {shortened(word)} is too large", f"at most {_DIGITS} digits")
+        raise MistakeError(f"the cost {shortened(word)} is too large", f"write at most {_DIGITS} digits")
     return cost
 
 
 class CostReader:
-    """Reads costs. A cost that is infinite, or reaches `infinity` or the file's `bound`, forbids.
+    """Reads costs. A cost that reaches `infinity` or the file's `bound` is infinite.
 
     A finite cost is a number of units of 10 to the power of minus `places`.
     """
@@ -86,12 +87,13 @@ class CostReader:
         self._infinity = min(stated) if stated else None
 
     def cost(self, word: str) -> Price:
-        """Return the cost that `word` is. Raises `MistakeError`."""
+        """Return `word` as a cost. Raises `MistakeError`."""
         infinite = _INFINITY.fullmatch(word)
         if infinite:
             if (infinite[1] == "-") != self._maximize:
-                what, good = ("utilities", "-infinity") if self._maximize else ("costs", "infinity")
-                raise MistakeError(f"{word} among {what}", f"'{good}' forbids; nothing is infinitely good")
+                kind, bad = ("utility", "-infinity") if self._maximize else ("cost", "infinity")
+                what = f"the {kind} {word} would be better than all others"
+                raise MistakeError(what, f"write a number, or '{bad}' for a forbidden tuple")
             return INFINITE
         cost = finite_cost(word)
         if self._infinity is not None and (-cost if self._maximize else cost) >= self._infinity:
@@ -103,15 +105,15 @@ def unit_places(word: str) -> int:
     """Return the decimal places of a unit of costs: 2 of 0.01. Raises `MistakeError`."""
     match = re.fullmatch(r"0\.(0*1)", word)
     if match is None or len(match[1]) > MAX_PLACES:
-        raise MistakeError(f"the unit of costs '{shortened(word)}'", "write 0.1, 0.01, or less")
+        raise MistakeError(f"the unit of costs '{shortened(word)}' is not valid", "write 0.1, 0.01 or a smaller unit")
     return len(match[1])
 
 
 def split_tuples(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the cost's text, empty where none is written, and the values' of each tuple in a relation's text."""
+    """Yield, for each tuple in the text of a relation, the text of its cost (may be empty) and of its values."""
     parts = text.split("|")
     if len(parts) > MAX_TUPLES + 1:
-        raise MistakeError(f"a relation of more than {MAX_TUPLES} tuples", "split it")
+        raise MistakeError(f"the relation has more than {MAX_TUPLES} tuples", "use smaller domains or scopes")
     for part in parts:
         cost, _, values = part.rpartition(":")
         if part.strip():

@@ -1,6 +1,6 @@
-"""Read an XML file of XCSP 2.1 with agents. Counts that the file states are not compared with its contents.
+"""Read an XML file of XCSP 2.1 with agents. The counts stated in the file are ignored.
 
-The file is read through views of its elements: a part that is not read here is an error.
+The file is read through views of its elements: an unread part is an error.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ _TRUTH_VALUES = {"true": "eq(0,0)", "false": "ne(0,0)"}
 MAX_XML = 32 * 1024 * 1024
 """The maximum size of an XML file, in bytes."""
 MAX_CONSTRAINTS = 200_000
-"""The maximum number of constraints, once global ones are written out."""
+"""The maximum number of constraints, after the expansion of global constraints."""
 GLOBAL = "global:"
 PUBLIC = "PUBLIC"
 
 PrivateAgentReader = Callable[[ElementView, Instance], str]
-"""Returns the agent that alone knows a constraint, or an empty text."""
+"""Returns the only agent that knows a constraint, or an empty text."""
 
 _DESCRIPTIONS = (
     "maxConstraintArity", "minViolatedConstraints", "nbSolutions", "solution", "format", "benchmark", "model",
@@ -67,14 +67,14 @@ _DESCRIPTIONS = (
 
 
 class FileHead:
-    """The first bytes of a file.
+    """The properties of a file by its first bytes, without parsing it.
 
     Attributes:
         is_instance: Whether its root element is `instance`, and not XCSP3's.
-        format: The format that its presentation names. Empty: none.
-        type: The type that its presentation names. Empty: none.
-        has_agents: Whether it lists agents: robots' own files do not.
-        is_network: Whether it lists domains and variables, and has nothing of a robot's own file.
+        format: The format stated in its presentation, or an empty text.
+        type: The type stated in its presentation, or an empty text.
+        has_agents: Whether it has a section of agents, which robots' files do not have.
+        is_network: Whether it has domains and variables, and no part that only robots' files have.
     """
 
     def __init__(self, beginning: bytes) -> None:
@@ -96,8 +96,8 @@ def read_instance(path: Path, options: ImportOptions, private_agent: PrivateAgen
 
     Args:
         path: The file.
-        options: What the import is asked.
-        private_agent: Returns the agent that alone knows a constraint, or an empty text.
+        options: The options of the import.
+        private_agent: Returns the only agent that knows a constraint, or an empty text.
 
     Raises:
         InvalidInputError: with the first mistake.
@@ -109,8 +109,6 @@ def read_instance(path: Path, options: ImportOptions, private_agent: PrivateAgen
 
 
 class _Xcsp21Reader:
-    """A file on its way."""
-
     def __init__(
         self, path: Path, root: ElementView, options: ImportOptions, private_agent: PrivateAgentReader
     ) -> None:
@@ -166,12 +164,12 @@ class _Xcsp21Reader:
                 self._bounds(constraints)
 
     def _bounds(self, constraints: ElementView) -> None:
-        """Note the constant cost, and the bound of a weighted CSP (XCSP 2.1, "Representing WCSP")."""
+        """Read the constant cost, and the bound of a weighted CSP (XCSP 2.1, "Representing WCSP")."""
         initial, most = constraints.attribute("initialCost"), constraints.attribute("maximalCost")
         if initial:
             self.found.constant = finite_cost(initial)
             if self.found.constant:
-                self.found.notes.append(ConversionNote("constant", f"initialCost {initial} is added to every cost"))
+                self.found.notes.append(ConversionNote("constant", f"initialCost {initial} is added to the cost"))
         if most and most != "infinity":
             bound = finite_cost(most)
             self.found.maximal_cost = bound
@@ -184,7 +182,7 @@ class _Xcsp21Reader:
         name = element.attribute("name")
         element.ignore_attributes("description")
         if name in self.found.agents:
-            raise element.mistake(f"a second agent '{shortened(name)}'", "names are unique")
+            raise element.mistake(f"duplicate agent '{shortened(name)}'", "rename one of them")
         self.found.agents.append(name)
         if given := element.attribute("id"):
             self.found.ids[given] = name
@@ -195,7 +193,7 @@ class _Xcsp21Reader:
         if element.attribute("type") == "random":
             self._not_stochastic(element)
         if name in self.found.variables or not name:
-            raise element.mistake(f"a second variable '{shortened(name)}'", "names are unique")
+            raise element.mistake(f"duplicate or empty variable name '{shortened(name)}'", "write a unique name")
         if domain not in self._domains:
             hint = suggestion(domain, self._domains, "domains")
             raise element.mistake(f"there is no domain '{shortened(domain)}'", hint)
@@ -203,9 +201,9 @@ class _Xcsp21Reader:
         self.found.variables[name] = ForeignVariable(name, domain, self._domains[domain], owner, element.line)
 
     def _not_stochastic(self, element: ElementView) -> NoReturn:
-        what = f"the {'random variable' if element.tag == 'variable' else 'probability'} "
-        what += f"'{shortened(element.attribute('name'))}'"
-        raise element.mistake(f"{what}: stochastic problems are not read", "give the variable one value")
+        kind = "random variable" if element.tag == "variable" else "probability"
+        what = f"the {kind} '{shortened(element.attribute('name'))}': stochastic problems are not supported"
+        raise element.mistake(what, "give the variable one value")
 
     def _define(self) -> None:
         costs = CostReader(
@@ -222,12 +220,13 @@ class _Xcsp21Reader:
                 with _with_line(element):
                     self._formulas[self._new(element)] = read_formula(element)
                     if self._unit_places and kind == "function":
-                        raise MistakeError(f"a function in a file with a {UNIT}", "write its costs as a relation")
+                        what = f"functions are not supported in a file with a {UNIT}"
+                        raise MistakeError(what, "write the costs as a relation")
 
     def _new(self, element: ElementView) -> str:
         name = element.attribute("name")
         if name in self._relations or name in self._formulas:
-            raise MistakeError(f"a second definition '{shortened(name)}'", "names are unique")
+            raise MistakeError(f"duplicate definition '{shortened(name)}'", "rename one of them")
         return name
 
     def _constrain(self, element: ElementView) -> None:
@@ -243,9 +242,9 @@ class _Xcsp21Reader:
             else:
                 scope_now = scope
             if not scope_now:
-                raise MistakeError(f"constraint {shortened(name)} is about no variable", "delete it")
+                raise MistakeError(f"the constraint {shortened(name)} has no variables", "delete it")
             if len(self.found.constraints) == MAX_CONSTRAINTS:
-                raise MistakeError(f"more than {MAX_CONSTRAINTS} constraints", "import a smaller problem")
+                raise MistakeError(f"there are more than {MAX_CONSTRAINTS} constraints", "import a smaller problem")
             private_agent = self._private_agent(element, self.found)
             self.found.constraints.append(
                 ForeignConstraint(name, scope_now, content, private_agent, str(self._path), element.line)
@@ -266,8 +265,10 @@ class _Xcsp21Reader:
             relation = self._relations[reference]
             arity = relation.arity if isinstance(relation, ForeignTable) else relation.first.arity
             if arity not in {0, len(scope)}:
-                there = f"{len(scope)} variables in the scope, but tuples of {arity} values in '{shortened(reference)}'"
-                raise MistakeError(there, "one for each variable")
+                what = (
+                    f"the scope has {len(scope)} variables, but tuples of '{shortened(reference)}' have {arity} values"
+                )
+                raise MistakeError(what, "write one value for each variable")
             return [relation]
         definition = self._formulas.get(reference) or PREDEFINED.get(reference)
         if definition is None:
@@ -278,15 +279,15 @@ class _Xcsp21Reader:
         terms = tuple(integer(word) if is_integer(word) else word for word in words)
         self._check_terms(terms)
         if len(terms) != len(definition.parameters):
-            there = f"{len(terms)} parameters for '{shortened(reference)}', which has {len(definition.parameters)}"
-            raise MistakeError(there, "one for each")
+            what = f"'{shortened(reference)}' has {len(definition.parameters)} parameters, but {len(terms)} are given"
+            raise MistakeError(what, "write one for each")
         return [Formula(definition, terms)]
 
     def _check_terms(self, terms: tuple[str | int, ...]) -> None:
         for term in terms:
             if isinstance(term, str) and term not in self.found.variables:
                 hint = suggestion(term, self.found.variables, "variables")
-                raise MistakeError(f"'{shortened(term)}' is no variable", hint)
+                raise MistakeError(f"'{shortened(term)}' is not a variable", hint)
 
     def _every(self, section: str, tag: str) -> Iterator[ElementView]:
         for found in self._root.children(section):
@@ -297,20 +298,22 @@ class _Xcsp21Reader:
 def read_relation(element: ElementView, costs: CostReader) -> ForeignTable | AsymmetricTable:
     """Return a relation. Raises `MistakeError`.
 
-    A cost holds for all following tuples until the next one. The last of equal tuples wins, as with FRODO. Where there
-    is no `defaultCost`, tuples that are not listed are forbidden.
+    A cost applies to all following tuples until the next cost. Of equal tuples the last one counts, as in FRODO.
+    Without `defaultCost`, unlisted tuples are forbidden.
     """
     semantics = element.attribute("semantics")
     element.ignore_attributes("nbTuples")
     if semantics not in _SEMANTICS:
-        raise MistakeError(f"the semantics '{shortened(semantics)}'", f"known are {' '.join(_SEMANTICS)}")
+        what = f"the semantics '{shortened(semantics)}' is not valid"
+        raise MistakeError(what, f"write one of {' '.join(_SEMANTICS)}")
     if semantics == "soft":
         return _soft(element, costs)
     listed, other = (_ZERO, INFINITE) if semantics == "supports" else (INFINITE, _ZERO)
     found: dict[tuple[int, ...], Price] = {}
     for cost, values in split_tuples(element.text()):
         if cost:
-            raise MistakeError(f"the cost {shortened(cost)} in a {semantics} relation", 'write semantics="soft"')
+            what = f"a relation with semantics {semantics} cannot have the cost {shortened(cost)}"
+            raise MistakeError(what, 'write semantics="soft"')
         found[_values(values)] = listed
     return _table(element, found, other)
 
@@ -328,7 +331,8 @@ def _soft(element: ElementView, costs: CostReader) -> ForeignTable | AsymmetricT
         if not now:
             raise MistakeError(f"the tuple '{shortened(text.strip())}' has no cost", "write cost:tuple, 5:1 2|3:2 2")
         if len(now) > 2 or (first and (len(now) > 1) != bool(second)):  # noqa: PLR2004 - one for each side
-            raise MistakeError(f"the costs '{shortened(cost)}'", "one cost a tuple, or two everywhere: one a side")
+            what = f"the number of costs in '{shortened(cost)}' is not valid"
+            raise MistakeError(what, "write one cost for each tuple, or two for each tuple: one for each agent")
         values = _values(text)
         if values:
             first[values] = now[0]
@@ -345,7 +349,8 @@ def _table(element: ElementView, costs: dict[tuple[int, ...], Price], default: P
     for values in costs:
         if len(values) != arity:
             shown = " ".join(map(str, values))
-            raise MistakeError(f"the tuple '{shortened(shown)}' has {len(values)} values, others {arity}", "mend it")
+            what = f"the tuple '{shortened(shown)}' has {len(values)} values, but other tuples have {arity}"
+            raise MistakeError(what, "write one value for each variable")
     return ForeignTable(name, arity, costs, default)
 
 
@@ -360,9 +365,9 @@ def read_formula(element: ElementView) -> Predicate | Function:
     functional = formula.child("functional") if formula else None
     if formula is None or functional is None:
         others = next((form for form in _OTHER_FORMS if formula and formula.has(form)), "")
-        wrong = f"an expression in the form {others}" if others else "no expression"
-        raise MistakeError(f"'{shortened(name)}' has {wrong}", "write <expression><functional>")
-    formula.ignore(*_OTHER_FORMS)  # say the same
+        wrong = f"only an expression in the form {others}" if others else "no expression"
+        raise MistakeError(f"'{shortened(name)}' has {wrong}", "write it as <expression><functional>")
+    formula.ignore(*_OTHER_FORMS)  # other forms of the same expression
     if function:
         element.ignore_attributes("return")
     formals = _parameters(parameters.text() if parameters else "")
@@ -373,9 +378,9 @@ def read_formula(element: ElementView) -> Predicate | Function:
 def _parameters(text: str) -> tuple[str, ...]:
     words = text.split()
     if len(words) % 2 or any(word != "int" for word in words[::2]):
-        raise MistakeError(f"the parameters '{shortened(text.strip())}'", "write int X int Y")
+        raise MistakeError(f"the parameters '{shortened(text.strip())}' are not valid", "write int X int Y")
     if len(set(words[1::2])) < len(words) // 2:
-        raise MistakeError(f"a parameter stands twice in '{shortened(text.strip())}'", "give each its own name")
+        raise MistakeError(f"duplicate parameter in '{shortened(text.strip())}'", "rename one of them")
     return tuple(words[1::2])
 
 
@@ -391,7 +396,7 @@ def expression(text: str, names: tuple[str, ...], wanted: Type) -> Expression:
 
 @contextmanager
 def _with_line(element: ElementView) -> Iterator[None]:
-    """Give a `MistakeError` raised inside the line of `element`, if it has none."""
+    """Add the line of `element` to a `MistakeError` without a line."""
     try:
         yield
     except MistakeError as mistake:

@@ -1,4 +1,4 @@
-"""From an `Instance` to a team: names that are allowed here, owners of variables, costs as integers of one unit."""
+"""From an `Instance` to a team: valid names, owners of variables, costs as integers of one unit."""
 
 from __future__ import annotations
 
@@ -39,20 +39,18 @@ from robochoc.model.problem import ProblemKind
 
 
 def to_team(instance: Instance, dialect: str, options: ImportOptions) -> ImportResult:
-    """Return the team of `instance`, and what was mapped.
+    """Return the team of `instance`, and notes on the differences.
 
     Raises:
-        InvalidInputError: if something has no counterpart here.
+        InvalidInputError: if a part of the instance has no counterpart in a team.
     """
     return _TeamBuilder(instance, options).imported(dialect)
 
 
 class _TeamBuilder:
-    """An instance on its way to a team."""
-
     def __init__(self, instance: Instance, options: ImportOptions) -> None:
         if not instance.variables:
-            refuse(instance.file, 0, "has no variable", "there is nothing to decide")
+            refuse(instance.file, 0, "has no variables", "declare at least one in <variables>")
         self._instance = instance
         self._options = options
         self._names = NameMap()
@@ -96,7 +94,7 @@ class _TeamBuilder:
     # Owners
 
     def _with_owners(self) -> dict[str, list[str]]:
-        """Return the variables of each agent, by their original names, and the agents in their order."""
+        """Return the variables of each agent by their original names, with the agents in the order of the file."""
         instance = self._instance
         owner = {one.name: one.owner for one in instance.variables.values()}
         agents = list(dict.fromkeys([*instance.agents, *filter(None, owner.values())]))
@@ -108,17 +106,17 @@ class _TeamBuilder:
             agent = owner[name] or next((agent for agent in agents if agent in seen[name]), agents[0])
             owned[agent].append(name)
             if not owner[name]:
-                self._notes.append(ConversionNote("shared variable", f"{name} is owned by {agent} from now on"))
+                self._notes.append(ConversionNote("shared variable", f"{name} has no owner in the file: now {agent}"))
         return owned
 
     def _owned_by_names(self) -> dict[str, list[str]]:
-        """Return a robot for each variable, or for each group that `--owner` makes of their names."""
+        """Return one robot for each variable, or for each group of variables by `--owner`."""
         owned: dict[str, list[str]] = defaultdict(list)
         for name in self._instance.variables:
             found = re.search(self._options.owner, name) if self._options.owner else None
             owned[(found[1] if found.re.groups else found[0]) if found else name].append(name)
-        what = "by their names (--owner)" if self._options.owner else "one each"
-        self._notes.append(ConversionNote("owners", f"variables have no agents in the file: robots own them, {what}"))
+        what = "robots own them by their names (--owner)" if self._options.owner else "each gets its own robot"
+        self._notes.append(ConversionNote("owners", f"variables have no agents in the file: {what}"))
         return owned
 
     def _variable(self, name: str) -> Variable:
@@ -136,7 +134,7 @@ class _TeamBuilder:
 
     def _units(self) -> CostUnits:
         if self._places:
-            text = f"costs are decimals: inside, 1 stands for {Decimal(1).scaleb(-self._places):f}"
+            text = f"costs are decimals, stored as integers in units of {Decimal(1).scaleb(-self._places):f}"
             self._notes.append(ConversionNote("scale", text))
         if self._instance.maximize:
             self._notes.append(ConversionNote("maximize", "the sum is maximised"))
@@ -148,7 +146,7 @@ class _TeamBuilder:
     # Constraints
 
     def _constraints(self, one: ForeignConstraint) -> Iterator[tuple[str, Constraint]]:
-        """Yield a constraint, and the robot that alone knows of it; an empty text where all of its robots do."""
+        """Yield the constraints for one constraint, each with the only robot that knows it, or an empty text."""
         if isinstance(one.content, AsymmetricTable):
             yield from self._asymmetric_parts(one, one.content)
             return
@@ -156,20 +154,20 @@ class _TeamBuilder:
 
     def _asymmetric_parts(self, one: ForeignConstraint, sides: AsymmetricTable) -> Iterator[tuple[str, Constraint]]:
         if len(one.scope) != 2:  # noqa: PLR2004 - a cost for each of two variables
-            message = f"two costs a tuple, but {len(one.scope)} variables in '{shortened(one.name)}'"
-            refuse(one.file, one.line, message, "asymmetric costs are for constraints of two variables")
+            message = f"'{shortened(one.name)}' has two costs for each tuple, but {len(one.scope)} variables"
+            refuse(one.file, one.line, message, "use asymmetric costs only for constraints on two variables")
         for variable, table in zip(one.scope, (sides.first, sides.second), strict=True):
             apart = self._owner[one.scope[0]] != self._owner[one.scope[1]]
             yield self._owner[variable] if apart else "", self._constraint(one, table)
 
     def _private_agent(self, one: ForeignConstraint) -> str:
-        """Return the robot that alone knows of a constraint with another. Empty: there is none."""
+        """Return the only robot that knows a constraint with another robot, or an empty text."""
         owners = {self._owner[name] for name in one.scope}
         if not one.private_agent:
             return ""
         if one.private_agent not in owners:
-            what = f"constraint '{shortened(one.name)}' is known to {shortened(one.private_agent)} alone"
-            refuse(one.file, one.line, f"{what}, who owns none of its variables", "let an agent of its scope know it")
+            what = f"the constraint '{shortened(one.name)}' is known only to {shortened(one.private_agent)}, which owns"
+            refuse(one.file, one.line, f"{what} none of its variables", "name an agent that owns one of them")
         if len(owners) == 1:
             return ""
         if len(one.scope) > 2 or _is_function(one):  # noqa: PLR2004 - partially known constraints are binary
@@ -192,7 +190,7 @@ class _TeamBuilder:
 
 
 class _Definitions:
-    """Relations, predicates and functions, each under a name of its own."""
+    """Relations, predicates and functions with unique names."""
 
     def __init__(self, in_units: Callable[[Price], float]) -> None:
         self._in_units = in_units
@@ -201,7 +199,7 @@ class _Definitions:
         self._relations: dict[int, tuple[ForeignTable, Relation]] = {}
 
     def formula(self, definition: Predicate | Function) -> Predicate | Function:
-        """Return `definition` under a name that no other has."""
+        """Return `definition` with a unique name."""
         if isinstance(definition, GlobalPredicate):
             return definition
         if definition not in self._formulas:
@@ -209,7 +207,7 @@ class _Definitions:
         return self._formulas[definition]
 
     def relation(self, table: ForeignTable, arity: int) -> Relation:
-        """Return the relation that `table` is: a soft one only where a cost is neither 0 nor infinite."""
+        """Return `table` as a relation, which is soft only if a cost is neither 0 nor infinite."""
         if id(table) not in self._relations:
             self._relations[id(table)] = table, self._relation(table, arity)
         return self._relations[id(table)][1]
@@ -233,7 +231,7 @@ class _Definitions:
 
 
 def _agents_that_see(instance: Instance, owner: Mapping[str, str]) -> Mapping[str, set[str]]:
-    """Return, for each variable that nobody owns, the agents that have constraints on it."""
+    """Return, for each variable without an owner, the agents with constraints on it."""
     seen: dict[str, set[str]] = defaultdict(set)
     for one in instance.constraints:
         for name in one.scope:
@@ -243,7 +241,7 @@ def _agents_that_see(instance: Instance, owner: Mapping[str, str]) -> Mapping[st
 
 
 def _all_prices(instance: Instance) -> Iterator[Price]:
-    """Yield every cost, those of a table once."""
+    """Yield every cost; the costs of a shared table are yielded once."""
     yield instance.constant
     met: set[int] = set()
     for one in instance.constraints:
@@ -274,5 +272,5 @@ def _places(price: Price) -> int:
 
 
 def without_blanks(name: str) -> str:
-    """Return `name` without blanks, as names of domains, definitions and constraints are."""
+    """Return `name` with blanks replaced, as a name of a domain, definition or constraint."""
     return re.sub(r"\s+", "_", name) or "_"

@@ -1,4 +1,4 @@
-"""A team's whole problem as one XCSP3 file, which ACE, Choco and other solvers read (https://xcsp.org)."""
+"""Write a team's problem as one XCSP3 file for ACE, Choco and other solvers (https://xcsp.org)."""
 
 from __future__ import annotations
 
@@ -18,17 +18,20 @@ from robochoc.solver.weighted import MAX_CODE
 
 
 def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
-    """Return the merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
+    """Return the merged problem of `team` as an XCSP3-core document: tables over the original values, and allDifferent.
 
-    Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. Those without one are parts
-    of predicates that are too wide for one table. With costs it is a COP: what soft constraints charge are variables
-    too, and their sum is to be minimised, or maximised where the team does.
-    Costs are integers in the team's unit, as a `note` says where that is not 1; one further variable stands for their
-    constant part. To export many teams, one may lend a `solver`.
+    Variables get names that XCSP3 allows; the attribute `note` names the variable of the team and its robot. Variables
+    without a note are parts of predicates that are too wide for one table. A problem with costs becomes a COP: the cost
+    of each soft constraint is a variable, and the sum of these is minimised, or maximised as in the team. Costs are
+    integers in the team's unit, which a `note` states unless it is 1; one more variable is their constant part.
+
+    Args:
+        team: The team.
+        solver: A running process to use, for the export of many teams. None: start one.
 
     Raises:
-        UnsupportedError: if the team has what XCSP3 has not.
-        SolverLostError: if pycsp3, which writes it in a process of its own, fails.
+        UnsupportedError: if XCSP3 lacks a feature of the team.
+        SolverLostError: if pycsp3, which writes the document in its own process, fails.
     """
     team = normalized(team)
     network, costs = _as_told(team, *team_network(team))
@@ -48,13 +51,16 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
 
 
 def _as_told(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes]:
-    """Return a network of normalised costs with the costs that the user has: negated, and with their constant."""
+    """Return a network of normalised costs with the user's costs: negated if maximised, and with their constant."""
     sign = -1 if team.told_in.maximize else 1
     constant = flat_units(team).constant
     if team.kind != ProblemKind.DISWCSP or (sign == 1 and not constant):
         return network, costs
     if abs(constant) > MAX_CODE:
-        raise UnsupportedError(f"{team.name} has a constant cost of {constant:,}, too much for XCSP3's solvers")
+        raise UnsupportedError(
+            f"{team.name} has a constant cost of {constant:,}, but XCSP3's solvers support at most {MAX_CODE:,}: use a"
+            " smaller constant"
+        )
     paid = set(costs)
     domains = [
         tuple(sorted(sign * value for value in domain)) if place in paid else domain

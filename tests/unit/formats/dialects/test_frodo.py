@@ -72,7 +72,7 @@ def test_costs_of_zero_and_infinity_are_satisfaction(tmp_path: Path) -> None:
 def test_decimals_are_told_with_their_scale(tmp_path: Path) -> None:
     found = imported(frodo(soft("0.125: 1 1", 'defaultCost="3"')), tmp_path)
     assert found.team.robots[0].costs.places == 3
-    assert ("scale", "costs are decimals: inside, 1 stands for 0.001") in found.notes
+    assert ("scale", "costs are decimals, stored as integers in units of 0.001") in found.notes
 
 
 def test_costs_from_a_number_on_forbid(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_shared_variable_gets_an_owner(tmp_path: Path) -> None:
     )
     found = imported(text, tmp_path)
     assert found.team.owner["z"] == "b"
-    assert ("shared variable", "z is owned by b from now on") in found.notes
+    assert ("shared variable", "z has no owner in the file: now b") in found.notes
 
 
 def test_agents_without_variables_are_left_out(tmp_path: Path) -> None:
@@ -178,13 +178,13 @@ def test_one_file_an_agent_counts_copies_once(tmp_path: Path) -> None:
     for file in files:
         file.write_text(SPLIT.format(me=file.stem, cost=3))
     assert optimum(read_foreign(files, ImportOptions()).team) == 3
-    with pytest.raises(InvalidInputError, match="the file of b is not here"):
+    with pytest.raises(InvalidInputError, match="the file of agent b, which owns y, is missing"):
         read_foreign(files[:1], ImportOptions())
     files[1].write_text(SPLIT.format(me="b", cost=2))
-    with pytest.raises(InvalidInputError, match="constraint 'c' costs otherwise"):
+    with pytest.raises(InvalidInputError, match="the constraint 'c' has different costs"):
         read_foreign(files, ImportOptions())
     files[1].write_text(SPLIT.format(me="a", cost=3))
-    with pytest.raises(InvalidInputError, match="is the file of agent a, and so is"):
+    with pytest.raises(InvalidInputError, match="is a second file of agent a; the first is"):
         read_foreign(files, ImportOptions())
 
 
@@ -194,25 +194,25 @@ RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
 @looped(
     ("old", "new", "message"),
     [
-        ("</variables>", RANDOM, "the random variable 'w': stochastic problems are not read"),
+        ("</variables>", RANDOM, "the random variable 'w': stochastic problems are not supported"),
         ("<relations>", '<probabilities><probability name="q"/></probabilities><relations>', "the probability 'q'"),
-        ("1..3<", "1.5 2<", "the value 1.5 is no integer (domains here are integers: scale them)"),
-        ("1..3<", "-infinity..3<", "'-infinity..3' is no integer"),
-        ("1..3<", "1..999999999<", "a domain of more than 100000 values"),
+        ("1..3<", "1.5 2<", "the value 1.5 is not an integer (scale the values to integers)"),
+        ("1..3<", "-infinity..3<", "'-infinity..3' is not an integer"),
+        ("1..3<", "1..999999999<", "the domain has more than 100000 values"),
         ("1..3<", "<", "the domain of 'xa' is empty"),
-        ("4: 1 1", "-infinity: 1 1", "-infinity among costs ('infinity' forbids; nothing is infinitely good)"),
-        ("4: 1 1", "NaN: 1 1", "'NaN' is no cost"),
+        ("4: 1 1", "-infinity: 1 1", "the cost -infinity would be better than all others (write a number"),
+        ("4: 1 1", "NaN: 1 1", "'NaN' is not a cost"),
         ("4: 1 1", "0.00000000001: 1 1", "has 11 decimal places"),
         ("4: 1 1", "1 1", "the tuple '1 1' has no cost"),
-        ("4: 1 1", "4: 1 1 1", "has 2 values, others 3"),
+        ("4: 1 1", "4: 1 1 1", "has 2 values, but other tuples have 3"),
         ('reference="r"', 'reference="s"', "there is no 's' (known relations, predicates and functions: r)"),
         ('scope="xa xb"', 'scope="xa xc"', "there is no variable 'xc'"),
-        ('scope="xa xb"', 'scope="xa"', "1 variables in the scope, but tuples of 2 values in 'r'"),
-        ('name="c"', 'name="c" agent="e"', "constraint 'c' is known to e alone, who owns none of its variables"),
-        ('reference="r"', 'reference="global:circuit"', "the global constraint 'circuit' (known are allDifferent"),
+        ('scope="xa xb"', 'scope="xa"', "the scope has 1 variables, but tuples of 'r' have 2 values"),
+        ('name="c"', 'name="c" agent="e"', "the constraint 'c' is known only to e, which owns none of its variables"),
+        ('reference="r"', 'reference="global:circuit"', "the global constraint 'circuit' is not supported (use one of allDifferent"),
         ('domain="d"', 'domain="e"', "there is no domain 'e'"),
         ("<relations>", "<routes/><relations>", "<routes> is not supported in <instance>"),
-        ('<agent name="b"/>', '<agent name="a"/>', "a second agent 'a'"),
+        ('<agent name="b"/>', '<agent name="a"/>', "duplicate agent 'a'"),
     ],
 )
 def test_what_is_refused_is_named(old: str, new: str, message: str, tmp_path: Path) -> None:
@@ -227,7 +227,7 @@ def test_expressions_in_other_forms_are_refused(tmp_path: Path) -> None:
             "</functional></expression></p", "</infix></expression></p"
         )
     )
-    assert "'p' has an expression in the form infix" in refused(text, tmp_path)
+    assert "'p' has only an expression in the form infix" in refused(text, tmp_path)
 
 
 def test_a_unit_of_costs_divides_them(tmp_path: Path) -> None:
@@ -286,7 +286,7 @@ def test_costs_and_values_beyond_32_bits_are_refused() -> None:
     assert written("frodo", team_of(1, 2**31 - 3))
     with pytest.raises(UnsupportedError, match="costs may add up to 2,147,483,648, but"):
         written("frodo", team_of(1, 2**31 - 1))
-    with pytest.raises(UnsupportedError, match="the value 2,147,483,649 of x is beyond"):
+    with pytest.raises(UnsupportedError, match="the value 2,147,483,649 of x is too large"):
         written("frodo", team_of(2**31 - 1, 1))
 
 

@@ -100,12 +100,12 @@ def test_what_frodo_has_too_is_exported_as_it_was(kind: str, parameters: str, tm
     [
         ("weightedSum", "[ {1 V0} ] <foo/> 3", "'<foo/>' where <eq/> or <ne/>"),
         ("weightedSum", "[ {1 V0 ] <eq/> 3", "']' where '}' should stand"),
-        ("weightedSum", "[ {1 V9} ] <eq/> 3", "'V9' is no variable"),
+        ("weightedSum", "[ {1 V9} ] <eq/> 3", "'V9' is not a variable"),
         ("element", "V0 [ 1 2", "the end where a variable or an integer should stand"),
-        ("allDifferent", "[ V0 V1 ] V2", "'V2' where the end should stand"),
+        ("allDifferent", "[ V0 V1 ] V2", "have 'V2', expected the end"),
         ("cumulative", "[ {V0 1} ] 1", "{origin duration end height}, in which one may be <nil/>"),
         ("cumulative", "[" + "{V0 1 1}" * 101 + "] 1", "global:cumulative over 26 of them"),
-        ("allDifferent", "[" + " V0" * 501 + "]", "global:allDifferent over 501 terms"),
+        ("allDifferent", "[" + " V0" * 501 + "]", "global:allDifferent has 501 terms"),
         ("allDifferent", "[" + " V0" * 9000 + "]", "global:allDifferent has too many parameters"),
     ],
 )

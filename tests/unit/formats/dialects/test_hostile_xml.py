@@ -35,14 +35,14 @@ HOSTILE = {
     "cut off": (f"<instance>{FRODO}<domains>", "is not well-formed XML"),
     "deep": (f"<instance>{FRODO}{'<domains>' * 9999}</instance>", "is not well-formed XML"),
     "huge range": (f"<instance>{FRODO}{DOMAIN.format('0..999999999999999999')}</instance>", "more than 100000 values"),
-    "many digits": (f"<instance>{FRODO}{DOMAIN.format('9' * 100_000)}</instance>", "is no integer"),
+    "many digits": (f"<instance>{FRODO}{DOMAIN.format('9' * 100_000)}</instance>", "is not an integer"),
     "huge counts": (f"<instance>{FRODO}{DOMAIN.format('1')}<variables nbVariables='999999999999'/></instance>",
         "has no variable"),
     "huge cost": (f"<instance>{FRODO}{DOMAIN.format('1')}{VARIABLE}{RELATION.format('1e99:1')}</instance>",
         "the cost 1e99 is too large"),
     "huge arity": (
         f"<instance>{FRODO}{DOMAIN.format('1')}{VARIABLE}{RELATION.format('').replace('1', '9' * 12)}{CONSTRAINT}",
-        "tuples of 999999999999 values",
+        "have 999999999999 values",
     ),
     "deep expression": (f"<instance>{FRODO}{PREDICATE.format('not(' * 900 + 'eq(X,1)' + ')' * 900)}</instance>",
         "nested too deep"),
@@ -79,7 +79,7 @@ def test_what_is_no_file_is_not_recognised(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo)
     assert recognise(fifo) is recognise(tmp_path) is recognise(tmp_path / "nowhere") is None
-    with pytest.raises(InvalidInputError, match="is of no format that is read here"):
+    with pytest.raises(InvalidInputError, match="has an unknown format"):
         read_foreign([fifo], ImportOptions())
 
 

@@ -98,7 +98,7 @@ def test_two_files_are_two_problems(tmp_path: Path) -> None:
     files = [tmp_path / "one.xml", tmp_path / "two.xml"]
     for file in files:
         file.write_text(xdiscsp(over("X1.1 X2.1"), SOFT))
-    with pytest.raises(InvalidInputError, match=r"two\.xml: is a whole problem by itself"):
+    with pytest.raises(InvalidInputError, match=r"two\.xml: is a second problem"):
         read_foreign(files, ImportOptions())
 
 
@@ -142,7 +142,7 @@ def test_what_cannot_be_written_is_refused_by_name() -> None:
     for team, message in (
         (team_with(_soft(-1)), "integer costs of 0 or more, but c has -1"),
         (team_with(_soft(1), CostUnits(places=1)), "integer costs of 0 or more, but c has 0.1"),
-        (team_with(_soft(1), CostUnits(maximize=True)), "has no utilities"),
+        (team_with(_soft(1), CostUnits(maximize=True)), "does not support utilities"),
         (team_with(Constraint("c", function, scope, scope)), "c over xa xb xc has 8,000,000 combinations"),
     ):
         with pytest.raises(UnsupportedError, match=message):
