@@ -124,9 +124,9 @@ def merge(instances: Sequence[Instance]) -> Instance:
                 result.constraints.append(constraint)
             elif not _same(first, constraint):
                 if not (is_hard(first) and is_hard(constraint)):
-                    hint = f"rename it, or write the costs of {first.file}:{first.line}"
+                    what = f"the constraint '{shortened(constraint.name)}' has different costs"
                     refuse(
-                        one.file, constraint.line, f"the constraint '{shortened(constraint.name)}' has different costs", hint
+                        one.file, constraint.line, what, f"rename it, or write the costs of {first.file}:{first.line}"
                     )
                 result.constraints.append(constraint)
     return result

@@ -209,7 +209,11 @@ RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
         ('scope="xa xb"', 'scope="xa xc"', "there is no variable 'xc'"),
         ('scope="xa xb"', 'scope="xa"', "the scope has 1 variables, but tuples of 'r' have 2 values"),
         ('name="c"', 'name="c" agent="e"', "the constraint 'c' is known only to e, which owns none of its variables"),
-        ('reference="r"', 'reference="global:circuit"', "the global constraint 'circuit' is not supported (use one of allDifferent"),
+        (
+            'reference="r"',
+            'reference="global:circuit"',
+            "the global constraint 'circuit' is not supported (use one of allDifferent",
+        ),
         ('domain="d"', 'domain="e"', "there is no domain 'e'"),
         ("<relations>", "<routes/><relations>", "<routes> is not supported in <instance>"),
         ('<agent name="b"/>', '<agent name="a"/>', "duplicate agent 'a'"),
