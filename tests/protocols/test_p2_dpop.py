@@ -128,9 +128,9 @@ class Probe(P2DPOP):
     group = ToyGroup
     roots: ClassVar[list[tuple[int, str]]] = []
 
-    def _take(self, place: int) -> None:
+    def _choose(self, place: int) -> None:
         Probe.roots.append((self.turn, self.problem.agent))
-        super()._take(place)
+        super()._choose(place)
 
 
 def test_each_robot_is_the_root_in_one_turn_and_spare_turns_are_of_one_robot() -> None:

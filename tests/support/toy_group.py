@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from robochoc.protocols.private.ed25519 import NO_ELEMENT, Group, Secret
+from robochoc.protocols.private.ed25519 import NO_ELEMENT, PrimeGroup, Secret
 
 PRIME = (1 << 61) - 1
 
 
-class ToyGroup(Group):
+class ToyGroup(PrimeGroup):
     """The numbers below a prime, added."""
 
     size = 8

@@ -1,13 +1,13 @@
-"""Pseudo-trees that robots build without names: no message names a robot, or says how many neighbours one has.
+"""Pseudo-trees that robots build without names: messages contain no names of robots, nor numbers of neighbours.
 
 As in `shared/dfs.py` a root is elected by waves of all candidates (the echo algorithm with extinction; Tel,
 "Introduction to Distributed Algorithms", 2nd edition, 2000, Section 7.2), and a token goes depth first from there. The
-differences, for privacy: a candidate is known by a random score, which says nothing of its name or degree; the token
-names nobody, so it bounces off robots that it has visited (Cheung, IEEE TSE 9(4), 1983), two more messages for each
-edge outside the tree; and a robot sends it to its neighbours in a random order.
+differences, for privacy: a candidate has a random score, which reveals neither its name nor its degree; the token
+contains no names, so it bounces off visited robots (Cheung, IEEE TSE 9(4), 1983), two more messages for each edge
+outside the tree; and a robot sends it to its neighbours in a random order.
 
-A robot that gets the token again is above its sender: a neighbour below that was visited has sent the token here
-itself before.
+A robot that receives the token again is above its sender: a visited neighbour below it would have sent the token here
+before.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Wave(Message, frozen=True):
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
-        return f"somebody whose score begins with {self.score[:2].hex()} wants to be the root"
+        return f"a robot whose score begins with {self.score[:2].hex()} wants to be the root"
 
 
 class Token(Message, frozen=True):
     """The token of the depth-first search; a receiver that it has not visited becomes the sender's child."""
 
-    act = Act(Performative.REQUEST, "the receiver is to go on with the tree")
+    act = Act(Performative.REQUEST, "the receiver continues the tree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -48,9 +48,9 @@ class Token(Message, frozen=True):
 
 
 class Bounce(Message, frozen=True):
-    """The token comes back at once: the sender is in the tree already, above the receiver."""
+    """The immediate return of the token: the sender is already in the tree, above the receiver."""
 
-    act = Act(Performative.REFUSE, "the sender is in the tree already")
+    act = Act(Performative.REFUSE, "the sender is already in the tree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -60,7 +60,7 @@ class Bounce(Message, frozen=True):
 class Back(Message, frozen=True):
     """The token on its way back: all robots below the sender are in the tree."""
 
-    act = Act(Performative.INFORM, "what `Token` asked for is done")
+    act = Act(Performative.INFORM, "the request of `Token` is done")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -72,11 +72,11 @@ AnonymousTreeMessage = Wave | Token | Bounce | Back
 
 
 SCORE = 16
-"""Bytes: two robots have the same score once in 2^128 pairs."""
+"""The bytes of a score: two robots have the same score once in 2^128 pairs."""
 
 
 class AnonymousTreeProtocol(TreeProtocol):
-    """One agent that takes its place in a pseudo-tree without names, and then runs a protocol on it."""
+    """One agent that finds its place in a pseudo-tree without names, and then runs a protocol on it."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -88,10 +88,10 @@ class AnonymousTreeProtocol(TreeProtocol):
 
     @abstractmethod
     def start_in_tree(self) -> None:
-        """Begin the search; the place in the tree is known."""
+        """Start the search; the place in the tree is known."""
 
     def leave_tree(self) -> None:
-        """Forget the place in the tree, but not who was elected: the next tree is another root's."""
+        """Forget the place in the tree, but not the election: the next tree has another root."""
         self.parent = None
         self.pseudo_parents = self.children = self.pseudo_children = ()
         self.placed = False
@@ -100,7 +100,7 @@ class AnonymousTreeProtocol(TreeProtocol):
         self._to_visit = []
 
     def start(self) -> None:
-        """Start the own election wave; a robot with an empty domain ends the search."""
+        """Start this robot's election wave; a robot with an empty domain ends the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -123,18 +123,18 @@ class AnonymousTreeProtocol(TreeProtocol):
             case Bounce():
                 self._met.add(sender)
                 self.pseudo_parents = self._sorted((*self.pseudo_parents, sender))
-                self._pass_on()
+                self._send_token()
             case Back():
-                self._pass_on()
+                self._send_token()
             case _ if self.placed:
                 self.handle(sender, message)
             case _:
                 self._early.append((sender, message))
 
     def _process_wave(self, sender: str, score: bytes) -> None:
-        """Prefer the candidate with the higher score; its wave goes back once it has come from all neighbours."""
+        """Prefer the candidate with the higher score; return its wave once it has arrived from all neighbours."""
         if len(score) != SCORE:
-            raise ValueError(f"a score of {len(score)} bytes")
+            raise ValueError(f"{sender} sent a score of {len(score)} bytes; it must have {SCORE}")
         if score > self._score:
             self._score, self._from, self._returned = score, sender, set()
             for name in self.problem.neighbours:
@@ -158,14 +158,14 @@ class AnonymousTreeProtocol(TreeProtocol):
         self.send(sender, Bounce())
 
     def enter(self, parent: str | None) -> None:
-        """Take the first visit of the token; the root begins with one from nobody."""
+        """Process the first visit of the token; the root starts with a visit from no robot."""
         self._visited = True
         self.parent = parent
         self._met.update([] if parent is None else [parent])
         self._to_visit = shuffled([name for name in self.problem.neighbours if name != parent], self.secret)
-        self._pass_on()
+        self._send_token()
 
-    def _pass_on(self) -> None:
+    def _send_token(self) -> None:
         """Send the token to a neighbour that may not be in the tree, or back if there is none."""
         while self._to_visit and self._to_visit[-1] in self._met:
             self._to_visit.pop()
@@ -175,10 +175,10 @@ class AnonymousTreeProtocol(TreeProtocol):
             self.children = (*self.children, child)
             self.send(child, Token())
             return
-        self._take_place()
+        self._complete_subtree()
 
-    def _take_place(self) -> None:
-        """The whole subtree is in the tree: begin."""
+    def _complete_subtree(self) -> None:
+        """Set the place in the tree, and start the search: the whole subtree is in the tree."""
         above = {*self.ancestors}
         self.children = self._sorted(name for name in self.children if name not in above)
         known = above | {*self.children}

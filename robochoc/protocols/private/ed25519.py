@@ -1,7 +1,7 @@
-"""The group that private protocols encrypt in: the points of prime order of Edwards25519, by libsodium.
+"""The group in which private protocols encrypt: the points of prime order of Edwards25519, by libsodium.
 
-It is the one module that knows PyNaCl (the extra `private`), which wraps libsodium. Points and scalars are 32 bytes
-that nobody else looks into. What libsodium does not take, a point off the curve or of low order, is a `ValueError`.
+Only this module uses PyNaCl (the extra `private`), which wraps libsodium. Points and scalars are 32 bytes, opaque to
+other modules. Points that libsodium rejects, off the curve or of low order, cause a `ValueError`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 NEEDS = ("nacl", "pip install 'robochoc[private]'")
 """The module of PyNaCl, and how to install it (`Traits.needs`)."""
-NO_ELEMENT = "these bytes are no element of the group"
+NO_ELEMENT = "these bytes are not an element of the group"
 Secret = Callable[[int], int]
 """`Protocol.secret`."""
 
 
-class Group(ABC):
+class PrimeGroup(ABC):
     """A group of prime order in which discrete logarithms are hard, written additively."""
 
     size: int
@@ -34,7 +34,7 @@ class Group(ABC):
 
     @abstractmethod
     def scalar(self, secret: Secret) -> bytes:
-        """Draw a scalar; each is as likely as any other."""
+        """Draw a scalar; all are equally likely."""
 
     @abstractmethod
     def multiple(self, scalar: bytes) -> bytes:
@@ -42,23 +42,23 @@ class Group(ABC):
 
     @abstractmethod
     def times(self, scalar: bytes, element: bytes) -> bytes:
-        """Return `element`, `scalar` times. Raises `ValueError` for what is no element."""
+        """Return `element`, `scalar` times. Raises `ValueError` if it is not an element."""
 
     @abstractmethod
     def check(self, element: bytes) -> None:
-        """Raise `ValueError` for what is no element, or the neutral one."""
+        """Raise `ValueError` unless `element` is an element, and not the neutral one."""
 
     @abstractmethod
     def plus(self, first: bytes, second: bytes) -> bytes:
-        """Return the sum of two elements that were checked."""
+        """Return the sum of two checked elements."""
 
     @abstractmethod
     def minus(self, first: bytes, second: bytes) -> bytes:
-        """Return the difference of two elements that were checked."""
+        """Return the difference of two checked elements."""
 
 
-class Ed25519(Group):
-    """Edwards25519 by libsodium. Raises `UnsupportedError` where PyNaCl is not installed."""
+class Ed25519(PrimeGroup):
+    """Edwards25519 by libsodium. Raises `UnsupportedError` if PyNaCl is not installed."""
 
     size = 32
     zero = b"\x01" + bytes(31)
@@ -76,20 +76,20 @@ class Ed25519(Group):
         return bytes(self._sodium.crypto_scalarmult_ed25519_base_noclamp(scalar))
 
     def times(self, scalar: bytes, element: bytes) -> bytes:
-        """Return `element`, `scalar` times. Raises `ValueError` for what is no point of prime order."""
+        """Return `element`, `scalar` times. Raises `ValueError` if it is not a point of prime order."""
         return self._by(self._sodium.crypto_scalarmult_ed25519_noclamp, scalar, element)
 
     def check(self, element: bytes) -> None:
-        """Raise `ValueError` for what is no point of prime order."""
+        """Raise `ValueError` unless `element` is a point of prime order."""
         if len(element) != self.size or not self._sodium.crypto_core_ed25519_is_valid_point(element):
             raise ValueError(NO_ELEMENT)
 
     def plus(self, first: bytes, second: bytes) -> bytes:
-        """Return the sum of two points; some that are none are refused."""
+        """Return the sum of two points; raises `ValueError` for some invalid ones."""
         return self._by(self._sodium.crypto_core_ed25519_add, first, second)
 
     def minus(self, first: bytes, second: bytes) -> bytes:
-        """Return the difference of two points; some that are none are refused."""
+        """Return the difference of two points; raises `ValueError` for some invalid ones."""
         return self._by(self._sodium.crypto_core_ed25519_sub, first, second)
 
     @staticmethod
@@ -101,11 +101,9 @@ class Ed25519(Group):
 
 
 def _bindings() -> ModuleType:
-    """Import PyNaCl. Late: who asks what protocols there are has no use for it."""
+    """Import PyNaCl late: listing protocols does not need it."""
     try:
         from nacl import bindings  # noqa: PLC0415
     except ModuleNotFoundError as missing:
-        raise UnsupportedError(
-            f"this protocol encrypts with PyNaCl, which is not installed; say: {NEEDS[1]}"
-        ) from missing
+        raise UnsupportedError(f"this protocol encrypts with PyNaCl, which is not installed: {NEEDS[1]}") from missing
     return bindings

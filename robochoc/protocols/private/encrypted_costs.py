@@ -1,7 +1,7 @@
-"""Tables of costs that nobody can read: each cell has a cipher for each cost, of whether so much is enough.
+"""Tables of costs that no robot can read: each cell has a cipher for each cost, of whether this cost is sufficient.
 
-A cost is in unary code: bit c says whether a cost of at most c can be had, so an infinite one is all zeros. A known
-cost is added by moving bits up, and of two costs the smaller one has the bits of both: the sum of their ciphers, as a
+A cost is in unary code: bit c says whether a cost of at most c is possible, so an infinite one is all zeros. A known
+cost is added by moving bits up, and the smaller one of two costs has the bits of both: the sum of their ciphers, as a
 sum of bits is 0 only if all are. Two encrypted costs cannot be added.
 """
 
@@ -17,7 +17,7 @@ from robochoc.protocols.private.elgamal import TeamKey
 
 Pair = tuple[bytes, bytes]
 Sources = NDArray[np.intp]
-"""For each own value and each cell of the new table, a cell of the old one."""
+"""For each of this robot's values and each cell of the new table, a cell of the old one."""
 Costs = NDArray[np.float64]
 
 
@@ -30,11 +30,11 @@ class CostCipher:
 
     @property
     def size(self) -> int:
-        """Return the bytes of a cipher."""
+        """The bytes of a cipher."""
         return self._key.size
 
     def encrypted(self, costs: Costs) -> bytes:
-        """Return a table of costs that are known."""
+        """Return the encrypted table of known costs."""
         bits = np.arange(self.levels) >= costs.reshape(-1, 1)
         return b"".join([self._key.encrypt(bit=bool(bit)) for bit in bits.reshape(-1)])
 
@@ -44,11 +44,11 @@ class CostCipher:
         return [pairs[at : at + self.levels] for at in range(0, len(pairs), self.levels)]
 
     def eliminated(self, cells: list[list[Pair]], sources: Sources, costs: Costs) -> bytes:
-        """Return the table of minimum costs over all own values, encrypted anew.
+        """Return the table of minimum costs over all of this robot's values, encrypted again.
 
         Args:
             cells: the old table.
-            sources: where the own value, and the cell of the new table, are in the old one.
+            sources: for each of this robot's values and each cell of the new table, the cell of the old one.
             costs: the costs to be added, in the same shape.
         """
         return b"".join(
@@ -60,7 +60,7 @@ class CostCipher:
         )
 
     def _least(self, cells: list[list[Pair]], column: list[int], added: list[float]) -> list[Pair]:
-        """Return the bits of the smallest of some costs, to each of which a known cost is added."""
+        """Return the bits of the smallest cost in `column`, after the known costs in `added` are added."""
         least: list[Pair | None] = [None] * self.levels
         for cell, cost in zip(column, added, strict=True):
             if cost == INFINITE:
@@ -75,7 +75,7 @@ class CostCipher:
         return self._least(cells, list(range(len(cells))), [0.0] * len(cells))
 
     def prefixes(self, cells: list[list[Pair]], cost: int) -> list[Pair]:
-        """Return, for each cell, whether `cost` is enough in it or in one before it."""
+        """Return, for each cell, whether `cost` is sufficient in it or in a previous one."""
         return list(self._sums(cells, cost))
 
     def _sums(self, cells: list[list[Pair]], cost: int) -> Iterator[Pair]:

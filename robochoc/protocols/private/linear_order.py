@@ -1,8 +1,8 @@
-"""How far costs may go, and how large tables will be: the linear orders of P2-DPOP, before any table is made.
+"""The range of costs and the sizes of tables: the linear orders of P2-DPOP, before any table is made.
 
 There is a linear order for each turn: the circle, from the turn's root round to it. A plan goes along it: the axes of
-the table that will. A robot asks its neighbours which of them are still to come. Constraints whose other robots all
-are will be added by it: so its own table has their axes, and those of the plan but its own.
+the later table. A robot asks its neighbours which of them come later. It will add the constraints whose other robots
+all come later: so its table has their axes, and those of the received plan without its own.
 """
 
 from __future__ import annotations
@@ -32,30 +32,30 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_CIPHERS = 1_000_000
-"""A table of as many takes 64 MB, and each robot about eight minutes in each turn."""
+"""A table with this many takes 64 MB, and each robot about eight minutes in each turn."""
 
 
 class P2DPOPSettings(Settings, frozen=True):
-    """`ciphers`: the number of ciphers that a table may have; a run that needs more ends. `spare`: as for P3/2-DPOP."""
+    """`ciphers`: the most ciphers of a table; a run that needs more ends. `spare`: as for P3/2-DPOP."""
 
     ciphers: int = 20_000
     spare: int = 2
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for numbers that cannot be."""
+        """Raise `ValueError` for numbers outside their range."""
         if not 1 <= self.ciphers <= MOST_CIPHERS:
-            raise ValueError(f"ciphers is a number of ciphers from 1 to {MOST_CIPHERS:,}, not {self.ciphers}")
+            raise ValueError(f"ciphers is {self.ciphers}; it must be from 1 to {MOST_CIPHERS:,}")
         if not 0 <= self.spare <= MOST:
-            raise ValueError(f"spare is a number of turns from 0 to {MOST}, not {self.spare}")
+            raise ValueError(f"spare is {self.spare}; it must be from 0 to {MOST} turns")
 
 
 class CostSum(Message, frozen=True):
-    """Sums over the robots before the receiver in the circle, from a random start: `least` and `range` of costs."""
+    """Sums over the robots before the receiver in the circle, plus random numbers: `least` and `range` of costs."""
 
     least: int
     range: int
 
-    act = Act(Performative.REQUEST, "the receiver is to add how far its costs may go")
+    act = Act(Performative.REQUEST, "the receiver adds the range of its costs")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -63,12 +63,12 @@ class CostSum(Message, frozen=True):
 
 
 class CostRange(Message, frozen=True):
-    """The costs of all robots together are at least `least`, and at most `range` more if no hard constraint breaks."""
+    """All robots together have costs of at least `least`, and at most `range` more if no hard constraint breaks."""
 
     least: int
     range: int
 
-    act = Act(Performative.INFORM, "the receiver learns what all costs may add up to")
+    act = Act(Performative.INFORM, "the receiver learns the range of all robots' costs")
     proves_nothing = True  # about a single robot, if there are three robots or more
 
     def in_words(self, _: Wording) -> str:
@@ -76,12 +76,12 @@ class CostRange(Message, frozen=True):
 
 
 class Plan(Message, frozen=True):
-    """The axes of the table that the sender will send in this turn: codenames, and how many values each has."""
+    """The axes of the sender's table in this turn: codenames, and their numbers of values."""
 
     turn: int
     axes: Shape
 
-    act = Act(Performative.REQUEST, "the receiver is to plan its own table")
+    act = Act(Performative.REQUEST, "the receiver plans its table")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -90,11 +90,11 @@ class Plan(Message, frozen=True):
 
 
 class AskAxis(Message, frozen=True):
-    """Asks a neighbour for its axis in this turn, if it has not planned its own table yet."""
+    """A request for a neighbour's axis in this turn, if the neighbour has not planned its table yet."""
 
     turn: int
 
-    act = Act(Performative.QUERY_REF, "the receiver is asked for the axis of its values")
+    act = Act(Performative.QUERY_REF, "the sender asks for the axis of the receiver's values")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -102,13 +102,13 @@ class AskAxis(Message, frozen=True):
 
 
 class Axis(Message, frozen=True):
-    """The sender is still to come in this turn. `values` are all that it was declared to have, in a random order."""
+    """The axis of a robot that comes later in this turn. `values` are all its declared values, in a random order."""
 
     turn: int
     codename: str
     values: list[Value]
 
-    act = Act(Performative.INFORM, "the receiver learns the axis that it asked for")
+    act = Act(Performative.INFORM, "the receiver learns the requested axis")
     proves_nothing = True  # the files declare these values
 
     def in_words(self, words: Wording) -> str:
@@ -116,7 +116,7 @@ class Axis(Message, frozen=True):
 
 
 class Gone(Message, frozen=True):
-    """The sender stands before the receiver in this turn: constraints between the two are in the table already."""
+    """The sender comes before the receiver in this turn: constraints between the two are already in the table."""
 
     turn: int
 
@@ -131,18 +131,18 @@ T = TypeVar("T", bound=np.generic)
 
 
 class OwnAxis(NamedTuple):
-    """The own axis in one turn: its `codename`, and for each code the place of the value among the declared ones."""
+    """This robot's axis in a turn: its `codename`, and for each code the place of the value among the declared ones."""
 
     codename: str
     order: Sequence[int]
 
     def codes(self, places: Mapping[int, int]) -> dict[int, int]:
-        """Return the codes of own values, each with the value's place in the compiled domain."""
+        """Return the codes of this robot's values, each with the value's place in the compiled domain."""
         return {code: places[place] for code, place in enumerate(self.order) if place in places}
 
 
-class Place(NamedTuple):
-    """The axes of the table that comes, and of the one that goes on; `later` are neighbours still to come."""
+class EliminationStep(NamedTuple):
+    """The axes of the received and of the sent table; `later` are the axes of neighbours that come later."""
 
     incoming: Shape
     outgoing: Shape
@@ -150,12 +150,12 @@ class Place(NamedTuple):
 
     @property
     def cells(self) -> int:
-        """Return the number of cells of the table that goes on."""
+        """The number of cells of the sent table."""
         return cells_of(self.outgoing)
 
 
-def place_after(problem: LocalProblem, own: OwnAxis, incoming: Shape, later: Mapping[str, Axis]) -> Place:
-    """Return the place of a robot that eliminates itself. Axes are in an order that says nothing.
+def step_after(problem: LocalProblem, own: OwnAxis, incoming: Shape, later: Mapping[str, Axis]) -> EliminationStep:
+    """Return the step of a robot that eliminates itself. The order of axes reveals nothing.
 
     Raises:
         ValueError: if a neighbour's axis has another size than the table's.
@@ -165,12 +165,12 @@ def place_after(problem: LocalProblem, own: OwnAxis, incoming: Shape, later: Map
         for agent in agents:
             size = len(later[agent].values)
             if outgoing.setdefault(later[agent].codename, size) != size:
-                raise ValueError(f"a table in which {agent} has another number of values than it says")
-    return Place(incoming, dict(sorted(outgoing.items())), later)
+                raise ValueError(f"the axis of {agent} has {size} values, and another number in the table")
+    return EliminationStep(incoming, dict(sorted(outgoing.items())), later)
 
 
 def own_costs(problem: LocalProblem) -> Costs:
-    """Return what each own value costs whatever other robots do."""
+    """Return the cost of each of this robot's values that does not depend on other robots."""
     own = np.array(problem.charges, np.float64)
     for table in problem.tables({}):
         own = own + table.charges
@@ -178,9 +178,9 @@ def own_costs(problem: LocalProblem) -> Costs:
 
 
 def own_places(problem: LocalProblem) -> dict[int, int]:
-    """Return, for each place among the declared values, the place of the own value; the cheapest, of several.
+    """Return, for each place among the declared values, the place of this robot's value; the cheapest, of several.
 
-    Several look alike only where no neighbour sees any variable. Declared values that the robot cannot take are left
+    Several look alike only if no neighbour sees any variable. Declared values that the robot cannot choose are left
     out.
     """
     costs = own_costs(problem)
@@ -193,8 +193,8 @@ def own_places(problem: LocalProblem) -> dict[int, int]:
     return found
 
 
-def sources(place: Place, codename: str, codes: Sequence[int]) -> Sources:
-    """Return, for each own code and each cell of the table that goes on, the cell of the table that comes."""
+def sources(place: EliminationStep, codename: str, codes: Sequence[int]) -> Sources:
+    """Return, for each of this robot's codes and each cell of the sent table, the cell of the received table."""
     cells = np.arange(cells_of(place.incoming)).reshape(list(place.incoming.values()))
     axes = list(place.incoming)
     cells = cells.take(codes, axes.index(codename)) if codename in axes else cells[..., np.newaxis]
@@ -202,10 +202,10 @@ def sources(place: Place, codename: str, codes: Sequence[int]) -> Sources:
     return np.broadcast_to(spread, (len(codes), *place.outgoing.values())).reshape(len(codes), -1)
 
 
-def costs_to_add(problem: LocalProblem, place: Place, codename: str, indices: Sequence[int]) -> Costs:
-    """Return, for the own values at `indices` and each cell of the table that goes on, what they cost there.
+def costs_to_add(problem: LocalProblem, place: EliminationStep, codename: str, indices: Sequence[int]) -> Costs:
+    """Return, for the own values at `indices` and each cell of the sent table, the costs that are added there.
 
-    That is, the private costs, and those of constraints of which all other robots are still to come.
+    These are the private costs, and those of constraints whose other robots all come later.
     """
     onto = (codename, *place.outgoing)
     added = np.zeros((len(indices), *place.outgoing.values()), np.float64)
@@ -223,10 +223,10 @@ def _aligned(table: NDArray[T], axes: Sequence[str], onto: Sequence[str]) -> NDA
 
 
 CODENAME = 32
-"""Hexadecimal digits."""
+"""The hexadecimal digits of a codename."""
 MOST_AXES = 1_000
 SUM = 1 << 62
-"""Sums of costs are taken modulo this number; they begin with a random one below it."""
+"""Sums of costs are modulo this number; they begin with a random one below it."""
 
 
 class LinearOrderProtocol(RerootingProtocol):
@@ -234,9 +234,9 @@ class LinearOrderProtocol(RerootingProtocol):
 
     State, besides the circle's, in the order in which it becomes known:
 
-    - `costs`: the least that all costs add up to, and how much more it can be;
-    - `step`: how many times an order has been gone through: first once for each turn without tables, then with them;
-    - `axes`, the own axis of each turn, and `places`, the axes of the tables that come and go.
+    - `costs`: the least total cost, and the range above it;
+    - `step`: the number of rounds through an order: first one for each turn without tables, then with them;
+    - `axes`, this robot's axis of each turn, and `places`, the axes of the received and sent tables.
     """
 
     settings: ClassVar[P2DPOPSettings] = P2DPOPSettings()
@@ -246,49 +246,49 @@ class LinearOrderProtocol(RerootingProtocol):
         self.costs: CostRange | None = None
         self.step = 0
         self.axes: dict[int, OwnAxis] = {}
-        self.places: dict[int, Place] = {}
+        self.places: dict[int, EliminationStep] = {}
         self.is_root = False
-        """Of the turn under way."""
+        """Whether this robot is the root of the present turn."""
         self._mask = CostSum(0, 0)
         self._pending: Plan | None = None
         self._answers: dict[str, Axis | None] = {}
-        """Of the neighbours that have answered; None: it comes before this robot."""
+        """The answers of neighbours; None: the neighbour comes before this robot."""
 
     @abstractmethod
     def decide_alone(self) -> None:
-        """Take the best value; there is no neighbour."""
+        """Choose the best value; there is no neighbour."""
 
     @abstractmethod
     def send_first_table(self) -> None:
-        """As the root: send the table of the own axis."""
+        """As the root: send the table of this robot's axis."""
 
     @property
     def spare(self) -> int:
-        """Return the largest number of turns that are played for show."""
+        """The largest number of additional turns, which hide the number of robots."""
         return self.settings.spare
 
     @property
     def turn(self) -> int:
-        """Return the number of the turn under way; it comes twice, first without tables."""
+        """The number of the present turn; each comes twice, first without tables."""
         return self.step % self.turns
 
     @property
     def planning(self) -> bool:
-        """Return whether the turns are still gone through without tables."""
+        """Whether the turns are still executed without tables."""
         return self.step < self.turns
 
     @property
     def cipher(self) -> CostCipher:
-        """Return what encrypts costs. Raises `ValueError` before it is known how far they may go."""
+        """The encryption of costs. Raises `ValueError` before their range is known."""
         _, key = self.in_ring()
         if self.costs is None:
-            raise ValueError("how far costs may go is not known yet")
+            raise ValueError("the range of costs is not known yet")
         return CostCipher(key, self.costs.range + 1)
 
-    # The circle, and how far costs may go
+    # The circle, and the range of costs
 
     def start_in_tree(self) -> None:
-        """Take the place in the circle; the first robot begins. A robot alone takes its best value."""
+        """Enter the circle; the first robot starts. A robot alone chooses its best value."""
         if not self.problem.neighbours:
             self.decide_alone()
             return
@@ -300,38 +300,38 @@ class LinearOrderProtocol(RerootingProtocol):
 
     @property
     def least_own(self) -> int:
-        """Return the least of the private costs."""
+        """The least of the private costs."""
         return int(min([cost for cost in self.problem.charges if cost < INFINITE], default=0))
 
     def _with_own_costs(self, total: CostSum) -> CostSum:
-        """Return the sums with the private costs, and with the constraints of which this robot is the lowest."""
+        """Return the sums with the private costs, and with the constraints whose lowest robot is this one."""
         dearest = max([cost for cost in self.problem.charges if cost < INFINITE], default=0)
         most = dearest + sum(charge for _, charge in self.problem.scopes(self.ancestors))
         check_exact(most)
         return CostSum((total.least + self.least_own) % SUM, (total.range + int(most) - self.least_own) % SUM)
 
     def add_costs(self, total: CostSum) -> None:
-        """Add the own costs; the first robot takes the random numbers out, and tells all."""
+        """Add this robot's costs; the first robot subtracts the random numbers, and sends the result to all."""
         ring, _ = self.in_ring()
         if self.costs is not None:
-            raise ValueError("sums of costs that are known already")
+            raise ValueError("received sums of costs for the second time")
         if not ring.is_first:
             self.send(ring.onward, self._with_own_costs(total))
             return
         least, most = (total.least - self._mask.least) % SUM, (total.range - self._mask.range) % SUM
         check_exact(least + most)
-        self._tell_costs(CostRange(least, most))
+        self._send_costs(CostRange(least, most))
         self.open_ring()
 
     def learn_costs(self, sender: str, costs: CostRange) -> None:
-        """Take what the first robot has found, and tell it below."""
+        """Store the result of the first robot, and send it down."""
         ring, _ = self.in_ring()
         if sender != ring.parent or self.costs is not None or min(costs.least, costs.range) < 0:
-            raise ValueError(f"{sender} has no costs of all to tell")
-        self._tell_costs(costs)
+            raise ValueError(f"{sender} sent an unexpected or invalid CostRange")
+        self._send_costs(costs)
 
-    def _tell_costs(self, costs: CostRange) -> None:
-        """Take what the first robot has found, and tell it below."""
+    def _send_costs(self, costs: CostRange) -> None:
+        """Store the range of all costs, and send it down."""
         ring, _ = self.in_ring()
         self.costs = costs
         for child in ring.children:
@@ -340,7 +340,7 @@ class LinearOrderProtocol(RerootingProtocol):
     # Turns
 
     def start_turn(self) -> None:
-        """Be the root, if it is the own turn and known to be: send the plan, or the table, of the own axis."""
+        """Be the root, if it is known to be this robot's turn: send the plan, or the table, of its axis."""
         if self.is_root or self.own_turns is None or self.turn not in self.own_turns:
             return
         self.is_root = True
@@ -352,16 +352,16 @@ class LinearOrderProtocol(RerootingProtocol):
         self.send_first_table()
 
     def end_turn(self) -> None:
-        """Tell all that the next turn begins, unless this was the last."""
+        """Start the next turn for all robots, unless this was the last."""
         self.is_root = False
         if self.step + 1 < 2 * self.turns:
             self._next_turn(None)
 
     def start_next_turn(self, sender: str) -> None:
-        """Begin the next turn, and pass on that it does."""
+        """Start the next turn, and send on the message about it."""
         ring, _ = self.in_ring()
         if sender not in ring.neighbours or self.is_root or self.step + 1 >= 2 * self.turns:
-            raise ValueError(f"{sender} cannot end a turn")
+            raise ValueError(f"{sender} sent an unexpected Next")
         self._next_turn(sender)
 
     def _next_turn(self, sender: str | None) -> None:
@@ -375,16 +375,16 @@ class LinearOrderProtocol(RerootingProtocol):
     # Plans: the axes and sizes of all tables
 
     def own_axis(self, turn: int) -> OwnAxis:
-        """Return the own axis of a turn; draw it when it is needed first. Raises `TooLargeError`."""
+        """Return this robot's axis of a turn; it is drawn at its first use. Raises `TooLargeError`."""
         if turn not in self.axes:
             size = self.problem.declared_count(self.problem.agent)
-            self._refuse_large(size, 1)
+            self._check_size(size, 1)
             codename = f"{self.secret(4 * CODENAME):0{CODENAME}x}"
             self.axes[turn] = OwnAxis(codename, shuffled(range(size), self.secret))
         return self.axes[turn]
 
-    def _refuse_large(self, cells: int, axes: int) -> None:
-        """Raise `TooLargeError` if so many cells have more ciphers than a table may have."""
+    def _check_size(self, cells: int, axes: int) -> None:
+        """Raise `TooLargeError` if a table of these cells needs more ciphers than allowed."""
         levels = self.cipher.levels
         if cells * levels > self.settings.ciphers:
             raise TooLargeError(
@@ -395,32 +395,32 @@ class LinearOrderProtocol(RerootingProtocol):
             )
 
     def plan(self, plan: Plan) -> None:
-        """Ask the neighbours which of them are still to come; the root ends the turn."""
+        """Ask the neighbours which of them come later; the root ends the turn."""
         if not self.planning or plan.turn != self.turn or self._pending is not None:
-            raise ValueError(f"a plan for turn {plan.turn}, which is not under way")
+            raise ValueError(f"received an unexpected plan for turn {plan.turn}")
         own = self.own_axis(self.turn)
         if (
             len(plan.axes) > MOST_AXES
             or min(plan.axes.values(), default=1) < 1
             or plan.axes.get(own.codename, len(own.order)) != len(own.order)
         ):
-            raise ValueError("a plan that cannot be")
+            raise ValueError(f"received an invalid plan of {len(plan.axes):,} axes")
         if self.is_root:
             if plan.axes != {own.codename: len(own.order)}:
-                raise ValueError("a plan of which more is left than the root's own axis")
+                raise ValueError("received a plan at the root with other axes than the root's own one")
             self.end_turn()
             return
         if self.turn in self.places:
-            raise ValueError("a second plan for the same turn")
+            raise ValueError(f"received a second plan for turn {plan.turn}")
         self._pending = plan
         self._answers = {}
         for name in self.problem.neighbours:
             self.send(name, AskAxis(self.turn))
 
     def answer(self, sender: str, turn: int) -> None:
-        """Tell a neighbour the own axis, or that this robot comes before it."""
+        """Send a neighbour this robot's axis, or that this robot comes before it."""
         if sender not in self.problem.neighbours or not 0 <= turn < self.turns:
-            raise ValueError(f"{sender} cannot ask for an axis")
+            raise ValueError(f"{sender} sent an unexpected AskAxis for turn {turn}")
         if turn in self.places:
             self.send(sender, Gone(turn))
             return
@@ -429,26 +429,26 @@ class LinearOrderProtocol(RerootingProtocol):
         self.send(sender, Axis(turn, own.codename, [values[place] for place in own.order]))
 
     def receive_answer(self, sender: str, answer: Axis | Gone) -> None:
-        """Once all have answered: plan the own table, and tell the next robot."""
+        """Once all have answered: plan this robot's table, and send the plan to the next robot."""
         if self._pending is None or sender not in self.problem.neighbours or sender in self._answers:
-            raise ValueError(f"{sender} was not asked for an axis")
+            raise ValueError(f"{sender} sent an axis without a request")
         if answer.turn != self._pending.turn:
-            raise ValueError(f"{sender} tells an axis of another turn")
+            raise ValueError(f"{sender} sent an axis of turn {answer.turn}, not of turn {self._pending.turn}")
         self._answers[sender] = self._checked(sender, answer) if isinstance(answer, Axis) else None
         if len(self._answers) < len(self.problem.neighbours):
             return
         ring, _ = self.in_ring()
         plan, self._pending = self._pending, None
         later = {name: axis for name, axis in self._answers.items() if axis is not None}
-        place = place_after(self.problem, self.own_axis(plan.turn), plan.axes, later)
-        self._refuse_large(place.cells, len(place.outgoing))
-        self.places[plan.turn] = place
-        self.send(ring.onward, Plan(plan.turn, place.outgoing))
+        step = step_after(self.problem, self.own_axis(plan.turn), plan.axes, later)
+        self._check_size(step.cells, len(step.outgoing))
+        self.places[plan.turn] = step
+        self.send(ring.onward, Plan(plan.turn, step.outgoing))
 
     def _checked(self, sender: str, axis: Axis) -> Axis:
         """Return an axis. Raises `ValueError` unless it has each declared value of its robot once."""
         if len(axis.codename) != CODENAME or len(axis.values) != self.problem.declared_count(sender):
-            raise ValueError(f"{sender} tells an axis that cannot be")
+            raise ValueError(f"{sender} sent an axis with {len(axis.values):,} values, or an invalid codename")
         if sorted(map(str, axis.values)) != sorted(map(str, self.problem.declared(sender))):
-            raise ValueError(f"{sender} tells values that it was not declared to have")
+            raise ValueError(f"{sender} sent an axis with other values than the declared ones")
         return axis

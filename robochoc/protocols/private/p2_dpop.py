@@ -1,57 +1,58 @@
-"""P2-DPOP: DPOP on tables that nobody can read, and in which no robot tells its value, its domain or a cost.
+"""P2-DPOP: DPOP on tables that no robot can read; robots do not send their values, domains or costs.
 
-As in P3/2-DPOP the robots stand in a circle, and are the root in turns that nobody else knows. But tables are
-encrypted to the whole team, and go round the circle, from the root of the turn back to it. Each robot on the way adds
-its costs, takes the minimum over its own values, and encrypts all anew; it reads nothing. Encrypted costs can be
-added to known ones only, not to each other: so there is one table, along a linear order, instead of one for each branch
-of a tree. The root has some ciphers opened by all robots: by bisection it reads the minimum cost, and a value of its
-own that attains it. It keeps the value; from then on its costs are those of that value.
+As in P3/2-DPOP the robots form a circle, and are the root in turns that no other robot knows. But tables are encrypted
+to the whole team, and go round the circle, from the root of the turn back to it. Each robot on the way adds its costs,
+minimises over its own values, and encrypts the table again; it reads nothing. Encrypted costs can only be added to
+known ones, not to each other: so there is one table, along a linear order, instead of one for each branch of a tree.
+The root has some ciphers opened by all robots: by bisection it reads the minimum cost, and one of its values that
+attains it. It keeps the value; from then on its costs are those of that value.
 
-- **When to use**: costs, and nobody may be told a value, a domain or a cost. For small problems: a table has a cell for
-  each combination of values of the robots that are still to come and are linked to those before, and a cipher in each
-  cell for each cost that all could pay together. All sizes are known before the first table is made.
-- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are taken
-  to keep to the protocol, not to put their knowledge together, and to have channels that nobody else reads.
-- **Parameters (`--set`)**: `ciphers`, the number of ciphers that a table may have (default 20,000; 64 bytes and some
-  half a millisecond each, for each robot in each turn). `spare`, the largest number of turns that are played for show
-  (default 2): only the first of the ring knows how many there are.
+- **When to use**: costs, and nobody may learn a value, a domain or a cost. For small problems: a table has a cell for
+  each combination of values of the robots that come later and are linked to those before, and in each cell a cipher for
+  each possible total cost. All sizes are known before the first table is made.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
+  to follow the protocol, not to combine their knowledge, and to have channels that nobody else reads.
+- **Parameters (`--set`)**: `ciphers`, the most ciphers of a table (default 20,000; each needs 64 bytes and about half a
+  millisecond, for each robot in each turn). `spare`, the largest number of additional turns (default 2), which hide the
+  number of robots: only the first of the ring knows how many there are.
 - **References**: Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making",
   JAIR 47, 2013. "Privacy-preserving multi-agent constraint satisfaction", PASSAT 2009 (opening by all). Desmedt,
   Frankel: "Threshold cryptosystems", CRYPTO 1989.
 
-Why it is right: in each turn robots are eliminated in the order of the circle, and each constraint is added by the
+Why it is correct: in each turn robots are eliminated in the order of the circle, and each constraint is added by the
 first robot of its scope: the dynamic programming of DPOP, in the order of a path. So the root reads the minimum over
-all values that go with those taken before, and takes one that attains it. By induction all values taken are part of one
-optimum. There are as many turns as robots, but for `spare`, and each has a fixed number of messages: it ends.
+all values that are compatible with those chosen before, and chooses one that attains it. By induction all chosen values
+are part of one optimum. There are as many turns as robots, up to `spare`, and each has a fixed number of messages: it
+ends.
 
-Why nothing else is told: whatever a robot receives of a table are ciphers with fresh randomness of its sender, for
-which one share of the key is always missing. What is opened was encrypted anew by the root and blinded by all others:
-the root reads a bit, and nobody else does. How many are opened depends on numbers that all know. What is told:
+Why nothing else is disclosed: a robot receives only ciphers of a table, with fresh randomness of their sender, and for
+these a share of the key is always missing. An opened cipher was encrypted again by the root and blinded by all others:
+only the root reads its bit. The number of openings depends on public numbers. The following is disclosed:
 
-- How far the costs of all may go, as a sum in which no robot stands alone, if there are three or more. With two robots
-  it is what the other one has, as in every sum of two.
-- The optimum, and how many robots are connected, but for `spare`. The root also learns that no value declared before
+- The range of all costs, as a sum over all robots, if there are three or more. With two robots it gives the other
+  one's range, as any sum of two does.
+- The optimum, and the number of connected robots, up to `spare`. The root also learns that no value declared before
   its own attains the optimum.
-- Which neighbours come before a robot in a turn, so on which side of it the root is. A robot may guess more from the
+- The neighbours that come before a robot in a turn, so the direction of the root. A robot may guess more from the
   number of axes of a table. Axes have new codenames, and values another order, in each turn.
-- Neighbours are told the declared values, which they know. That private constraints forbid some is not told.
+- Neighbours receive the declared values, which they know; not that private constraints forbid some of them.
 
-Encryption: ElGamal with one share of the key for each robot, in the group Edwards25519, by libsodium (PyNaCl: the extra
+Encryption: ElGamal with a share of the key for each robot, in the group Edwards25519, by libsodium (PyNaCl: the extra
 `private`). Keys come from `Protocol.secret`, as P-DPOP's.
 
 The methods:
 
     circle, next root             `rerooting`        encrypt, open          `elgamal.TeamKey`
     linear orders, largest cost   `linear_order`     unary costs, + and min `encrypted_costs`
-    UTIL                          `_pass_table`      bisection              `_ask_team`, `bisection`
+    UTIL                          `_process_table`   bisection              `_ask_team`, `Bisection`
 
-Choices that the paper leaves open, and differences (its text was not at hand; this is built from its principle):
+Choices that the paper leaves open, and differences (its text was not available; this follows its principle):
 
-- A bit is 0 or not: the sum of bits stands for "or". The paper's cost limit is computed, in a sum that begins with
-  random numbers: the difference of the largest and the least costs of all robots.
-- First all turns are played without tables, for their sizes: a run that needs too much ends before it has computed.
-- The root also sends the first table, of its own axis, so that the next robot cannot tell that it is the first.
-- Ties go to the value of the root that is declared first.
+- A bit is 0 or not: the sum of bits acts as "or". The paper's cost limit is computed, in a sum that begins with random
+  numbers: the difference of the largest and the least costs of all robots.
+- First all turns are executed without tables, for their sizes: a run that needs too much ends before it computes.
+- The root also sends the first table, of its own axis, so that the next robot cannot recognise that it is the first.
+- Ties go to the root's value that is declared first.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -99,7 +100,7 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class EncryptedTable(Message, frozen=True):
-    """The table that was planned: for each cell a cipher for each cost, of whether so much is enough.
+    """The planned table: for each cell a cipher for each cost, of whether this cost is sufficient.
 
     The last axis changes fastest, in the order of the plan, and costs within cells.
     """
@@ -107,7 +108,7 @@ class EncryptedTable(Message, frozen=True):
     turn: int
     ciphers: bytes
 
-    act = Act(Performative.REQUEST, "the receiver is to add its costs, without reading the table")
+    act = Act(Performative.REQUEST, "the receiver adds its costs, without reading the table")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -115,11 +116,11 @@ class EncryptedTable(Message, frozen=True):
 
 
 class Opening(Message, frozen=True):
-    """One cipher that the root wants to read, blinded by all robots before the receiver, and without their shares."""
+    """A cipher for the root to read, blinded by all robots before the receiver, and without their shares."""
 
     cipher: bytes
 
-    act = Act(Performative.REQUEST, "the receiver is to blind it, and to take its share of the key off")
+    act = Act(Performative.REQUEST, "the receiver blinds the cipher, and removes its share of the key")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -133,7 +134,7 @@ LinearMessage = CostSum | CostRange | Plan | AskAxis | Axis | Gone | EncryptedTa
 class Bisection:
     """Finds the first of `places` for which something is true; from there on it is true for all.
 
-    There are as many questions as it may take at most: once the place is found, the rest is asked for show.
+    The number of questions is always the highest that can be necessary, to hide the place.
     """
 
     def __init__(self, places: int) -> None:
@@ -148,8 +149,8 @@ class Bisection:
         """The place to ask about next."""
         return min((self._low + self._high) // 2, self._last)
 
-    def take(self, *, true: bool) -> None:
-        """Take the answer for `place`."""
+    def receive_answer(self, *, true: bool) -> None:
+        """Process the answer for `place`."""
         if self._low < self._high:
             if true:
                 self._high = self.place
@@ -159,7 +160,7 @@ class Bisection:
 
     @property
     def found(self) -> int:
-        """The first place for which it is true, once no question is left; the number of places if there is none."""
+        """The first place for which it is true, when no question is left; the number of places if there is none."""
         return self._low
 
 
@@ -168,7 +169,7 @@ class P2DPOP(LinearOrderProtocol):
 
     State, besides that of the linear orders:
 
-    - `optimum`: the least cost of all robots that are connected, once the first own turn is over.
+    - `optimum`: the least cost of all connected robots, after this robot's first turn.
     """
 
     messages = AnonymousTreeMessage | RerootingMessage | LinearMessage
@@ -191,13 +192,13 @@ class P2DPOP(LinearOrderProtocol):
         self.optimum: int | None = None
         self._cells: list[list[Pair]] = []
         self._questions: list[Pair] = []
-        """Ciphers of the root, of which the first that is no 0 is sought."""
+        """The root's ciphers, in which the first one that is not 0 is searched for."""
         self._bisection: Bisection | None = None
         self._cost: int | None = None
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for its root also the optimum, once it has had its turn."""
+        """The place in the tree; for its root also the optimum, after its turn."""
         return msgspec.structs.replace(super().findings, bound=self.optimum if self.parent is None else None)
 
     def handle(self, sender: str, message: Message) -> None:
@@ -213,12 +214,12 @@ class P2DPOP(LinearOrderProtocol):
             case Next():
                 self.start_next_turn(sender)
             case CostSum() | Plan() | EncryptedTable() | Opening() as round_trip:
-                self._go_round(sender, round_trip)
+                self._receive_from_circle(sender, round_trip)
             case never:
                 assert_never(never)
 
-    def _go_round(self, sender: str, message: CostSum | Plan | EncryptedTable | Opening) -> None:
-        """Pass on what is for another robot of the circle; process what is for this one."""
+    def _receive_from_circle(self, sender: str, message: CostSum | Plan | EncryptedTable | Opening) -> None:
+        """Send on a message for another robot of the circle; process a message for this one."""
         ring, _ = self.in_ring()
         onward = ring.on_its_way(sender)
         if onward is not None:
@@ -230,14 +231,14 @@ class P2DPOP(LinearOrderProtocol):
             case Plan():
                 self.plan(message)
             case EncryptedTable():
-                self._pass_table(message)
+                self._process_table(message)
             case Opening():
                 self._open(message)
             case never:
                 assert_never(never)
 
     def decide_alone(self) -> None:
-        """Take the best value; there is no neighbour."""
+        """Choose the best value; there is no neighbour."""
         costs = own_costs(self.problem)
         if costs.min() == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
@@ -248,63 +249,63 @@ class P2DPOP(LinearOrderProtocol):
     # Tables, from the root round to the root
 
     def send_first_table(self) -> None:
-        """As the root: send the own private costs, encrypted; of the own value only, once there is one."""
+        """As the root: send the private costs, encrypted; once there is a value, its costs only."""
         ring, _ = self.in_ring()
         own = self.own_axis(self.turn)
         costs = np.full(len(own.order), INFINITE)
         alone = own_costs(self.problem)
-        for code, index in own.codes(self._kept).items():
+        for code, index in own.codes(self._possible_values).items():
             costs[code] = alone[index] - self.least_own
         self.send(ring.onward, EncryptedTable(self.turn, self.cipher.encrypted(costs)))
 
     @property
-    def _kept(self) -> Mapping[int, int]:
-        """Return the places of the own values that are left: of one once it is taken."""
+    def _possible_values(self) -> Mapping[int, int]:
+        """The places of this robot's possible values: once a value is chosen, its place only."""
         places = own_places(self.problem)
         return places if self.value is None else {place: i for place, i in places.items() if i == self.value}
 
-    def _pass_table(self, table: EncryptedTable) -> None:
-        """Add the own costs, take the minimum over the own values, and send it on; the root opens what it needs."""
+    def _process_table(self, table: EncryptedTable) -> None:
+        """Add this robot's costs, minimise over its values, and send the table on; the root starts to read it."""
         if self.planning or table.turn != self.turn:
-            raise ValueError(f"a table for turn {table.turn}, which is not under way")
+            raise ValueError(f"received an unexpected table for turn {table.turn}")
         own = self.own_axis(self.turn)
         incoming = {own.codename: len(own.order)} if self.is_root else self.places[self.turn].incoming
         if len(table.ciphers) != cells_of(incoming) * self.cipher.levels * self.cipher.size:
-            raise ValueError("a table of another size than planned")
+            raise ValueError(f"received a table of {len(table.ciphers):,} bytes, another size than planned")
         cells = self.cipher.cells(table.ciphers)
         if self.is_root:
             self._start_reading([cells[code] for code in sorted(range(len(cells)), key=own.order.__getitem__)])
             return
-        place = self.places[self.turn]
-        codes = own.codes(self._kept)
-        costs = costs_to_add(self.problem, place, own.codename, list(codes.values())) - self.least_own
-        fewer = self.cipher.eliminated(cells, sources(place, own.codename, list(codes)), costs)
+        step = self.places[self.turn]
+        codes = own.codes(self._possible_values)
+        costs = costs_to_add(self.problem, step, own.codename, list(codes.values())) - self.least_own
+        fewer = self.cipher.eliminated(cells, sources(step, own.codename, list(codes)), costs)
         ring, _ = self.in_ring()
         self.send(ring.onward, EncryptedTable(self.turn, fewer))
 
     # The root reads the optimum, and its value
 
     def _start_reading(self, cells: list[list[Pair]]) -> None:
-        """Seek the least cost that any value has; `cells` are in the order of the declared values."""
+        """Search for the least cost of all values; `cells` are in the order of the declared values."""
         if self._bisection is not None:
-            raise ValueError("a second table of the same turn")
+            raise ValueError("received a second table in this turn")
         self._cells, self._cost = cells, None
         self._questions = self.cipher.any_of(cells)
         self._bisection = Bisection(self.cipher.levels)
         self._ask_team(self._bisection)
 
     def _ask_team(self, bisection: Bisection) -> None:
-        """Have the next cipher opened; it is encrypted anew, as the robot before the root knows those of the table."""
+        """Have the next cipher opened, encrypted again, as the robot before the root knows the table's ciphers."""
         ring, key = self.in_ring()
         if bisection.left:
             self.send(ring.onward, Opening(key.renewed(self._questions[bisection.place])))
         elif self._cost is None:
-            self._seek_value(bisection.found)
+            self._search_value(bisection.found)
         else:
-            self._take(bisection.found)
+            self._choose(bisection.found)
 
-    def _seek_value(self, cost: int) -> None:
-        """Seek the first value that attains the least cost."""
+    def _search_value(self, cost: int) -> None:
+        """Search for the first value that attains the least cost."""
         if self.costs is None or cost > self.costs.range:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -315,21 +316,21 @@ class P2DPOP(LinearOrderProtocol):
         self._ask_team(self._bisection)
 
     def _open(self, opening: Opening) -> None:
-        """Blind a cipher, and take the own share off; the root reads it."""
+        """Blind a cipher, and remove this robot's share; the root reads it."""
         ring, key = self.in_ring()
         if len(opening.cipher) != key.size:
-            raise ValueError("this is not one cipher")
+            raise ValueError(f"received a cipher of {len(opening.cipher)} bytes; it must have {key.size}")
         (pair,) = key.checked(opening.cipher)
         if not self.is_root:
             self.send(ring.onward, Opening(key.stripped(key.blinded(pair))))
             return
         if self._bisection is None:
-            raise ValueError("an answer to nothing")
-        self._bisection.take(true=not key.is_zero(key.stripped(pair)))
+            raise ValueError("received an opened cipher without a request")
+        self._bisection.receive_answer(true=not key.is_zero(key.stripped(pair)))
         self._ask_team(self._bisection)
 
-    def _take(self, place: int) -> None:
-        """Take the value at a place among the declared ones, and tell nobody."""
-        self.value = self._kept[place]
+    def _choose(self, place: int) -> None:
+        """Choose the value at a place among the declared ones, without sending it."""
+        self.value = self._possible_values[place]
         self._cells, self._questions, self._bisection = [], [], None
         self.end_turn()

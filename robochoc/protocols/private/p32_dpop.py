@@ -1,29 +1,29 @@
-"""P3/2-DPOP: P-DPOP in which no robot tells its value; the robots take turns at the root.
+"""P3/2-DPOP: P-DPOP in which no robot sends its value; the robots take turns at the root.
 
-P-DPOP's tables go up, under keys, and only the root sees what its own values lead to. Here nothing goes down: the root
-takes its best value, and keeps it; from then on its tables are those of that value. Then another robot is the root, of
-another tree over the same constraints, until each has been it. Nobody knows whose turn it is but the robot itself. For
-that the robots stand in a circle, along the first tree. Each has a vector of encrypted bits, a bit for each turn; it
-goes round, and everybody shuffles it, in the same way for all vectors, and encrypts it anew. Then everybody but its
-owner takes its share of the key off, and the owner reads in which turn it is the root.
+P-DPOP's tables go up, under keys, and only the root sees the consequences of its values. Here nothing goes down: the
+root chooses its best value, and keeps it; from then on its tables are those of that value. Then another robot is the
+root, of another tree over the same constraints, until each has been it. Only the robot itself knows its turn. For that
+the robots form a circle, along the first tree. Each has a vector of encrypted bits, a bit for each turn; it goes round,
+and every robot shuffles it, in the same way for all vectors, and encrypts it again. Then all robots but its owner
+remove their shares of the key, and the owner reads its turn as the root.
 
-- **When to use**: costs, and nobody, not even a neighbour, may be told a value. The price: as many times P-DPOP as
-  there are robots, and messages for the vectors by the square of that number.
-- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are taken
-  to keep to the protocol, not to put their knowledge together, and to have channels that nobody else reads.
-- **Parameters (`--set`)**: `cells`, the number of cells that a table may have (default 1,000,000). `spare`, the largest
-  number of turns that are played for show (default 2): only the first of the ring knows how many there are.
+- **When to use**: costs, and nobody, not even a neighbour, may learn a value. The price: one P-DPOP for each robot, and
+  messages for the vectors by the square of the number of robots.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
+  to follow the protocol, not to combine their knowledge, and to have channels that nobody else reads.
+- **Parameters (`--set`)**: `cells`, the most cells of a table (default 1,000,000). `spare`, the largest number of
+  additional turns (default 2), which hide the number of robots: only the first of the ring knows how many there are.
 - **References**: Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making",
   JAIR 47, 2013. Desmedt, Frankel: "Threshold cryptosystems", CRYPTO 1989.
 
-What stays hidden, and what does not, besides what `p-dpop` says:
+Disclosed and hidden information, besides that of `p-dpop`:
 
-- No message tells a value. A robot whose subtree shares constraints with the receiver alone shows its table all the
-  same, and once it has had its turn, the table of its value alone: the receiver may read the value from the difference.
-- All robots learn the optimum (each has been the root), and how many robots are connected, but for `spare`.
-- In each turn a robot learns on which side of it the root is.
+- Messages contain no values. A robot whose subtree shares constraints with the receiver alone shows its table all the
+  same, and after its turn, the table of its value alone: the receiver may read the value from the difference.
+- All robots learn the optimum (each has been the root), and the number of connected robots, up to `spare`.
+- In each turn a robot learns the direction of the root.
 
-Encryption: ElGamal with one share of the key for each robot, in the group Edwards25519, by libsodium (PyNaCl: the extra
+Encryption: ElGamal with a share of the key for each robot, in the group Edwards25519, by libsodium (PyNaCl: the extra
 `private`). Keys come from `Protocol.secret`, as P-DPOP's.
 
 The methods:
@@ -34,10 +34,10 @@ The methods:
 
 Choices that the paper leaves open, and differences:
 
-- Numbers in the circle count from a random offset, so that a number tells nobody its place; the paper lets each robot
-  add a random step, which makes vectors longer by that factor.
-- A robot has its whole vector opened at once, and so knows from the start when its turn is; it learns nothing else.
-- Spare turns are the first robot's: it is the root again.
+- Numbers in the circle count from a random offset, so that a number does not reveal the place; in the paper each robot
+  adds a random step, which makes vectors longer by that factor.
+- A robot has its whole vector opened at once, and so knows its turn from the start; it learns nothing else.
+- Additional turns are the first robot's: it is the root again.
 - Ties go to the first value in its domain.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -70,19 +70,19 @@ MOST = 1_000
 
 
 class P32DPOPSettings(PDPOPSettings, frozen=True):
-    """`cells`: as for P-DPOP. `spare`: at most so many turns more than there are robots, to hide how many there are."""
+    """`cells`: as for P-DPOP. `spare`: the most additional turns, which hide the number of robots."""
 
     spare: int = 2
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for numbers that cannot be."""
+        """Raise `ValueError` for numbers outside their range."""
         super().__post_init__()
         if not 0 <= self.spare <= MOST:
-            raise ValueError(f"spare is a number of turns from 0 to {MOST}, not {self.spare}")
+            raise ValueError(f"spare is {self.spare}; it must be from 0 to {MOST} turns")
 
 
 class Table(UTIL, frozen=True):
-    """A table of P-DPOP in the turn of one root; robots that have had theirs have their values."""
+    """A table of P-DPOP in the turn of one root; robots that have had their turns have fixed values."""
 
     turn: int
 
@@ -90,7 +90,7 @@ class Table(UTIL, frozen=True):
         return f"{super().in_words(words)}, for turn {self.turn + 1}"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: after the first turn nothing about every value of the sender.
+        """Return P-DPOP's proofs; after the first turn none about every value of the sender.
 
         The sender may have had its turn since, and then the table is about one value.
         """
@@ -101,9 +101,9 @@ class Table(UTIL, frozen=True):
 class P32DPOP(RerootingProtocol, PDPOP):
     """One agent of P3/2-DPOP.
 
-    State, besides the circle's and P-DPOP's, which is of the turn under way:
+    State, besides the circle's and P-DPOP's of the present turn:
 
-    - `turn`: how many turns are over.
+    - `turn`: the number of completed turns.
     """
 
     messages = AnonymousTreeMessage | Codes | Table | RerootingMessage
@@ -120,21 +120,21 @@ class P32DPOP(RerootingProtocol, PDPOP):
         super().__init__(problem, order)
         self.turn = 0
         self._done = False
-        """The own table of this turn is told, or the own value taken."""
+        """This robot's table of this turn is sent, or its value chosen."""
         self._waiting: list[tuple[str, Message]] = []
 
     @property
     def spare(self) -> int:
-        """Return the largest number of turns that are played for show."""
+        """The largest number of additional turns, which hide the number of robots."""
         return self.settings.spare
 
     @property
     def findings(self) -> Findings:
-        """Return the place in the last turn's tree; for its root also the optimum."""
+        """The place in the last turn's tree; for its root also the optimum."""
         return super().findings if self.turn + 1 >= self.turns else NO_FINDINGS
 
     def receive(self, sender: str, message: Message) -> None:
-        """Process what goes round the circle; keep what is of the next turn until that begins."""
+        """Process messages of the circle; store messages of the next turn until it begins."""
         if self.verdict is not None:
             return
         match message:
@@ -142,7 +142,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
                 self.reroot(sender, message)
             case Next():
                 if sender != self.parent or not self._done or self.turn + 1 >= self.turns:
-                    raise ValueError(f"{sender} cannot end a turn")
+                    raise ValueError(f"{sender} sent an unexpected Next")
                 self._end_turn()
             case Wave():
                 super().receive(sender, message)
@@ -152,7 +152,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
                 super().receive(sender, message)
 
     def start_in_tree(self) -> None:
-        """In the first tree: remember the circle. Later: run P-DPOP in the tree of this turn."""
+        """In the first tree: enter the circle. Later: run P-DPOP in the tree of this turn."""
         if self.ring is not None or not self.problem.neighbours:
             super().start_in_tree()
             return
@@ -165,22 +165,22 @@ class P32DPOP(RerootingProtocol, PDPOP):
     # Turns
 
     def start_turn(self) -> None:
-        """Be the root, if it is the own turn and known to be."""
+        """Be the root, if it is known to be this robot's turn."""
         if not self.placed and self.own_turns is not None and self.turn in self.own_turns:
             self.enter(None)
 
     def send_table(self, parent: str, cells: bytes) -> None:
-        """Send the own table to the parent. No value will come back."""
+        """Send this robot's table to the parent; no value will be returned."""
         self.send(parent, Table(self.axes, cells, self.turn))
         self._done = True
 
     def joined(self) -> CellTable:
-        """Return P-DPOP's sums; those of the own value alone once there is one."""
+        """Return P-DPOP's sums; once there is a value, its sums alone."""
         joined = super().joined()
         return joined if self.value is None else joined[self.value : self.value + 1]
 
     def decide_as_root(self) -> None:
-        """Take the best value, unless there is one, and tell nobody."""
+        """Choose the best value, unless there is one, without sending it."""
         if self.value is None and self.choices is not None:
             self.value = int(self.choices.item())
         self._done = True
@@ -188,7 +188,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
             self._end_turn()
 
     def _end_turn(self) -> None:
-        """Tell it the children, forget the turn, and begin the next one."""
+        """Inform the children, forget the turn, and start the next one."""
         for child in self.children:
             self.send(child, Next())
         self.leave_tree()
@@ -199,7 +199,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
             self.receive(sender, message)
 
     def leave_tree(self) -> None:
-        """Forget the tree, and P-DPOP's state in it. The own value stays."""
+        """Forget the tree, and P-DPOP's state in it. This robot's value remains."""
         super().leave_tree()
         self.above = {}
         self.utils = {}

@@ -1,28 +1,28 @@
 """Private DPOP (P-DPOP): DPOP whose tables are in codenames, codes and random keys.
 
-Dynamic programming on a pseudo-tree, as DPOP, for minimum cost. Each robot tells its neighbours below (`Codes`) a
+Dynamic programming on a pseudo-tree, as DPOP, for minimum cost. Each robot sends its neighbours below (`Codes`) a
 codename for itself, its values in a random order, and a random key for each value, another for each neighbour. Tables
-(UTIL) name robots by codenames and values by their codes; whoever makes one adds, for each neighbour above, the key of
-that neighbour's value. Robots in between join and minimise without understanding: a key depends on an axis that is
-still there. The robot that a codename stands for knows all keys that were added for it, and subtracts them. From the
-root down, robots are told the codes of the values above them (VALUE).
+(UTIL) contain codenames instead of robots' names, and codes instead of values; the robot that makes a table adds, for
+each neighbour above, the key of that neighbour's value. Robots in between join and minimise without understanding: a
+key depends on an axis that is still there. The robot with the codename knows all keys that were added for it, and
+subtracts them. From the root down, robots receive the codes of the values above them (VALUE).
 
 - **When to use**: costs, and constraints that third robots must not learn. Where DPOP's tables fit; it is slower.
-- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are taken
-  to keep to the protocol, not to put their knowledge together, and to have channels that nobody else reads.
-- **Parameters (`--set`)**: `cells`, the number of cells that a table may have (default 1,000,000).
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
+  to follow the protocol, not to combine their knowledge, and to have channels that nobody else reads.
+- **Parameters (`--set`)**: `cells`, the most cells of a table (default 1,000,000).
 - **References**: Faltings, Leaute, Petcu: "Privacy guarantees through distributed constraint satisfaction", IAT 2008;
   Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making", JAIR 47, 2013.
 
-What stays hidden, and what does not:
+Disclosed and hidden information:
 
-- A robot learns no name of another that it shares no constraint with, from messages (all robots know the team's names).
+- From messages, a robot learns no names of robots with which it shares no constraint (all robots know the team's
+  names).
 - A cell over another robot's codename is hidden by that robot's key. Keys have 100 bits; a broken hard constraint
-  counts 2^60 instead of infinity, so that it shows no more than costs do: to 2^-20 for a million constraints, and less
-  for fewer.
-- Differences along the own axis are seen by the robot that it stands for, and so are costs of a subtree that shares
-  constraints with it alone.
-- Values leak downwards: to robots that share a constraint with the one that takes them. The root's choice and the tree
+  counts 2^60 instead of infinity, so that it reveals no more than costs do: to 2^-20 for a million constraints, and
+  less for fewer.
+- A robot sees the differences along its own axis, and the costs of a subtree that shares constraints with it alone.
+- Values are disclosed downwards: to robots that share a constraint with their owner. The root's choice and the tree
   are not hidden from neighbours.
 
 Where keys come from: `Protocol.secret` (`protocols/key_stream.py`). Across machines it is the operating system; in the
@@ -30,13 +30,13 @@ simulator and in processes it follows from the seed, so that runs can be repeate
 
 The methods:
 
-    choose codes     `start_in_tree`              join, subtract keys, minimise   `_compute_util`
-    root, tree       `anonymous_dfs`      choose the value                `_choose`
+    choose codes     `start_in_tree`              join, subtract, minimise      `_compute_util`
+    root, tree       `anonymous_dfs`              choose the value              `_choose`
 
 Choices that the paper leaves open, and differences:
 
 - A robot has one codename and one order of values for all neighbours below (the paper's merged codenames): tables of
-  several branches can be joined. So these see that they have to do with the same robot, if they compare.
+  several branches can be joined. So the neighbours can find out that they share the same robot, if they compare.
 - The root is elected by random scores in asynchronous waves. The paper's rounds with lies, which hide how far away the
   root is, are left out: a robot sees through which neighbour the root's wave came first.
 - Ties go to the first value in its domain.
@@ -79,37 +79,37 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_CELLS = 100_000_000
-"""A table of as many takes gigabytes."""
+"""A table with this many takes gigabytes."""
 
 
 class PDPOPSettings(Settings, frozen=True):
-    """`cells`: the number of cells that a table may have. A run that needs more ends."""
+    """`cells`: the most cells of a table. A run that needs more ends."""
 
     cells: int = 1_000_000
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for numbers that cannot be."""
+        """Raise `ValueError` for a number outside its range."""
         if not 1 <= self.cells <= MOST_CELLS:
-            raise ValueError(f"cells is a number of cells from 1 to {MOST_CELLS:,}, not {self.cells}")
+            raise ValueError(f"cells is {self.cells}; it must be from 1 to {MOST_CELLS:,}")
 
 
 WIDTH = 16
-"""Bytes of a cell, and of a key."""
+"""The bytes of a cell, and of a key."""
 
 
 BROKEN = 1 << 60
-"""The cost of a hard constraint that is broken: above all finite costs, and hidden by keys like these."""
+"""The cost of a broken hard constraint: above all finite costs, and hidden by the same keys."""
 
 
 Shape = dict[str, int]
-"""The axes of a table: codenames, and how many codes each has."""
+"""The axes of a table: codenames, and their numbers of codes."""
 
 
 class Codes(Message, frozen=True):
-    """Codes and keys for the sender's values, by which a neighbour below speaks of them without telling others.
+    """Codes and keys for the sender's values, for the messages of a neighbour below that others must not understand.
 
-    `codename` stands for the sender; the code of a value is its place in `values`, which are in a random order. `keys`
-    has a random key for each of them, which is added to what a table says of it.
+    `codename` represents the sender; the code of a value is its place in `values`, which are in a random order. `keys`
+    has a random key for each value, which is added to the value's costs in a table.
     """
 
     codename: str
@@ -134,22 +134,22 @@ class UTIL(Message, frozen=True):
     axes: Shape
     cells: bytes
 
-    act = Act(Performative.INFORM, "the receiver learns what the sender's subtree costs")
+    act = Act(Performative.INFORM, "the receiver learns the costs of the sender's subtree")
 
     def in_words(self, _: Wording) -> str:
         axes = counted(len(self.axes), "codename")
         return f"a table over {axes}: {counted(len(self.cells) // WIDTH, 'cost')}, hidden by keys"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: something only if no other robot's key is in it.
+        """Return bounds on the sender's costs, if no other robot's key is in the table.
 
-        Then all that is below the sender shares constraints with the receiver alone, which can subtract its keys.
+        Then all robots below the sender share constraints with the receiver alone, which can subtract its keys.
         """
         subtree = _without(hearing)
         near = [robot for robot in sorted(subtree) if robot in hearing.neighbours(hearing.receiver)]
-        told = [hearing.last(Codes, hearing.receiver, robot) for robot in near]
-        codes = [one for one in told if one is not None]
-        if len(codes) < len(told) or list(self.axes) != [codes[0].codename]:
+        last = [hearing.last(Codes, hearing.receiver, robot) for robot in near]
+        codes = [one for one in last if one is not None]
+        if len(codes) < len(last) or list(self.axes) != [codes[0].codename]:
             return NOTHING
         found: list[Proof] = []
         keys = map(sum, zip(*(numbers(one.keys) for one in codes), strict=True))
@@ -173,11 +173,11 @@ class VALUE(Message, frozen=True):
         return f"the codes of {counted(len(self.codes), 'value')} above you"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: the values of robots that have told it their codes."""
-        told = {robot: hearing.last(Codes, robot, hearing.receiver) for robot in hearing.neighbours(hearing.receiver)}
+        """Return the values of the robots that have sent the receiver their codes."""
+        last = {robot: hearing.last(Codes, robot, hearing.receiver) for robot in hearing.neighbours(hearing.receiver)}
         return [
             StandsAt(robot, codes.values[self.codes[codes.codename]])
-            for robot, codes in sorted(told.items())
+            for robot, codes in sorted(last.items())
             if codes is not None and codes.codename in self.codes
         ]
 
@@ -188,12 +188,12 @@ def numbers(packed: bytes) -> list[int]:
 
 
 def packed(cells: Iterable[int]) -> bytes:
-    """Return cells, or keys, as they travel."""
+    """Return cells, or keys, as bytes for a message."""
     return b"".join([cell.to_bytes(WIDTH, "little") for cell in cells])
 
 
 def cells_of(shape: Shape) -> int:
-    """Return the number of cells of a table; nothing is allocated."""
+    """Return the number of cells of a table, without allocating it."""
     return math.prod(shape.values())
 
 
@@ -211,10 +211,10 @@ def _without(hearing: Hearing) -> set[str]:
 
 KEY_BITS = 100
 CODENAME = 32
-"""Hexadecimal digits."""
+"""The hexadecimal digits of a codename."""
 MOST_AXES = 1_000
 CellTable = NDArray[np.object_]
-"""Integers of any size: keys are larger than those that numpy computes with itself."""
+"""Integers of any size: keys are larger than numpy's own integers."""
 
 
 class PDPOP(AnonymousTreeProtocol):
@@ -222,10 +222,10 @@ class PDPOP(AnonymousTreeProtocol):
 
     State, in the order in which it becomes known:
 
-    - `codename`; `coded`, for each code the place of the own value; `keys`, for each code the sum of all that were
-      told;
+    - `codename`; `coded`, for each code the place of this robot's value; `keys`, for each code the sum of all keys
+      sent;
     - `above`, the codes of the neighbours above; `utils`, the children's tables;
-    - `axes` of the own table, and `choices`, for each of its cells the best own value;
+    - `axes` of this robot's table, and `choices`, for each of its cells this robot's best value;
     - `optimum`: the cost of the whole tree (at its root).
     """
 
@@ -257,7 +257,7 @@ class PDPOP(AnonymousTreeProtocol):
         self._asked: dict[str, list[str]] = {}
 
     def start_in_tree(self) -> None:
-        """Choose the own codename, the codes and the keys, and tell them the neighbours below."""
+        """Choose the codename, the codes and the keys, and send them to the neighbours below."""
         self.codename = f"{self.secret(4 * CODENAME):0{CODENAME}x}"
         self.coded = shuffled(range(len(self.problem.values)), self.secret)
         self.keys = [0] * len(self.coded)
@@ -276,41 +276,43 @@ class PDPOP(AnonymousTreeProtocol):
                 self._process_util(sender, util)
             case VALUE(codes):
                 if self.choices is None or codes.keys() != self.axes.keys():
-                    raise ValueError(f"{sender} tells values of a table that there is not")
+                    raise ValueError(f"{sender} sent values for other axes than those of {self.problem.agent}'s table")
                 self._choose(codes)
             case never:
                 assert_never(never)
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for a root also its tree's optimum, once it has all tables."""
+        """The place in the tree; for a root also the optimum of its tree, once it has all tables."""
         return msgspec.structs.replace(super().findings, bound=self.optimum)
 
     def _process_codes(self, sender: str, codes: Codes) -> None:
         if sender not in self.ancestors or sender in self.above:
-            raise ValueError(f"{sender} has no codes to tell")
+            raise ValueError(f"{sender} sent unexpected or repeated Codes")
         if len(codes.codename) != CODENAME or not 0 < len(codes.values) * WIDTH == len(codes.keys):
-            raise ValueError(f"{sender} tells codes that cannot be")
+            raise ValueError(
+                f"{sender} sent invalid Codes: {len(codes.values):,} values, {len(codes.keys):,} bytes of keys"
+            )
         self.above[sender] = codes
         self._compute_util()
 
     def _process_util(self, sender: str, util: UTIL) -> None:
         if sender not in self.children or sender in self.utils:
-            raise ValueError(f"{sender} has no table to send")
+            raise ValueError(f"{sender} sent an unexpected or repeated UTIL")
         if (
             len(util.axes) > MOST_AXES
             or min(util.axes.values(), default=0) < 1
             or util.axes.get(self.codename) != len(self.coded)
             or len(util.cells) != cells_of(util.axes) * WIDTH
         ):
-            raise ValueError(f"{sender} sends a table that cannot be")
+            raise ValueError(f"{sender} sent an invalid UTIL: {len(util.axes):,} axes, {len(util.cells):,} bytes")
         self.utils[sender] = util
         self._compute_util()
 
     # UTIL, from the leaves up
 
     def _compute_util(self) -> None:
-        """Once all codes and tables have come: join, subtract the own keys, minimise, and add the keys of others."""
+        """Once all codes and tables have arrived: join, subtract this robot's keys, minimise, add others' keys."""
         if len(self.above) < len(self.ancestors) or len(self.utils) < len(self.children):
             return
         self.axes = self._own_axes()
@@ -328,20 +330,20 @@ class PDPOP(AnonymousTreeProtocol):
             self.decide_as_root()
 
     def send_table(self, parent: str, cells: bytes) -> None:
-        """Send the own table to the parent."""
+        """Send this robot's table to the parent."""
         self.send(parent, UTIL(self.axes, cells))
 
     def decide_as_root(self) -> None:
-        """Take the best value, and tell the values below from there."""
+        """Choose the best value, and send the values below from there."""
         self._choose({})
 
     def _own_axes(self) -> Shape:
-        """Return the axes of the own table, in an order that says nothing. Raises `TooLargeError`."""
+        """Return the axes of this robot's table, in an order that reveals nothing. Raises `TooLargeError`."""
         axes = {codes.codename: len(codes.values) for codes in self.above.values()}
         for child, util in self.utils.items():
             for codename, size in util.axes.items():
                 if codename != self.codename and axes.setdefault(codename, size) != size:
-                    raise ValueError(f"{child} says that a codename has {size} values, and it has not")
+                    raise ValueError(f"{child} sent a wrong number of values of a codename: {size:,}")
         if cells_of(axes) * len(self.coded) > self.settings.cells:
             raise TooLargeError(
                 f"{self.problem.agent} needs a table of {cells_of(axes) * len(self.coded):,} cells, more than"
@@ -350,7 +352,7 @@ class PDPOP(AnonymousTreeProtocol):
         return dict(sorted(axes.items()))
 
     def joined(self) -> CellTable:
-        """Return the sum of the own costs, the children's tables and all keys; the own values come first, uncoded."""
+        """Return the sum of this robot's costs, the children's tables and all keys; its values come first, uncoded."""
         charges = self.problem.charges
         scopes = self.problem.scopes(self.ancestors)
         dearest = max((cost for cost in charges if cost < INFINITE), default=0)
@@ -374,7 +376,7 @@ class PDPOP(AnonymousTreeProtocol):
         return joined
 
     def _aligned(self, table: CellTable, axes: Sequence[str]) -> CellTable:
-        """Return `table` with the own axis first, then those of the own table, of length 1 where it has none."""
+        """Return `table` with this robot's axis first, then those of its table, of length 1 where it has none."""
         onto = (self.codename, *self.axes)
         table = table.transpose([axes.index(codename) for codename in onto if codename in axes])
         return table[tuple([slice(None) if codename in axes else np.newaxis for codename in onto])]
@@ -382,9 +384,10 @@ class PDPOP(AnonymousTreeProtocol):
     # VALUE, from the root down
 
     def _choose(self, codes: Mapping[str, int]) -> None:
-        """Take the best value for these codes, and tell the children the codes that are in their tables."""
+        """Choose the best value for these codes, and send the children the codes of their tables."""
         if self.choices is None or not all(0 <= codes[codename] < size for codename, size in self.axes.items()):
-            raise ValueError(f"{self.problem.agent} has no value for such codes")
+            raise ValueError(f"{self.problem.agent} has no table for these codes: {dict(codes)}")
+
         self.value = int(self.choices[tuple([codes[codename] for codename in self.axes])])
         self.choices = None
         known = {**codes, self.codename: self.coded.index(self.value)}

@@ -1,10 +1,10 @@
-"""Robots in a circle that take turns at the root, in an order that nobody knows (P3/2-DPOP and P2-DPOP).
+"""Robots in a circle that take turns at the root, in a secret order (P3/2-DPOP and P2-DPOP).
 
 The circle is along the first tree. Each robot has a number in it, from a random offset, a share of the team's key, and
-a vector of encrypted bits, a bit for each turn: 0 where it is the root. The vector goes round, and everybody shuffles
-it, in the same way for all vectors, and encrypts it anew. Then everybody but its owner takes its share of the key off,
-and the owner reads in which turn it is the root. (Leaute, Faltings: "Protecting privacy through distributed computation
-in multi-agent decision making", JAIR 47, 2013, rerooting.)
+a vector of encrypted bits, a bit for each turn: 0 where it is the root. The vector goes round, and every robot shuffles
+it, in the same way for all vectors, and encrypts it again. Then all robots but its owner remove their shares of the
+key, and the owner reads its turn as the root. (Leaute, Faltings: "Protecting privacy through distributed computation in
+multi-agent decision making", JAIR 47, 2013, rerooting.)
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.anonymous_dfs import AnonymousTreeProtocol
-from robochoc.protocols.private.ed25519 import Ed25519, Group
+from robochoc.protocols.private.ed25519 import Ed25519, PrimeGroup
 from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.protocols.private.ring import Ring
 from robochoc.protocols.wording import Wording
 from robochoc.solver.local_problem import LocalProblem
 
 
-class Stage(IntEnum):
+class VectorStage(IntEnum):
     """The rounds of a vector."""
 
     TO_FIRST = 0
@@ -35,16 +35,16 @@ class Stage(IntEnum):
     HOME = 2
     """From the first robot to its owner."""
     OPENING = 3
-    """A whole round from its owner: each other robot takes its share of the key off."""
+    """A whole round from its owner: each other robot removes its share of the key."""
 
 
 class Join(Message, frozen=True):
-    """Takes a robot into the ring: its `number`, and the sum of the public keys of the robots before it."""
+    """A robot's place in the ring: its `number`, and the sum of the public keys of the robots before it."""
 
     number: int
     key: bytes
 
-    act = Act(Performative.REQUEST, "the receiver is to take the number, and to add its public key")
+    act = Act(Performative.REQUEST, "the receiver adopts the number, and adds its public key")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -52,7 +52,7 @@ class Join(Message, frozen=True):
 
 
 class Setup(Message, frozen=True):
-    """The team's public `key`; there are `turns`, and the number of each robot counts from `offset`."""
+    """The team's public `key`; the number of `turns`, and the `offset` of the robots' numbers."""
 
     key: bytes
     offset: int
@@ -66,21 +66,21 @@ class Setup(Message, frozen=True):
 
 
 class Vector(Message, frozen=True):
-    """One robot's encrypted bits, a bit for each turn: 0 where it is the root. Nobody but its owner knows the `tag`."""
+    """One robot's encrypted bits, a bit for each turn: 0 where it is the root. Only its owner knows the `tag`."""
 
-    stage: Stage
+    stage: VectorStage
     tag: bytes
     ciphers: bytes
 
-    act = Act(Performative.REQUEST, "the receiver is to shuffle it, to open it, or to pass it on")
+    act = Act(Performative.REQUEST, "the receiver shuffles the vector, opens it, or sends it on")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
         to_do = {
-            Stage.TO_FIRST: "pass it on to the first of the ring",
-            Stage.MIXING: "shuffle it",
-            Stage.HOME: "pass it on to its owner",
-            Stage.OPENING: "take your share of the key off",
+            VectorStage.TO_FIRST: "pass it on to the first of the ring",
+            VectorStage.MIXING: "shuffle it",
+            VectorStage.HOME: "pass it on to its owner",
+            VectorStage.OPENING: "take your share of the key off",
         }
         return f"somebody's turns, encrypted ({self.tag[:2].hex()}): {to_do[self.stage]}"
 
@@ -100,20 +100,20 @@ RerootingMessage = Join | Setup | Vector | Next
 
 
 TAG = 16
-"""Bytes: two vectors have the same tag once in 2^128 pairs."""
+"""The bytes of a tag: two vectors have the same tag once in 2^128 pairs."""
 NUMBER_BITS = 62
 
 
 class RerootingProtocol(AnonymousTreeProtocol):
-    """One agent that takes its place in the circle, and finds out when it is the root.
+    """One agent that finds its place in the circle, and learns its turns as the root.
 
     State, besides the tree's:
 
     - `ring`: the place in the circle;
-    - `number` in it; `turns`, how many there are; `own_turns`, in which this robot is the root.
+    - `number` in it; `turns`, their number; `own_turns`, those in which this robot is the root.
     """
 
-    group: ClassVar[type[Group]] = Ed25519
+    group: ClassVar[type[PrimeGroup]] = Ed25519
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -129,37 +129,37 @@ class RerootingProtocol(AnonymousTreeProtocol):
     @property
     @abstractmethod
     def spare(self) -> int:
-        """Return the largest number of turns that are played for show."""
+        """The largest number of additional turns, which hide the number of robots."""
 
     @abstractmethod
     def start_turn(self) -> None:
-        """Be the root, if it is the own turn and known to be. Called once the own turns are known."""
+        """Be the root, if it is known to be this robot's turn. Called once its turns are known."""
 
     def join_ring(self, ring: Ring) -> TeamKey:
-        """Take a place in the circle; draw the own share of the team's key, and return it."""
+        """Enter the circle; draw this robot's share of the team's key, and return it."""
         self.ring = ring
         self._key = TeamKey(self._elements, self.secret)
         return self._key
 
     def in_ring(self) -> tuple[Ring, TeamKey]:
-        """Return the place in the circle, and the own share of the key. Raises `ValueError` before there are any."""
+        """Return the place in the circle, and this robot's share of the key. Raises `ValueError` if there are none."""
         if self.ring is None or self._key is None:
-            raise ValueError("the first tree is not built yet")
+            raise ValueError("the first tree is not complete yet")
         return self.ring, self._key
 
     def open_ring(self) -> None:
-        """As the first robot: send round who is in the circle."""
+        """As the first robot: start the round in which robots join the circle."""
         ring, key = self.in_ring()
         self.number = self.secret(NUMBER_BITS)
         self.send(ring.onward, Join(self.number + 1, key.share))
 
     def reroot(self, sender: str, message: Join | Setup | Vector) -> None:
-        """Process what goes round before the first turn."""
+        """Process a message of the circle before the first turn."""
         ring, _ = self.in_ring()
         match message:
             case Setup() as setup:
                 if sender != ring.parent:
-                    raise ValueError(f"{sender} has no key to tell")
+                    raise ValueError(f"{sender} sent an unexpected Setup")
                 self._set_up(setup)
             case Join() | Vector() as rest:
                 onward = ring.on_its_way(sender)
@@ -168,34 +168,34 @@ class RerootingProtocol(AnonymousTreeProtocol):
                 elif isinstance(rest, Join):
                     self._join(rest)
                 else:
-                    self._pass_vector(rest)
+                    self._process_vector(rest)
             case never:
                 assert_never(never)
 
     def _join(self, join: Join) -> None:
-        """Take the number; the first robot gets the key of all, and tells it."""
+        """Adopt the number; the first robot receives the sum of all keys, and sends it to all."""
         ring, key = self.in_ring()
         if key.joint != self._elements.zero or len(join.key) != self._elements.size:
-            raise ValueError("a place in the ring that cannot be")
+            raise ValueError("received an unexpected or invalid Join")
         if not ring.is_first:
             self.number = join.number
             self.send(ring.onward, Join(join.number + 1, key.added_to(join.key)))
             return
         robots = join.number - self.number
         if not 1 < robots <= len(self.order.names):
-            raise ValueError(f"a ring of {robots} robots")
+            raise ValueError(f"the ring has {robots} robots; it must have from 2 to {len(self.order.names)}")
         turns = robots + self.secret(64) % (self.spare + 1)
         offset = self.number - self.secret(64) % turns
         self._set_up(Setup(join.key, offset, turns))
         self._tag = self.secret(8 * TAG).to_bytes(TAG, "little")
-        mine = {self.number - offset, *((self.number + more - offset) % turns for more in range(robots, turns))}
-        self._mix(Vector(Stage.TO_FIRST, self._tag, self._vector(mine)))
+        own = {self.number - offset, *((self.number + more - offset) % turns for more in range(robots, turns))}
+        self._mix(Vector(VectorStage.TO_FIRST, self._tag, self._vector(own)))
 
     def _set_up(self, setup: Setup) -> None:
-        """Know the key, and tell it below; all but the first robot send their vectors off."""
+        """Store the key, and send it down; all but the first robot send off their vectors."""
         ring, key = self.in_ring()
         if self.turns or not 1 < setup.turns <= len(self.order.names) + self.spare:
-            raise ValueError(f"a key for {setup.turns} turns")
+            raise ValueError(f"received an unexpected or invalid Setup of {setup.turns} turns")
         self._elements.check(setup.key)
         key.joint = setup.key
         self.turns = setup.turns
@@ -204,54 +204,54 @@ class RerootingProtocol(AnonymousTreeProtocol):
             self.send(child, setup)
         if not ring.is_first:
             self._tag = self.secret(8 * TAG).to_bytes(TAG, "little")
-            mine = {(self.number - setup.offset) % self.turns}
-            self.send(ring.onward, Vector(Stage.TO_FIRST, self._tag, self._vector(mine)))
+            own = {(self.number - setup.offset) % self.turns}
+            self.send(ring.onward, Vector(VectorStage.TO_FIRST, self._tag, self._vector(own)))
 
     # Vectors
 
-    def _vector(self, mine: set[int]) -> bytes:
-        """Return the own vector, before it is shuffled."""
+    def _vector(self, own: set[int]) -> bytes:
+        """Return this robot's vector, before it is shuffled; `own` are its turns."""
         _, key = self.in_ring()
-        return b"".join([key.encrypt(bit=place not in mine) for place in range(self.turns)])
+        return b"".join([key.encrypt(bit=turn not in own) for turn in range(self.turns)])
 
-    def _pass_vector(self, vector: Vector) -> None:
-        """Shuffle, open, or pass on a vector that has come to this robot in the circle."""
+    def _process_vector(self, vector: Vector) -> None:
+        """Shuffle, open, or send on a vector that has arrived at this robot in the circle."""
         ring, key = self.in_ring()
         if len(vector.ciphers) != self.turns * key.size or len(vector.tag) != TAG:
-            raise ValueError("a vector that cannot be")
-        mine = vector.tag == self._tag
+            raise ValueError(f"received an invalid vector of {len(vector.ciphers):,} bytes for {self.turns:,} turns")
+        is_own = vector.tag == self._tag
         match vector.stage:
-            case Stage.TO_FIRST if ring.is_first:
+            case VectorStage.TO_FIRST if ring.is_first:
                 self._mix(vector)
-            case Stage.MIXING if not ring.is_first:
+            case VectorStage.MIXING if not ring.is_first:
                 self._mix(vector)
-            case Stage.MIXING | Stage.HOME if mine:
+            case VectorStage.MIXING | VectorStage.HOME if is_own:
                 self._tag = self.secret(8 * TAG).to_bytes(TAG, "little")
-                self.send(ring.onward, Vector(Stage.OPENING, self._tag, vector.ciphers))
-            case Stage.MIXING:
-                self.send(ring.onward, Vector(Stage.HOME, vector.tag, vector.ciphers))
-            case Stage.OPENING if mine:
+                self.send(ring.onward, Vector(VectorStage.OPENING, self._tag, vector.ciphers))
+            case VectorStage.MIXING:
+                self.send(ring.onward, Vector(VectorStage.HOME, vector.tag, vector.ciphers))
+            case VectorStage.OPENING if is_own:
                 self._read(vector.ciphers)
-            case Stage.OPENING:
+            case VectorStage.OPENING:
                 opened = b"".join([key.stripped(pair) for pair in key.checked(vector.ciphers)])
-                self.send(ring.onward, Vector(Stage.OPENING, vector.tag, opened))
+                self.send(ring.onward, Vector(VectorStage.OPENING, vector.tag, opened))
             case _:
                 self.send(ring.onward, vector)
 
     def _mix(self, vector: Vector) -> None:
-        """Put the vector in the own order, the same for all vectors, and encrypt it anew."""
+        """Shuffle the vector, in the same way for all vectors, and encrypt it again."""
         ring, key = self.in_ring()
         pairs = key.checked(vector.ciphers)
         mixed = b"".join([key.renewed(pairs[place]) for place in self._shuffle])
-        self.send(ring.onward, Vector(Stage.MIXING, vector.tag, mixed))
+        self.send(ring.onward, Vector(VectorStage.MIXING, vector.tag, mixed))
 
     def _read(self, ciphers: bytes) -> None:
-        """Take the own share off, and read in which turns this robot is the root."""
+        """Remove this robot's share, and read its turns as the root."""
         _, key = self.in_ring()
         if self.own_turns is not None:
-            raise ValueError("a vector that was opened before")
+            raise ValueError("received this robot's vector for the second time")
         opened = [key.stripped(pair) for pair in key.checked(ciphers)]
         self.own_turns = frozenset(turn for turn, one in enumerate(opened) if key.is_zero(one))
         if not self.own_turns:
-            raise ValueError("a vector without a turn")
+            raise ValueError("this robot's vector contains no turn")
         self.start_turn()

@@ -1,6 +1,6 @@
-"""The robots of a tree in a circle, depth first. What goes round it takes the tree's edges: nobody is written to anew.
+"""The robots of a tree in a circle, depth first. Messages in the circle use the tree's edges: no new links are needed.
 
-A robot that hands something on does not know who comes next, only through which neighbour.
+A robot that sends something on does not know the next robot, only the neighbour on the way to it.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 
 class Ring:
-    """One robot's place in the circle, from its place in the tree. The tree has two robots at least."""
+    """One robot's place in the circle, from its place in the tree. The tree has at least two robots."""
 
     def __init__(self, parent: str | None, children: Sequence[str]) -> None:
         self._parent = parent
@@ -17,14 +17,14 @@ class Ring:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the circle begins here: the tree's root."""
+        """Whether the circle begins here: the tree's root."""
         return self._parent is None
 
     @property
     def parent(self) -> str:
         """The neighbour above. Raises `ValueError` for the first robot."""
         if self._parent is None:
-            raise ValueError("nobody is above the first robot")
+            raise ValueError("the first robot of the circle has no parent")
         return self._parent
 
     @property
@@ -34,17 +34,18 @@ class Ring:
 
     @property
     def onward(self) -> str:
-        """The neighbour through which the next robot is reached."""
+        """The neighbour on the way to the next robot."""
         return self.children[0] if self.children else self.parent
 
     def on_its_way(self, sender: str) -> str | None:
-        """Return the neighbour that a message from `sender` goes on to; None: it is for this robot.
+        """Return the neighbour to which a message from `sender` is sent on; None: it is for this robot.
 
-        From above it is; from a child it is for the next child, or on its way up, or back at the first robot.
+        A message from above is for this robot; one from a child is for the next child, or on its way up, or back at
+        the first robot.
         """
         if sender == self._parent:
             return None
         if sender not in self.children:
-            raise ValueError(f"{sender} is not in the tree here")
+            raise ValueError(f"{sender} is not a neighbour in the tree")
         later = self.children[self.children.index(sender) + 1 :]
         return later[0] if later else self._parent
