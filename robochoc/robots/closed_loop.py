@@ -1,7 +1,7 @@
 """The closed loop: decisions reach robots, and the robots' situation changes the problem (the paper, Section 4.2).
 
-After each epoch the decision is published; then reports of the robots are awaited. The first report that changes the
-problem opens the next epoch, together with what comes within `TOGETHER_S` of it, and the team solves again.
+After each epoch the decision is published; then the loop waits for reports of the robots. The first report that changes
+the problem opens the next epoch, together with further reports within `TOGETHER_S`, and the team solves again.
 """
 
 from __future__ import annotations
@@ -32,6 +32,11 @@ from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Tea
 from robochoc.robots.mission_publisher import MissionPublisher
 from robochoc.robots.situation import BATTERY, Situation
 
+_ANSWERED = (Verdict.SOLUTION, Verdict.OPTIMAL)
+_WITHDRAWN = "withdr"
+"""The part of the master's text that stands for withdrawn robots."""
+
+
 TOGETHER_S = 0.5
 """Reports within this number of seconds after one that changes the problem belong to the same event."""
 
@@ -39,7 +44,7 @@ TOGETHER_S = 0.5
 _FLOWN = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
-class News(NamedTuple):
+class ReportedChanges(NamedTuple):
     """Changes that were reported during the search. Reports until `until_s` belong to the same event."""
 
     changes: list[Change]
@@ -54,7 +59,7 @@ class Feedback(ABC):
     idle: Callable[[], None] = staticmethod(lambda: None)
     """Called regularly while no report arrives."""
     simulated: bool = False
-    """True if the robots are simulated here, and so do not publish their reports themselves."""
+    """True if the robots are simulated here: then their reports are published here as well."""
 
     @property
     def notes(self) -> list[str]:
@@ -67,38 +72,38 @@ class Feedback(ABC):
 
     @abstractmethod
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
-        """Handle a published decision. Reports count for `left_s` seconds from now."""
+        """Handle a published decision. Reports are accepted for `left_s` seconds from now."""
 
     @abstractmethod
     def next(self, until_s: float | None) -> Report | None:
         """Return the next report, if it arrives before `until_s`; None if no more follow."""
 
     def poll(self) -> Report | None:
-        """Return a received report without waiting; None where time stops while the team decides."""
+        """Return a received report without waiting; None in a simulation, whose time stops while the team decides."""
         return None
 
 
 class ClosedLoop:
     """An environment of a run: publishes each decision, and opens an epoch when robots report a change.
 
-    What was received over a ROS is not published there again; it goes to recordings alone.
+    Reports received over ROS are not published there again; they are only recorded.
 
     Args:
         team: The team as its files have it.
-        publishers: They publish decisions and reports. The caller opens and closes their sinks.
-        feedback: Where reports come from; None: nothing changes the problem. Its clock gives the times.
-        scale: Metres a unit of the problem; None: as `mission.py` chooses.
-        battery: A drone with less charge is out of order.
+        publishers: Publishers of decisions and reports. The caller opens and closes their sinks.
+        feedback: The source of reports, and of the time; None: nothing changes the problem.
+        scale: The length of a unit of the problem, in metres; None: chosen by `mission.py`.
+        battery: The charge below which a drone is out of order.
         ground: A map of the ground, if there is one.
 
     Raises:
-        ValueError: The map has walls, and another `scale` is asked for.
+        ValueError: The map has walls, and `scale` differs from its scale.
         SinkError: Raised by methods: publishing failed.
         SourceError: Raised by methods: the source failed.
     """
 
     events: list[ScenarioEvent]
-    """The events that the robots' situation has caused."""
+    """The events caused by the robots' situation."""
     publishers: Sequence[MissionPublisher]
     """Publishers of decisions and reports."""
 
@@ -124,9 +129,9 @@ class ClosedLoop:
         self._legs: list[Leg] = []
         self._goals: dict[int, Goal] = {}
         self._improved: Leg | None = None
-        """The answer that was published last of the epoch that goes on."""
-        self._news: News | None = None
-        self._happened = 0
+        """The last published answer of the current epoch."""
+        self._news: ReportedChanges | None = None
+        self._past_events = 0
         self._lost = True
         self.events = []
         self.publishers = publishers
@@ -135,7 +140,7 @@ class ClosedLoop:
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         """Publish the decision of `epoch` for `team`; return the event that follows within `left_s` seconds."""
-        self._happened += not self._lost
+        self._past_events += not self._lost
         self._lost = bool(epoch.lost)
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
         leg, self._improved = self._improved, None
@@ -150,7 +155,7 @@ class ClosedLoop:
         self.feedback.on_decision(builder, leg, left_s)
         if epoch.lost or left_s == 0:
             return None
-        event = self._sensed(self.feedback, self._coming(team, self._happened), builder)
+        event = self._event_of_reports(self.feedback, self._after_known_events(team, self._past_events), builder)
         if event:
             self.events.append(event)
         return event
@@ -163,9 +168,9 @@ class ClosedLoop:
             self._decide(leg)
 
     def improve(self, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        """Publish what is decided while the team searches on: waypoints of drones alone that are to go elsewhere now.
+        """Publish a better answer during the search: only waypoints of drones whose goals have changed.
 
-        What is flown in a simulation is the last decision of an epoch: time does not go by while the team decides.
+        A simulation flies only the last decision of an epoch, since its time stops while the team decides.
         """
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
         leg = builder.leg(epoch, withdrawn)
@@ -176,25 +181,25 @@ class ClosedLoop:
         self._decide(replace(leg, goals=goals))
 
     def has_news(self, team: Team) -> bool:
-        """Return whether a received report changes the problem of `team`: it opens the next epoch."""
+        """Return whether a received report changes the problem of `team`, which opens the next epoch."""
         feedback, builder = self.feedback, self._builder
         if feedback is None or builder is None or self._improved is None:
             return False
-        team = self._coming(team, self._happened + (not self._lost))
+        team = self._after_known_events(team, self._past_events + (not self._lost))
         while self._news is None and (report := feedback.poll()) is not None:
             changes = self._situation_of(builder).changes(team, report)
             if changes:
-                self._news = News([*changes], report.at_s + TOGETHER_S)
+                self._news = ReportedChanges([*changes], report.at_s + TOGETHER_S)
         return self._news is not None
 
     @property
     def team(self) -> Team:
-        """Return the team with a scenario of all planned events, and all events from robots' reports."""
+        """The team with a scenario of all planned events, and all events from robots' reports."""
         return replace(self._team, scenario=(*self._team.scenario, *self.events))
 
     @property
     def mission(self) -> Mission | None:
-        """Return the mission so far. None before the first epoch is over."""
+        """The mission so far. None before the first epoch has ended."""
         return self._builder.mission(self._team.name, self._legs) if self._builder else None
 
     @property
@@ -206,7 +211,7 @@ class ClosedLoop:
     # Decisions
 
     def _new_builder(self, assignment: Assignment) -> MissionBuilder:
-        """Return a builder for all drones. They stand below where they go first, or where they could go."""
+        """Return a builder for all drones. They stand below their first places, or below possible ones."""
         first = {**_values(self._robots, 0), **assignment}
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
@@ -221,13 +226,13 @@ class ClosedLoop:
 
     # The situation
 
-    def _coming(self, team: Team, happened: int) -> Team:
-        """Return `team` after all events that are already known, of which so many have `happened`."""
+    def _after_known_events(self, team: Team, happened: int) -> Team:
+        """Return `team` after all known events, of which the first `happened` are already applied."""
         for event in self.team.scenario[happened:]:
             team, _ = apply_possible_changes(team, event.changes)
         return team
 
-    def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
+    def _event_of_reports(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
         """Return the event of the first reports that change `team`; None if there is no such report."""
         situation = self._situation_of(builder)
         changes: list[Change] = []
@@ -251,16 +256,46 @@ class ClosedLoop:
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:
-    """Return all drones of the team and of its events. Their places are unknown before the first decision."""
+    """Return all drones of the team and of its events. Their places are not known before the first decision."""
     robots = all_robots(team)
     return MissionBuilder(robots, _values(robots, 0)).drones
 
 
 def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> dict[str, int]:
-    """Return each variable's least value (`place` 0) or greatest (-1); only of those that span no more than `span`."""
+    """Return each variable's least value (`place` 0) or greatest (-1); only of domains no wider than `span`."""
     found = {}
     for variable in (variable for robot in robots for variable in robot.variables):
         ranges = variable.domain.ranges
         if ranges and (span is None or ranges[-1][-1] - ranges[0][0] <= span):
             found[variable.name] = ranges[place][place]
     return found
+
+
+def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
+    """Return the drones of `robot` before the first decision."""
+    return MissionBuilder([robot], {}).drones
+
+
+def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
+    """Return the goals of the drones of one robot on its own machine, where other robots' places are not known.
+
+    Goals are by the drones' numbers in `drones_of_robot`. A withdrawn robot lands at its first place, below its cell: a
+    point at the edge might belong to another robot. A drone without a cell in its file stays in place; so do all drones
+    if there is no solution.
+
+    Args:
+        robot: The robot.
+        why: The master's text on the end of the run: `optimal, 6 withdraw`.
+        assignment: The robot's decision; empty if it has withdrawn.
+        scale: The length of a unit, in metres.
+    """
+    verdict, _, others = why.partition(",")
+    if verdict not in _ANSWERED or not (assignment or _WITHDRAWN in others):
+        return Leg(why, Verdict.UNKNOWN, {})
+    builder = MissionBuilder([robot], assignment, scale=scale)
+    known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}
+    if assignment:
+        goals = builder.leg(EpochOutcome(Verdict(verdict), robots=(robot.name,), assignment=dict(assignment))).goals
+    else:
+        goals = {number: Goal(drone.home, lands=True) for number, drone in enumerate(builder.drones)}
+    return Leg(why, Verdict(verdict), {n: goal for n, goal in goals.items() if builder.drones[n].name in known})

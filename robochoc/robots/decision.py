@@ -28,27 +28,27 @@ PERIOD_S = 0.5
 FEEDBACK_CHARACTERS_MAX = 128 * 1024
 """An assignment that makes feedback longer is left out."""
 
-Tell = Callable[[str], None]
-"""Takes feedback, as JSON on one line."""
+SendFeedback = Callable[[str], None]
+"""Sends feedback, as JSON on one line."""
 
 
 class CancellableDecision:
     """Solves teams' problems, one at a time. Any thread may cancel the current search.
 
     Args:
-        tell: Called with feedback during a search (None: no feedback, and events are ignored).
+        send: Called with feedback during a search. None: no feedback, and events are ignored.
     """
 
-    def __init__(self, tell: Tell | None = None) -> None:
-        self._tell = tell
+    def __init__(self, send: SendFeedback | None = None) -> None:
+        self._send_text = send
         self._lock = threading.Lock()
         self._team = ""
 
     def __call__(self, team: Team, options: Options) -> Outcome:
         """Return the outcome. Raises the errors of `solve`."""
-        feedback = None if self._tell is None else _Feedback(team, options, self._tell)
+        feedback = None if self._send_text is None else _Feedback(team, options, self._send_text)
         with stop_heard():
-            self._is_now(team.name)
+            self._set_team(team.name)
             try:
                 if feedback is None:
                     return solve(team, options)
@@ -56,31 +56,31 @@ class CancellableDecision:
                 feedback.end(outcome.verdict.value)
                 return outcome
             finally:
-                self._is_now("")
+                self._set_team("")
 
     def cancel(self, _: Fields) -> dict[str, Any]:
-        """Return the answer to a request `std_srvs/Trigger_Request` to decide no longer.
+        """Cancel the current decision; return the answer to the request `std_srvs/Trigger_Request`.
 
-        The decision ends with the best that is known, as at the end of its time, and is then answered.
+        The decision ends with the best known assignment, as at the end of its time, and is then answered.
         """
         with self._lock:
             if not self._team:
                 return {"success": False, "message": "no team is deciding"}
             request_stop()
-            return {"success": True, "message": f"{self._team} decides no longer"}
+            return {"success": True, "message": f"the decision of {self._team} is cancelled"}
 
-    def _is_now(self, team: str) -> None:
+    def _set_team(self, team: str) -> None:
         with self._lock:
             self._team = team
 
 
 class _Feedback:
-    """Follows one decision: how long it takes, how many messages it took, and the cheapest assignment so far."""
+    """Feedback of one decision: its duration, its number of messages, and the cheapest assignment so far."""
 
-    def __init__(self, team: Team, options: Options, tell: Tell) -> None:
-        self._team, self._tell = team, tell
-        self._began = time.monotonic()
-        self._told = self._began
+    def __init__(self, team: Team, options: Options, send: SendFeedback) -> None:
+        self._team, self._send_text = team, send
+        self._started_s = time.monotonic()
+        self._sent_s = self._started_s
         self._lock = threading.Lock()
         self._events: list[AnyEvent] = []
         self._messages = 0
@@ -89,34 +89,34 @@ class _Feedback:
         self._assignment: dict[str, int] = {}
         self._objective: Objective | None = None
         self._reader = TeamReader()
-        with suppress(Exception):  # `solve` says what is wrong with the team
+        with suppress(Exception):  # `solve` reports errors of the team
             objective = objective_to_record(team, options)
             self._objective = objective and objective()
 
     def observe(self, event: AnyEvent) -> None:
-        """Take an event, in any thread."""
+        """Store an event, in any thread."""
         if isinstance(event, Decided | Heard | Given):
             with self._lock:
                 self._events.append(event)
 
     def progress(self, progress: Progress) -> None:
-        """Tell how far it is, not too often."""
+        """Send the progress, at most once in `PERIOD_S`."""
         self._messages = max(self._messages, progress.messages)
         now = time.monotonic()
-        if now - self._told >= PERIOD_S:
-            self._told = now
-            self._say({"state": "deciding"})
+        if now - self._sent_s >= PERIOD_S:
+            self._sent_s = now
+            self._send({"state": "deciding"})
 
     def end(self, verdict: str) -> None:
-        """Tell that it is over."""
-        self._say({"state": "decided", "verdict": verdict})
+        """Send the verdict."""
+        self._send({"state": "decided", "verdict": verdict})
 
-    def _say(self, first: Mapping[str, object]) -> None:
-        self._follow()
-        told: dict[str, object] = {
+    def _send(self, first: Mapping[str, object]) -> None:
+        self._apply_events()
+        report: dict[str, object] = {
             "team": self._team.name,
             **first,
-            "elapsed_s": round(time.monotonic() - self._began, 3),
+            "elapsed_s": round(time.monotonic() - self._started_s, 3),
             "messages": self._messages,
             "robots": len(self._team.robots),
             "decided": sum(map(bool, self._own.values())),
@@ -124,11 +124,11 @@ class _Feedback:
         if self._objective is not None and self._best < INFINITE:
             best = {"cost": str(self._objective.told(self._best)), "assignment": self._assignment}
             if len(msgspec.json.encode(best)) <= FEEDBACK_CHARACTERS_MAX:
-                told |= best
-        self._tell(msgspec.json.encode(told).decode())
+                report |= best
+        self._send_text(msgspec.json.encode(report).decode())
 
-    def _follow(self) -> None:
-        """Go through the events since the last time."""
+    def _apply_events(self) -> None:
+        """Apply the events since the last call."""
         with self._lock:
             events, self._events = self._events, []
         for event in events:
@@ -139,16 +139,16 @@ class _Feedback:
                     self._own[event.robot] = event.assignment
                     if self._objective is not None:
                         self._objective.change({event.robot: event.assignment})
-                        self._weigh(self._objective.cost, self._own)
+                        self._update_best(self._objective.cost, self._own)
                 case Heard() if self._objective is not None:
                     shown = self._objective.shown(event.values)
                     if shown is not None:
-                        self._weigh(float(event.cost), shown)
+                        self._update_best(float(event.cost), shown)
                 case _:
                     pass
 
-    def _weigh(self, cost: float, own: Mapping[str, Mapping[str, int]]) -> None:
-        """Keep `own` if it is cheaper than all before."""
+    def _update_best(self, cost: float, own: Mapping[str, Mapping[str, int]]) -> None:
+        """Store `own` if it is cheaper than the best assignment so far."""
         if cost < self._best:
             self._best = cost
             self._assignment = {name: value for robot in sorted(own) for name, value in own[robot].items()}

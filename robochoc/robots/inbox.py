@@ -15,59 +15,59 @@ WEIGHT_MAX = 16_000_000
 """The number of characters and fields stored for all topics together."""
 
 
-class _Kept(NamedTuple):
+class _StoredMessage(NamedTuple):
     number: int
     received: ReceivedMessage
     weight: int
 
 
 class MessageInbox:
-    """Messages in the order of their arrival. Any thread may add some; one thread reads them.
+    """Messages in the order of their arrival. Any thread may add messages; one thread reads them.
 
-    A topic with too many loses its own oldest messages, not those of others: batteries that report ten times a second
-    while the team solves do not displace the message that a cell is blocked.
+    A topic with too many messages loses its own oldest ones, not those of other topics: battery reports ten times a
+    second during a search do not displace a report of a blocked cell.
     """
 
     def __init__(self, per_topic: int = PER_TOPIC_MAX, weight: int = WEIGHT_MAX) -> None:
         self._per_topic, self._most = per_topic, weight
-        self._topics: dict[str, deque[_Kept]] = {}
+        self._topics: dict[str, deque[_StoredMessage]] = {}
         self._weight = 0
         self._count = 0
-        self._came = threading.Condition()
+        self._arrived = threading.Condition()
 
     def put(self, received: ReceivedMessage, weight: int = 1) -> None:
         """Add `received`, with this number of characters and fields."""
-        with self._came:
-            kept = self._topics.setdefault(received.topic, deque())
-            kept.append(_Kept(self._count, received, weight))
+        with self._arrived:
+            stored = self._topics.setdefault(received.topic, deque())
+            stored.append(_StoredMessage(self._count, received, weight))
             self._count += 1
             self._weight += weight
-            if len(kept) > self._per_topic:
-                self._weight -= kept.popleft().weight
+            if len(stored) > self._per_topic:
+                self._weight -= stored.popleft().weight
             while self._weight > self._most:
-                loudest = max(self._topics.values(), key=lambda kept: sum(one.weight for one in kept))
+                loudest = max(self._topics.values(), key=lambda stored: sum(one.weight for one in stored))
                 self._weight -= loudest.popleft().weight
-            self._came.notify()
+            self._arrived.notify()
 
     def wake(self) -> None:
         """Wake the waiting thread: nothing more will arrive."""
-        with self._came:
-            self._came.notify()
+        with self._arrived:
+            self._arrived.notify()
 
-    def get(self, wait_s: float, *, over: threading.Event | None = None) -> ReceivedMessage | None:
-        """Return the oldest message; None if none comes within `wait_s`, or before it is `over`."""
+    def get(self, wait_s: float, *, stopped: threading.Event | None = None) -> ReceivedMessage | None:
+        """Return the oldest message; None if none arrives within `wait_s`, or before `stopped` is set."""
         until = time.monotonic() + wait_s
-        with self._came:
+        with self._arrived:
             while True:
-                waiting = [kept for kept in self._topics.values() if kept]
+                waiting = [stored for stored in self._topics.values() if stored]
                 if waiting:
-                    oldest = min(waiting, key=lambda kept: kept[0].number).popleft()
+                    oldest = min(waiting, key=lambda stored: stored[0].number).popleft()
                     self._weight -= oldest.weight
                     return oldest.received
                 left = until - time.monotonic()
-                if left <= 0 or (over is not None and over.is_set()):
+                if left <= 0 or (stopped is not None and stopped.is_set()):
                     return None
-                self._came.wait(left)
+                self._arrived.wait(left)
 
 
 def weight_of(value: object) -> int:

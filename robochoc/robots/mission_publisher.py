@@ -1,4 +1,4 @@
-"""Publishers of a mission: the decisions, reports and poses of its drones, also those of a simulated flight."""
+"""Publishers of a mission: decisions, reports and poses of its drones, also from a simulated flight."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ class MissionPublisher(ABC):
     @property
     @abstractmethod
     def summary(self) -> str:
-        """Return the numbers of published messages as text, such as `10 waypoints, 6 landings`."""
+        """The numbers of published messages as text, such as `10 waypoints, 6 landings`."""
 
 
 class FlightBroadcast:
-    """Publishes a flight as its time goes by: reports, and all poses `POSES_HZ` times a second."""
+    """Publishes a flight step by step: reports, and all poses `POSES_HZ` times a second."""
 
     def __init__(self) -> None:
         self._ticks = 0
@@ -53,19 +53,19 @@ class FlightBroadcast:
     def publish(
         self, publishers: Sequence[MissionPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
     ) -> None:
-        """Publish what of `flown` was not published yet, up to `until_s`, and `reports` among it.
+        """Publish the poses of `flown` since the last call, up to `until_s`, and `reports` in the same order of time.
 
         Raises `SinkError`.
         """
-        untold = deque(reports)
+        pending = deque(reports)
         while (at_s := self._ticks / POSES_HZ) <= until_s:
-            while untold and untold[0].at_s <= at_s:
-                _report(publishers, untold.popleft())
+            while pending and pending[0].at_s <= at_s:
+                _report(publishers, pending.popleft())
             after = min(int(np.searchsorted(flown.times, at_s)), len(flown.times) - 1)
             for publisher in publishers:
                 publisher.poses(flown.positions[after], flown.attitudes[after], at_s)
             self._ticks += 1
-        for report in untold:
+        for report in pending:
             _report(publishers, report)
 
 

@@ -20,25 +20,25 @@ from robochoc.robots.closed_loop import TOGETHER_S, Feedback
 from robochoc.robots.mission_publisher import FlightBroadcast, nanoseconds
 
 NAMES_MAX = 12
-"""Drones that are named in an error."""
+"""The largest number of drones named in an error."""
 FAILS_S = 2.0
-"""The default time of a failure: the drone is in the air by then."""
+"""The default time of a failure: the drone is then in the air."""
 
 
 class CannotFlyError(Exception):
-    """The decision cannot be flown. The message says why."""
+    """The decision cannot be flown. The message has the reason."""
 
 
 class UnknownDroneError(Exception):
-    """A drone that is to fail does not exist. The message names those that do."""
+    """A drone that is to fail does not exist. The message names the existing drones."""
 
 
 @dataclass(frozen=True)
 class FlightSettings:
     """Conditions of a simulated flight, before its mission is known.
 
-    `failures` are names, of robots or of drones, with the second at which a motor stops. Of a robot's drones, the first
-    fails. `obstacles` are in units of the problem. The rest is as in `FlightConditions`.
+    `failures` are names of robots or drones, with the second at which a motor stops; of a robot's drones, the first
+    fails. `obstacles` are in units of the problem. The other attributes are those of `FlightConditions`.
     """
 
     distance: float | None = None
@@ -61,37 +61,37 @@ class FlightSettings:
             gusts=self.gusts,
             seed=self.seed,
             downwash=self.downwash,
-            failures=tuple(MotorFailure(_named(drones, name), at_s) for name, at_s in self.failures),
+            failures=tuple(MotorFailure(_drone_named(drones, name), at_s) for name, at_s in self.failures),
             obstacles=tuple((x * scale, y * scale, z * scale) for x, y, z in self.obstacles),
         )
 
 
-def _named(drones: Sequence[Drone], name: str) -> str:
-    """Return the name of the drone called `name`, or of the first one of that robot."""
+def _drone_named(drones: Sequence[Drone], name: str) -> str:
+    """Return the name of the drone called `name`, or of the first drone of that robot."""
     found = [drone for drone in drones if drone.name == name] or [drone for drone in drones if drone.robot == name]
     if not found:
         known = [drone.name for drone in drones]
         more = f" and {len(known) - NAMES_MAX} more" * (len(known) > NAMES_MAX)
-        raise UnknownDroneError(f"there is no drone {name!r} that could fail, but {', '.join(known[:NAMES_MAX])}{more}")
+        raise UnknownDroneError(f"there is no drone {name!r} to fail: choose {', '.join(known[:NAMES_MAX])}{more}")
     return found[0].name
 
 
 @dataclass
 class SimulatedFeedback(Feedback):
-    """Flies each decision in the simulation. It is over when all drones have reached their places.
+    """Flies each decision in the simulation. A decision is complete when all drones have reached their places.
 
-    A report ends the leg early: all other drones slow down and hover. After a report that changes nothing they fly on.
-    What was reported once is not reported again. Time begins at 0 with the first leg. Each decision is a leg of the
-    log, also one that was out of date before a drone could follow it. The team decides while all hover, and not before
-    all reports of an event are there. So a recording of the reports leads to the same run.
+    A report ends the leg early: all other drones slow down and hover. After a report without effect they continue.
+    Nothing is reported twice. Time begins at 0 with the first leg. Each decision is a leg of the log, even if it was
+    outdated before a drone could follow it. The team decides while all drones hover, and only after all reports of an
+    event. So a recording of the reports leads to the same run.
     """
 
     settings: FlightSettings
     simulated: bool = True
     _flight: Flight | None = None
     _leg: Leg | None = None
-    _follows: bool = False
-    """True if more of the decision is to be flown."""
+    _is_unfinished: bool = False
+    """True if the decision has not been flown completely."""
     _calls: list[int] = field(default_factory=list)
     """The number of calls of `Flight.fly` for each decision."""
     _waiting: deque[Report] = field(default_factory=deque)
@@ -122,14 +122,14 @@ class SimulatedFeedback(Feedback):
             except ValueError as refused:
                 raise CannotFlyError(on_one_line(str(refused))) from refused
         elif not self._calls[-1] and self._leg is not None:
-            self._go(self._flight, self._leg, {})
+            self._fly_leg(self._flight, self._leg, {})
         self._leg = leg
-        self._follows = True
+        self._is_unfinished = True
         self._calls.append(0)
 
     def next(self, until_s: float | None) -> Report | None:
         """Return the next report; see `Feedback.next`."""
-        while not self._waiting and until_s is None and self._follows and self._leg and self._flight:
+        while not self._waiting and until_s is None and self._is_unfinished and self._leg and self._flight:
             self._fly(self._flight, self._leg)
         if not self._waiting or (until_s is not None and self._waiting[0].at_s > until_s):
             return None
@@ -140,7 +140,7 @@ class SimulatedFeedback(Feedback):
         if self._flight is None or self._leg is None:
             return None
         if not self._calls[-1]:
-            self._go(self._flight, self._leg, self._leg.goals)
+            self._fly_leg(self._flight, self._leg, self._leg.goals)
         flown = self._flight.flown()
         stages = iter(flown.legs)
         parts = [list(islice(stages, calls)) for calls in self._calls]
@@ -149,22 +149,22 @@ class SimulatedFeedback(Feedback):
         )
 
     def _fly(self, flight: Flight, leg: Leg) -> None:
-        """Fly until a drone has something new to report, or all have reached their goals."""
-        reports = self._go(flight, leg, leg.goals, stop_on_report=True)
-        new = self._new(reports)
+        """Fly until a drone makes a new report, or all have reached their goals."""
+        reports = self._fly_leg(flight, leg, leg.goals, stop_on_report=True)
+        new = self._not_yet_reported(reports)
         if reports and not new:
-            self._go(flight, leg, leg.goals)
-        self._follows = bool(new)
+            self._fly_leg(flight, leg, leg.goals)
+        self._is_unfinished = bool(new)
         flown = flight.flown()
-        new += self._new(self._fallen(flown))
+        new += self._not_yet_reported(self._fallen(flown))
         while new and flown.times[-1] <= max(report.at_s for report in new) + TOGETHER_S:
-            self._go(flight, leg, {})
+            self._fly_leg(flight, leg, {})
             flown = flight.flown()
-            new += self._new(self._fallen(flown))
+            new += self._not_yet_reported(self._fallen(flown))
         self._waiting.extend(new)
-        self._tell(flown, new)
+        self._publish(flown, new)
 
-    def _go(
+    def _fly_leg(
         self, flight: Flight, leg: Leg, goals: Mapping[int, Goal], *, stop_on_report: bool = False
     ) -> tuple[Report, ...]:
         self._calls[-1] += 1
@@ -174,24 +174,24 @@ class SimulatedFeedback(Feedback):
             raise CannotFlyError(on_one_line(f"the decision cannot be flown: {refused}")) from refused
 
     def _fallen(self, flown: FlightLog) -> list[Report]:
-        """Return reports of drones that have fallen without a report."""
+        """Return reports for drones that have fallen without a report."""
         known = {report.drone for report in self._known if isinstance(report, OutOfOrder)}
         lost = [flown.names[number] for number in np.flatnonzero(np.isnan(flown.errors_m))]
         return [OutOfOrder(name, "has fallen", float(flown.times[-1])) for name in lost if name not in known]
 
-    def _new(self, reports: Sequence[Report]) -> list[Report]:
-        """Return those of `reports` that were not made before, by their times."""
-        new = sorted((one for one in reports if _what(one) not in self._known), key=lambda report: report.at_s)
-        self._known.update(map(_what, new))
+    def _not_yet_reported(self, reports: Sequence[Report]) -> list[Report]:
+        """Return the new reports, in the order of their times."""
+        new = sorted((one for one in reports if _without_time(one) not in self._known), key=lambda report: report.at_s)
+        self._known.update(map(_without_time, new))
         return new
 
-    def _tell(self, flown: FlightLog, reports: Sequence[Report]) -> None:
-        """Publish the flight since the last time, and the reports meanwhile, as time goes by."""
+    def _publish(self, flown: FlightLog, reports: Sequence[Report]) -> None:
+        """Publish the flight since the last call, with its reports."""
         self._now_s = float(flown.times[-1]) if len(flown.times) else self._now_s
         if self.publishers:
             self._broadcast.publish(self.publishers, flown, reports, self._now_s)
 
 
-def _what(report: Report) -> Report:
+def _without_time(report: Report) -> Report:
     """Return `report` without its time."""
     return replace(report, at_s=0.0)

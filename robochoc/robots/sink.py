@@ -1,14 +1,37 @@
-"""Sinks: where a mission's messages go. Packages offer them under the entry point group `robochoc.sinks`."""
+"""Sinks, which publish a mission's messages. Packages offer them under the entry point group `robochoc.sinks`."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
+from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.robots.waypoint import Waypoint
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """The goal of a drone: the paper's `/drone3.1/waypoint3.1` (Section 4.2)."""
+
+    drone: int
+    """The drone's number in the mission."""
+    topic: str
+    """The topic, by its name in ROS."""
+    kind: str
+    """The ROS type given in the robot's file."""
+    at: Point
+    """The place in metres, in `frame`."""
+    lands: bool
+    """True if the drone is to land there, because its robot has withdrawn."""
+    frame: str
+    stamp: int
+    """The time of the decision, in nanoseconds."""
+    before: Point | None = None
+    """The previous goal; None if the drone had none."""
+
 
 Fields = Mapping[str, Any]
 """A message's fields by their ROS names, nested. Times (`stamp`) are integers, in nanoseconds. A field without a value
@@ -17,20 +40,20 @@ is zero, or empty.
 
 
 class SinkError(Exception):
-    """The sink cannot be opened or written to. The message says why, and what might help."""
+    """The sink cannot be opened or written to. The message has the reason, and a hint."""
 
 
 class Sink(ABC):
     """Receives messages. It is a context manager: the caller that opens it closes it.
 
-    `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
+    `place` is the text after its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
     """
 
     live: bool = True
-    """True if robots may receive what is published. False for a recording, which only stores it."""
+    """True if robots may receive the messages. False for a recording."""
 
     arms: bool = False
-    """True if it commands robots, which `allow_arming` lets it arm."""
+    """True if it commands robots, which it may arm only after `allow_arming`."""
     summary: str = ""
     """The results of the decisions, after `close`; empty if it only publishes."""
 
@@ -58,7 +81,7 @@ class Sink(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Finish: everything has been published. A file appears in its place only now. Raises `SinkError`."""
+        """Finish after the last message. A file appears in its place only now. Raises `SinkError`."""
 
     def discard(self) -> None:
         """Finish after an error, without partial output."""

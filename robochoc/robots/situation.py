@@ -1,7 +1,7 @@
-"""Robots' reports and what they change in the problem: the paper's "read the robot situation" (Section 4.2).
+"""Derives changes of the problem from robots' reports: the paper's "read the robot situation" (Section 4.2).
 
 An obstacle removes values. A drone that cannot fly any more removes its robot from the team. When an obstacle is gone,
-values come back. Pure: a team and a report go in, changes of that team come out.
+its values are added again. Without side effects: from a team and a report follow the changes of that team.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import assert_never
 
 from robochoc.flight.crafts import Craft, crafts_of
@@ -18,28 +19,30 @@ from robochoc.flight.mission import Drone
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
-from robochoc.robots.point_index import PointIndex
 
+_Cell = tuple[int, int, int]
+_A_HAIR_MORE = 1 + 1e-9
+"""A point just outside a cube may still be near: distances are rounded."""
 BATTERY = 0.2
 """The default charge below which a drone is out of order."""
 WITHIN = 0.5
 """The distance, in units, within which an obstacle blocks places."""
 VALUES_MAX = 10_000
-"""The values of a larger domain are not tried one by one."""
+"""The largest domain whose values are tried one by one."""
 OBSTACLES_MAX = 10_000
-"""Obstacles that are remembered."""
+"""The largest number of stored obstacles."""
 NOTES_MAX = 20
-"""Notes about reports that change nothing."""
+"""The largest number of notes about reports that change nothing."""
 FLIES, LIES = 0.5, 0.25
-"""A drone this many units above its home flies; one lower than the second number lies on the ground."""
+"""Heights above its home, in units: a drone flies from the first on, and lies on the ground below the second."""
 LIES_S, LIES_TIMES = 1.0, 3
 """A drone that has flown is out of order after this number of reports on the ground, over this number of seconds."""
 _HAIR = 1e-6
 
 
 @dataclass
-class _Seen:
-    """The state of a drone, as its poses have shown it."""
+class _PoseHistory:
+    """The state of a drone, derived from its poses."""
 
     flew: bool = False
     lies_since: float = 0.0
@@ -49,14 +52,14 @@ class _Seen:
 class Situation:
     """The known situation of obstacles and of the drones.
 
-    A drone is also out of order when its poses say so: it was seen in the air (`FLIES`), and now lies on the ground
-    (`LIES`) for at least `LIES_TIMES` reports over at least `LIES_S` seconds, though its robot is in the team and so
-    is not to land. Its distance from its goal says nothing: it may be on its way, wait for others to pass, or hover
-    while the team decides.
+    A drone is also out of order if its poses show it: it was in the air (`FLIES`), and now lies on the ground (`LIES`)
+    for at least `LIES_TIMES` reports over at least `LIES_S` seconds, although its robot is in the team and so should
+    not land. Its distance from its goal is not used: it may be on its way, wait for others to pass, or hover while the
+    team decides.
 
     Args:
         drones: All drones that ever fly.
-        scale: Metres a unit of the problem.
+        scale: The length of a unit of the problem, in metres.
         battery: The charge, 0 to 1, below which a drone is out of order.
     """
 
@@ -69,9 +72,9 @@ class Situation:
         self._homes = {(drone.robot, drone.name): _in_units(drone.home, scale) for drone in drones}
         self._scale = scale
         self._battery = battery
-        self._seen: dict[str, _Seen] = {}
+        self._seen: dict[str, _PoseHistory] = {}
         self._obstacles = PointIndex()
-        self._taken: dict[tuple[str, int], set[Point]] = {}
+        self._removed: dict[tuple[str, int], set[Point]] = {}
         self.notes = []
 
     def changes(self, team: Team, report: Report) -> tuple[Change, ...]:
@@ -99,13 +102,13 @@ class Situation:
         if self._obstacles.any_near(place, _HAIR):
             return ()
         if len(self._obstacles) >= OBSTACLES_MAX:
-            self._note(f"more than {OBSTACLES_MAX:,} places are blocked: further ones are passed over")
+            self._note(f"more than {OBSTACLES_MAX:,} places are blocked: further obstacles are ignored")
             return ()
         self._obstacles.add(place)
         noted = len(self.notes)
-        found = tuple(self._taking(team, place))
+        found = tuple(self._removed_values(team, place))
         if not found and len(self.notes) == noted:
-            self._note(f"no drone is ever sent to the obstacle at {_shown(place)}: it changes nothing")
+            self._note(f"no drone is ever sent to the obstacle at {_point_text(place)}: it changes nothing")
         return found
 
     def _cleared(self, team: Team, place: Point) -> tuple[Change, ...]:
@@ -114,40 +117,42 @@ class Situation:
             return ()
         free = [
             value
-            for value, places in self._taken.items()
+            for value, places in self._removed.items()
             if not any(self._obstacles.any_near(one, WITHIN + _HAIR) for one in places)
         ]
         for value in free:
-            del self._taken[value]
+            del self._removed[value]
         return tuple(
             AddValue(variable, value)
             for variable, value in free
             if variable in team.owner and value not in team.variables[variable].domain
         )
 
-    def _taking(self, team: Team, place: Point) -> Iterator[RemoveValue]:
-        """The values by which a drone of `team` would be at `place`; they are kept in mind."""
+    def _removed_values(self, team: Team, place: Point) -> Iterator[RemoveValue]:
+        """Yield, and record, the values that would send a drone of `team` to `place`."""
         for robot in team.robots:
             gone = set()
             for number, craft in enumerate(crafts_of(robot, {})):
                 for variable, value, there in self._values_at(robot, number, craft, place):
-                    self._taken.setdefault((variable, value), set()).add(there)
+                    self._removed.setdefault((variable, value), set()).add(there)
                     gone.add((variable, value))
             yield from (RemoveValue(variable, value) for variable, value in sorted(gone))
 
     def _values_at(self, robot: Robot, number: int, craft: Craft, place: Point) -> Iterator[tuple[str, int, Point]]:
-        """Yield the variable and the values that would send a drone to `place`, and where exactly that is."""
+        """Yield the variable and the values that would send a drone near `place`, and its exact place."""
         if not _may_reach(craft, self._homes.get((robot.name, craft.name)), place):
             return
         if len(craft.decided_by) != 1:
             by = " and ".join(craft.decided_by) or "no variable"
-            self._regret(craft, place, f"its place depends on {by}, so no value alone can be taken away")
+            self._note_unusable(craft, place, f"its place depends on {by}, so no single value can be removed")
             return
         variable = craft.decided_by[0]
         domain = next((own.domain for own in robot.variables if own.name == variable), None)
         values = _candidates(craft, variable, domain, place) if domain else ()
         if values is None:
-            self._regret(craft, place, f"{variable} has too many values to look through (more than {VALUES_MAX:,})")
+            self._note_unusable(
+                craft, place, f"{variable} has too many values to check (more than {VALUES_MAX:,})"
+            )
             return
         for value in values:
             there = self._place_of(crafts_of(robot, {variable: value})[number])
@@ -155,13 +160,15 @@ class Situation:
                 yield variable, value, there
 
     def _place_of(self, craft: Craft) -> Point | None:
-        """Return where a craft flies, in units; one without a cell flies above its home."""
+        """Return the place to which a craft flies, in units; a craft without a cell flies above its home."""
         home = self._homes.get((craft.robot, craft.name))
         across = craft.cell or (home[:2] if home else None)
         return None if craft.level is None or across is None else (*across, craft.level)
 
-    def _regret(self, craft: Craft, place: Point, why: str) -> None:
-        self._note(f"the obstacle at {_shown(place)} may be in the way of {craft.name}, and changes nothing: {why}")
+    def _note_unusable(self, craft: Craft, place: Point, why: str) -> None:
+        self._note(
+            f"the obstacle at {_point_text(place)} may be in the way of {craft.name}, and changes nothing: {why}"
+        )
 
     def _note(self, text: str) -> None:
         if text not in self.notes and len(self.notes) < NOTES_MAX:
@@ -170,8 +177,8 @@ class Situation:
     # Poses
 
     def _is_down(self, drone: Drone, pose: Pose) -> bool:
-        """Return whether the drone has fallen, see `Situation`."""
-        seen = self._seen.setdefault(drone.name, _Seen())
+        """Return whether the drone has fallen; see `Situation`."""
+        seen = self._seen.setdefault(drone.name, _PoseHistory())
         height = (pose.place[2] - drone.home[2]) / self._scale
         if height >= FLIES:
             seen.flew = True
@@ -183,7 +190,7 @@ class Situation:
         seen.times += 1
         down = seen.times >= LIES_TIMES and pose.at_s - seen.lies_since >= LIES_S
         if down:
-            self._seen[drone.name] = _Seen()
+            self._seen[drone.name] = _PoseHistory()
         return down
 
 
@@ -213,7 +220,7 @@ def _candidates(craft: Craft, variable: str, domain: Domain, place: Point) -> It
 
 
 def _fixed(expression: Expression | None) -> int | None:
-    """Return the value of `expression`; None if it has a variable, or no value."""
+    """Return the value of `expression`; None if it contains a variable, or is undefined."""
     if expression is None or names(expression):
         return None
     try:
@@ -231,5 +238,55 @@ def _is_near(one: Point, other: Point) -> bool:
     return math.dist(one, other) <= WITHIN + _HAIR
 
 
-def _shown(place: Point) -> str:
+def _point_text(place: Point) -> str:
     return ", ".join(f"{at:g}" for at in place)
+
+
+class PointIndex:
+    """Points in space, grouped by unit cube, so that near points are found quickly.
+
+    The same point may be added several times. Only cubes that contain points use memory.
+    """
+
+    def __init__(self) -> None:
+        self._cubes: dict[_Cell, list[Point]] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def cubes(self) -> int:
+        """The number of cubes that contain points."""
+        return len(self._cubes)
+
+    def add(self, place: Point) -> None:
+        """Add a point."""
+        x, y, z = map(math.floor, place)
+        self._cubes.setdefault((x, y, z), []).append(place)
+        self._count += 1
+
+    def any_near(self, place: Point, within: float) -> bool:
+        """Return whether a point is within a distance of `place`."""
+        return any(
+            math.dist(place, other) <= within for cell in self._around(place, within) for other in self._cubes[cell]
+        )
+
+    def remove_near(self, place: Point, within: float) -> bool:
+        """Remove the points within a distance of `place`; return whether there were any."""
+        before = self._count
+        for cell in self._around(place, within):
+            points = self._cubes.pop(cell)
+            far = [other for other in points if math.dist(place, other) > within]
+            self._count -= len(points) - len(far)
+            if far:
+                self._cubes[cell] = far
+        return self._count < before
+
+    def _around(self, place: Point, within: float) -> Iterator[_Cell]:
+        """Yield the cubes that contain points and are within a distance of `place`."""
+        reach = within * _A_HAIR_MORE
+        spans = (range(math.floor(at - reach), math.floor(at + reach) + 1) for at in place)
+        for x, y, z in product(*spans):
+            if (x, y, z) in self._cubes:
+                yield x, y, z

@@ -1,4 +1,4 @@
-"""Sources: where messages about the robots' situation come from. Packages offer them under `robochoc.sources`."""
+"""Sources of messages about the robots' situation. Packages offer them under the entry points `robochoc.sources`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ REPORTS: Mapping[str, str] = MappingProxyType(
 
 
 class SourceError(Exception):
-    """The source cannot be opened or read. The message says why, and what might help."""
+    """The source cannot be opened or read. The message has the reason, and a hint."""
 
 
 class ReceivedMessage(NamedTuple):
@@ -37,20 +37,20 @@ class ReceivedMessage(NamedTuple):
 class Source(ABC):
     """Yields messages. It is a context manager: the caller that opens it closes it.
 
-    `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
+    `place` is the text after its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
     """
 
     live: bool = True
-    """True if messages arrive in real time. A recording has them all, so there is no waiting."""
+    """True if messages arrive in real time. A recording already has all messages, so there is no waiting."""
 
     def __init__(self, place: str) -> None:
         self.place = place
         self.others: dict[str, str] = {}
-        """Further topics of a recording, with their types; only the first of them."""
+        """Other topics of a recording, with their types; the first few only."""
 
     @property
     def is_busy(self) -> bool:
-        """Return whether robots are still on their way: the wait for their reports begins at their arrival."""
+        """Whether robots are still flying: the wait for their reports begins at their arrival."""
         return False
 
     def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only sources that know robots by name need them
@@ -65,7 +65,7 @@ class Source(ABC):
 
     @abstractmethod
     def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the next message; None if a recording is over, or nothing came within `wait_s`.
+        """Return the next message; None at the end of a recording, or if none arrives within `wait_s`.
 
         Raises `SourceError`.
         """

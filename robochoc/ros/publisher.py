@@ -16,9 +16,8 @@ from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.mission_publisher import MissionPublisher, nanoseconds
-from robochoc.robots.sink import Fields, Sink
+from robochoc.robots.sink import Fields, Sink, Waypoint
 from robochoc.robots.source import REPORTS
-from robochoc.robots.waypoint import Waypoint
 from robochoc.ros.names import TEAM_TOPICS, TopicNames
 from robochoc.ros.team_topics import BODY, GOAL, WAYPOINTS_ALONE, PublishOptions, status, transform, transforms
 from robochoc.ros.waypoint_types import NoMappingError, WaypointMapping, mapping_of, point

@@ -17,8 +17,7 @@ from typing import cast
 
 from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.robots.sink import Fields
-from robochoc.robots.waypoint import Waypoint
+from robochoc.robots.sink import Fields, Waypoint
 from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
 
 GROUP = "robochoc.waypoints"

@@ -15,8 +15,7 @@ from typing import ClassVar
 from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.maps.routes.distances import SLACK_M
-from robochoc.robots.sink import Fields, Sink, SinkError
-from robochoc.robots.waypoint import Waypoint
+from robochoc.robots.sink import Fields, Sink, SinkError, Waypoint
 from robochoc.vehicles.fleet import AtEnd, FleetError, point_text, read_fleet
 from robochoc.vehicles.guard_client import START_S, GuardError, shared
 from robochoc.vehicles.kinds import VehicleKind

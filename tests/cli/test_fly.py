@@ -259,7 +259,7 @@ def test_what_cannot_be_flown_is_one_clear_line(two: Path) -> None:
             (("--downwash", 1000), 2, "downwash has to be a number from 1 to 100"),
             (("--wind", 500), 2, "faster than 200 m/s"),
             (("--gusts", 1e9), 2, "gusts have to be"),
-            (("--fail", "nobody"), 2, "there is no drone 'nobody' that could fail, but V1.1, V1.2"),
+            (("--fail", "nobody"), 2, "there is no drone 'nobody' to fail: choose V1.1, V1.2"),
             (("--fail", "V1.1@-1"), 2, "is not of the form ROBOT or ROBOT@SECONDS"),
             (("--ros", "mcap:run.mcap"), 2, "give their folder with --team"),
             (("--team", HANGAR), 1, "the team here is not"),

@@ -13,7 +13,7 @@ from robochoc.flight.mission import Goal
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
-from robochoc.robots.single_robot import drones_of_robot, leg_of_robot
+from robochoc.robots.closed_loop import drones_of_robot, leg_of_robot
 from robochoc.ros.recordings.mcap_file import McapSink
 from tests.support.deployments import Deployment, ended
 from tests.support.program import ROOT

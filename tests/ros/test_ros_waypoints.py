@@ -13,9 +13,8 @@ from robochoc.flight.mission import Drone, Goal, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Topic
-from robochoc.robots.sink import Fields
+from robochoc.robots.sink import Fields, Waypoint
 from robochoc.robots.source import REPORTS
-from robochoc.robots.waypoint import Waypoint
 from robochoc.ros import waypoint_types
 from robochoc.ros.message_types import UnknownTypeError, types_of
 from robochoc.ros.publisher import NothingToPublishError, Publisher

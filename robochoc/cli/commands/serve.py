@@ -87,15 +87,15 @@ def serve(
     if kind not in _MIDDLEWARES:
         raise click.UsageError(f"--ros {place}: unknown middleware; use {', '.join(_MIDDLEWARES)}, such as dds:5")
     teams = _teams(paths)
-    from robochoc.robots.connections import lacking_for
+    from robochoc.robots.connections import missing_packages_of
     from robochoc.robots.decision import CancellableDecision
     from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
     from robochoc.ros.names import ros_name
     from robochoc.run.options import Options
 
-    lacking = lacking_for(kind)
-    if lacking:
-        raise Failure(USAGE, lacking)
+    missing = missing_packages_of(kind)
+    if missing:
+        raise Failure(USAGE, missing)
     options = Options(given["protocol"], given["runtime"], given["seed"], given["timeout"])
     triggers = {f"/robochoc{ros_name(team.name)}/decide": team.name for team in teams}
     if len(triggers) < len(teams):

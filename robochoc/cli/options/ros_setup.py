@@ -200,7 +200,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
         return
     import time
 
-    from robochoc.robots.single_robot import drones_of_robot, leg_of_robot
+    from robochoc.robots.closed_loop import drones_of_robot, leg_of_robot
     from robochoc.ros.publisher import SinkPublisher
 
     refuse_same_places({}, more_outputs=sink_places(texts))

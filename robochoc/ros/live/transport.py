@@ -67,7 +67,7 @@ class LiveSource(Source):
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
         """Return the oldest message, or the first that arrives within `wait_s`."""
-        received = self._inbox.get(wait_s, over=self._over)
+        received = self._inbox.get(wait_s, stopped=self._over)
         if received is None:
             self._check()
         return received

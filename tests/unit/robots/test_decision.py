@@ -91,7 +91,7 @@ def test_it_can_be_cancelled() -> None:
     canceller.start()
     outcome = DecideService([queens3d(4)], followed, ENDLESS).decide({})
     canceller.join()
-    assert answers == [{"success": True, "message": "queens3d-4 decides no longer"}]
+    assert answers == [{"success": True, "message": "the decision of queens3d-4 is cancelled"}]
     assert (outcome["success"], outcome["message"]) == (False, "unknown, 1 epoch: somebody has asked to stop")
     assert not stop_requested()
     assert followed.cancel({}) == {"success": False, "message": "no team is deciding"}

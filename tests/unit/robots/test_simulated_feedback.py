@@ -142,7 +142,7 @@ def test_one_after_the_other_falls_out() -> None:
 
 
 def test_who_is_to_fail_has_to_be_there() -> None:
-    with pytest.raises(UnknownDroneError, match="no drone 'Wing' that could fail, but Fin, Nose"):
+    with pytest.raises(UnknownDroneError, match="no drone 'Wing' to fail: choose Fin, Nose"):
         FlightSettings(failures=(("Wing", 1.0),)).check(drones_of(hangar()))
 
 

@@ -29,8 +29,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.robots.closed_loop import drones_of
-from robochoc.robots.point_index import PointIndex
-from robochoc.robots.situation import LIES_TIMES, Situation
+from robochoc.robots.situation import LIES_TIMES, PointIndex, Situation
 from robochoc.robots.source import ReceivedMessage
 from robochoc.ros.report_decoder import ReportDecoder
 from tests.support.cases import looped

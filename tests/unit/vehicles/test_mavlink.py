@@ -13,8 +13,7 @@ import pytest
 pytest.importorskip("mavsdk")
 
 from robochoc.robots.closed_loop import drones_of
-from robochoc.robots.sink import SinkError
-from robochoc.robots.waypoint import Waypoint
+from robochoc.robots.sink import SinkError, Waypoint
 from robochoc.vehicles import guard_client
 from robochoc.vehicles.fleet import read_fleet
 from robochoc.vehicles.guard_client import GuardClient, GuardError
