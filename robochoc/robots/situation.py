@@ -150,9 +150,7 @@ class Situation:
         domain = next((own.domain for own in robot.variables if own.name == variable), None)
         values = _candidates(craft, variable, domain, place) if domain else ()
         if values is None:
-            self._note_unusable(
-                craft, place, f"{variable} has too many values to check (more than {VALUES_MAX:,})"
-            )
+            self._note_unusable(craft, place, f"{variable} has too many values to check (more than {VALUES_MAX:,})")
             return
         for value in values:
             there = self._place_of(crafts_of(robot, {variable: value})[number])
