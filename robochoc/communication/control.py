@@ -64,7 +64,7 @@ class WentOn(EpochMessage, frozen=True):
     went: bool
 
 
-class Snapshot(EpochMessage, frozen=True):
+class RobotSnapshot(EpochMessage, frozen=True, tag="Snapshot"):
     """The answer to `TakeSnapshot`: the robot's values and findings, and the messages it has dropped; it continues."""
 
     number: int
@@ -79,7 +79,7 @@ class Events(_Control, frozen=True):
     events: list[AnyEvent]
 
 
-class Report(EpochMessage, frozen=True):
+class EpochReport(EpochMessage, frozen=True):
     """The end of an epoch: the values of the robot's variables, its counts, and its findings about the whole team."""
 
     assignment: dict[str, int]
@@ -87,7 +87,7 @@ class Report(EpochMessage, frozen=True):
     findings: Findings
 
 
-class Failed(_Control, frozen=True):
+class RobotFailed(_Control, frozen=True, tag="Failed"):
     """The robot cannot continue; `unsupported`: because of its problem, not because of a failure.
 
     `elsewhere`: another protocol may be able to solve it (`TooLargeError`).
@@ -115,7 +115,7 @@ class Pause(_Control, frozen=True):
     """The order to stop and report, as this epoch's search is over."""
 
 
-class Change(_Control, frozen=True):
+class EpochChange(_Control, frozen=True):
     """A new epoch. `change` contains the robot's `AgentProblem` and the `Invalidated` results (see `pack_change`).
 
     Robots in `gone` have left; if new robots have their names, queues to and from these are opened again.
@@ -138,7 +138,7 @@ class QueueFrom(_Control, frozen=True):
     robot: str
 
 
-class Wave(_Control, frozen=True):
+class CounterWave(_Control, frozen=True, tag="Wave"):
     """The order to report the counters."""
 
     number: int
@@ -155,7 +155,7 @@ class GoOn(_Control, frozen=True):
 
 
 def pack_change(part: AgentProblem, invalidated: Invalidated) -> bytes:
-    """Return the content of a `Change`."""
+    """Return the content of a `EpochChange`."""
     return pickle.dumps((part, invalidated))
 
 
@@ -168,7 +168,7 @@ def unpack_change(change: bytes) -> tuple[AgentProblem, Invalidated]:
     return part, invalidated
 
 
-RobotMessage = Ready | Counters | Conclusion | WentOn | Snapshot | Events
+RobotMessage = Ready | Counters | Conclusion | WentOn | RobotSnapshot | Events
 """A robot's message to the master during a search, in every runtime. Runtimes differ in the final report."""
-FromRobot = RobotMessage | OpenQueues | Report | Failed
-FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave | TakeSnapshot | GoOn
+FromRobot = RobotMessage | OpenQueues | EpochReport | RobotFailed
+FromParent = Begin | Pause | EpochChange | QueuesTo | QueueFrom | CounterWave | TakeSnapshot | GoOn

@@ -10,7 +10,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from robochoc.communication.control import GoOn, TakeSnapshot, Wave
+from robochoc.communication.control import CounterWave, GoOn, TakeSnapshot
 from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.search_state import SearchState
@@ -58,7 +58,7 @@ class MasterLoop(ABC):
         """Order all robots to start."""
 
     @abstractmethod
-    def _send_all(self, message: Wave | GoOn | TakeSnapshot, /) -> None:
+    def _send_all(self, message: CounterWave | GoOn | TakeSnapshot, /) -> None:
         """Send a control message to all robots."""
 
     def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
@@ -139,4 +139,4 @@ class MasterLoop(ABC):
             self._send_all(GoOn())
         wave = self.state.next_wave(wanted=wanted)
         if wave is not None:
-            self._send_all(Wave(wave))
+            self._send_all(CounterWave(wave))

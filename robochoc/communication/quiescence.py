@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 
-class Counts(NamedTuple):
+class MessageCounts(NamedTuple):
     """Numbers of protocol messages that a robot has sent and received so far."""
 
     sent: int
@@ -26,12 +26,12 @@ class FourCounters:
     """The state of the detection: the latest counters of each robot, and the open wave."""
 
     def __init__(self, robots: Iterable[str]) -> None:
-        self._latest: dict[str, Counts | None] = dict.fromkeys(robots)
+        self._latest: dict[str, MessageCounts | None] = dict.fromkeys(robots)
         self._unreported = len(self._latest)
-        self._total = Counts(0, 0)
+        self._total = MessageCounts(0, 0)
         self._wave = 0
         self._unanswered: set[str] = set()
-        self._before: Counts | None = None
+        self._before: MessageCounts | None = None
         self.quiescent = False
 
     @property
@@ -39,23 +39,23 @@ class FourCounters:
         """The number of messages sent, as far as reported."""
         return self._total.sent
 
-    def update(self, robot: str, counts: Counts) -> None:
+    def update(self, robot: str, counts: MessageCounts) -> None:
         """Record counters that `robot` reports unasked."""
         before = self._latest[robot]
         if before is None:
             self._unreported -= 1
-            before = Counts(0, 0)
+            before = MessageCounts(0, 0)
         self._latest[robot] = counts
-        self._total = Counts(
+        self._total = MessageCounts(
             self._total.sent + counts.sent - before.sent, self._total.received + counts.received - before.received
         )
 
     @property
-    def total(self) -> Counts | None:
+    def total(self) -> MessageCounts | None:
         """Messages sent and received by all robots; None while the counters of a robot are unknown."""
         return None if self._unreported else self._total
 
-    def latest(self, robot: str) -> Counts | None:
+    def latest(self, robot: str) -> MessageCounts | None:
         """Return the latest counters of `robot`; None if it has reported none."""
         return self._latest.get(robot)
 
@@ -82,7 +82,7 @@ class FourCounters:
         """Whether robots have not answered the latest wave yet."""
         return bool(self._unanswered)
 
-    def answer(self, robot: str, wave: int, counts: Counts) -> None:
+    def answer(self, robot: str, wave: int, counts: MessageCounts) -> None:
         """Record `robot`'s answer to `wave`; the last answer decides whether the search is quiescent."""
         self.update(robot, counts)
         if wave != self._wave:

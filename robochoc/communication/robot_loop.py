@@ -10,7 +10,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, Snapshot, WentOn
+from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, RobotSnapshot, WentOn
 from robochoc.communication.host import Host
 from robochoc.communication.message_dropper import MessageDropper
 from robochoc.journal.events import AnyEvent, Sent
@@ -172,7 +172,7 @@ class RobotLoop(ABC):
         if host is not None:
             assignment, findings = self._known_to_master(host)
             lost = 0 if host.dropper is None else host.dropper.count
-            self._send_to_master(Snapshot(self.epoch, number, assignment, lost, findings))
+            self._send_to_master(RobotSnapshot(self.epoch, number, assignment, lost, findings))
 
     def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
         """Return the values and findings that the master may know."""

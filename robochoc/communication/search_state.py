@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.communication.control import Conclusion, Counters, EpochMessage, Ready, Report, Snapshot, WentOn
-from robochoc.communication.quiescence import Counts, FourCounters
+from robochoc.communication.control import Conclusion, Counters, EpochMessage, EpochReport, Ready, RobotSnapshot, WentOn
+from robochoc.communication.quiescence import FourCounters, MessageCounts
 from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_watch import SnapshotRound
 from robochoc.model.outcome import Verdict
@@ -48,7 +48,7 @@ class SearchState:
         self._traits = traits
         self._present = set(order)
         self._unready = set(order)
-        self._reports: dict[str, Report] = {}
+        self._reports: dict[str, EpochReport] = {}
         self.lossy = False
         self._undecided: set[str] = set()
         self._went = False
@@ -66,20 +66,20 @@ class SearchState:
             case Ready():
                 self._unready.discard(name)
             case Counters(_, wave, sent, received):
-                fault = self._count(name, wave, Counts(sent, received))
+                fault = self._count(name, wave, MessageCounts(sent, received))
             case Conclusion(_, verdict):
                 fault = self._conclude(name, verdict)
             case WentOn(_, went):
                 fault = self._note_went_on(name, went=went)
-            case Snapshot():
+            case RobotSnapshot():
                 fault = self._take_snapshot(name, message)
-            case Report():
+            case EpochReport():
                 fault = self._take_report(name, message)
             case _:
                 fault = "its message is not for the master"
         return fault
 
-    def _count(self, name: str, wave: int, counts: Counts) -> str:
+    def _count(self, name: str, wave: int, counts: MessageCounts) -> str:
         self.counters.answer(name, wave, counts)
         return ""
 
@@ -101,7 +101,7 @@ class SearchState:
             self.verdict = self.verdict or Verdict.SOLUTION
         return ""
 
-    def _take_snapshot(self, name: str, snapshot: Snapshot) -> str:
+    def _take_snapshot(self, name: str, snapshot: RobotSnapshot) -> str:
         return self._snapshots.add(name, snapshot)
 
     def start_snapshot(self) -> int | None:
@@ -120,7 +120,7 @@ class SearchState:
         self._undecided, self._went = set(self._present), False
         return True
 
-    def _take_report(self, name: str, report: Report) -> str:
+    def _take_report(self, name: str, report: EpochReport) -> str:
         self._reports[name] = report
         return ""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 
-from robochoc.communication.control import Snapshot
+from robochoc.communication.control import RobotSnapshot
 from robochoc.communication.search_result import SearchResult
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import Findings
@@ -40,7 +40,7 @@ class SnapshotRound:
     def __init__(self) -> None:
         self.number = 0
         self._open = False
-        self._answers: dict[str, Snapshot] = {}
+        self._answers: dict[str, RobotSnapshot] = {}
 
     def open(self) -> int | None:
         """Open a round and return its number; None if another one is open."""
@@ -50,7 +50,7 @@ class SnapshotRound:
         self.number += 1
         return self.number
 
-    def add(self, name: str, answer: Snapshot) -> str:
+    def add(self, name: str, answer: RobotSnapshot) -> str:
         """Add the answer of the robot `name`; return the reason why it is invalid, or an empty text."""
         if not self._open or answer.number != self.number or name in self._answers:
             return "it sent a snapshot that was not requested"

@@ -19,7 +19,7 @@ from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.array_types import Floats, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, cycles_of, exact_sum
 from robochoc.communication.arrays.description import Description, KnownConstraints
-from robochoc.communication.arrays.layout import Layout
+from robochoc.communication.arrays.layout import ArrayLayout
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.message import encode
@@ -176,9 +176,9 @@ class ArrayProblem:
         return paid
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> ArrayLayout:
         """The arrays of the runtime; computed once."""
-        return Layout(self._described())
+        return ArrayLayout(self._described())
 
     def __repr__(self) -> str:
         return f"<array problem: {self.robots:,} robots, {len(self.edges):,} edges, {self.values:,} values>"

@@ -18,7 +18,7 @@ class UndefinedTermError(ArithmeticError):
     """A term has no value for this assignment, such as a division by zero."""
 
 
-class Operator(NamedTuple):
+class TermOperator(NamedTuple):
     """An operator of terms.
 
     Attributes:
@@ -88,34 +88,34 @@ def _key(value: object) -> object:
     return exact(value) if is_number(value) else value
 
 
-OPERATORS: dict[str, Operator] = {
-    "abs": Operator(NUMBER, lambda x: abs(exact(x)), "abs"),
-    "mul": Operator(NUMBER, _product, "*"),
-    "floordiv": Operator(NUMBER, _quotient, "//"),
-    "mod": Operator(NUMBER, _remainder, "%"),
-    "pow": Operator(NUMBER, _power, "**"),
-    "min": Operator(NUMBER, lambda *terms: min(map(exact, terms)), "minimum"),
-    "max": Operator(NUMBER, lambda *terms: max(map(exact, terms)), "maximum"),
-    "if": Operator(
+OPERATORS: dict[str, TermOperator] = {
+    "abs": TermOperator(NUMBER, lambda x: abs(exact(x)), "abs"),
+    "mul": TermOperator(NUMBER, _product, "*"),
+    "floordiv": TermOperator(NUMBER, _quotient, "//"),
+    "mod": TermOperator(NUMBER, _remainder, "%"),
+    "pow": TermOperator(NUMBER, _power, "**"),
+    "min": TermOperator(NUMBER, lambda *terms: min(map(exact, terms)), "minimum"),
+    "max": TermOperator(NUMBER, lambda *terms: max(map(exact, terms)), "maximum"),
+    "if": TermOperator(
         NUMBER,
         lambda test, then, otherwise: then if test else otherwise,
         "if_then_else",
         lambda test, then, otherwise: then() if test() else otherwise(),
     ),
-    "eq": Operator(BOOLEAN, _equal, "=="),
-    "ne": Operator(BOOLEAN, lambda x, y: not _equal(x, y), "!="),
-    "in": Operator(BOOLEAN, lambda x, *members: any(_equal(x, one) for one in members), "is_in"),
-    "lt": Operator(BOOLEAN, lambda x, y: exact(x) < exact(y), "<"),
-    "le": Operator(BOOLEAN, lambda x, y: exact(x) <= exact(y), "<="),
-    "gt": Operator(BOOLEAN, lambda x, y: exact(x) > exact(y), ">"),
-    "ge": Operator(BOOLEAN, lambda x, y: exact(x) >= exact(y), ">="),
-    "not": Operator(BOOLEAN, lambda x: not x, "~"),
-    "and": Operator(BOOLEAN, lambda *terms: all(terms), "&"),
-    "or": Operator(BOOLEAN, lambda *terms: any(terms), "|"),
-    "xor": Operator(BOOLEAN, lambda x, y: bool(x) != bool(y), "^"),
-    "implies": Operator(BOOLEAN, lambda x, y: bool(y) or not x, "implies"),
-    "different": Operator(BOOLEAN, lambda *terms: len(set(map(_key, terms))) == len(terms), "all_different"),
-    "element": Operator(NUMBER, _element, "element"),
+    "eq": TermOperator(BOOLEAN, _equal, "=="),
+    "ne": TermOperator(BOOLEAN, lambda x, y: not _equal(x, y), "!="),
+    "in": TermOperator(BOOLEAN, lambda x, *members: any(_equal(x, one) for one in members), "is_in"),
+    "lt": TermOperator(BOOLEAN, lambda x, y: exact(x) < exact(y), "<"),
+    "le": TermOperator(BOOLEAN, lambda x, y: exact(x) <= exact(y), "<="),
+    "gt": TermOperator(BOOLEAN, lambda x, y: exact(x) > exact(y), ">"),
+    "ge": TermOperator(BOOLEAN, lambda x, y: exact(x) >= exact(y), ">="),
+    "not": TermOperator(BOOLEAN, lambda x: not x, "~"),
+    "and": TermOperator(BOOLEAN, lambda *terms: all(terms), "&"),
+    "or": TermOperator(BOOLEAN, lambda *terms: any(terms), "|"),
+    "xor": TermOperator(BOOLEAN, lambda x, y: bool(x) != bool(y), "^"),
+    "implies": TermOperator(BOOLEAN, lambda x, y: bool(y) or not x, "implies"),
+    "different": TermOperator(BOOLEAN, lambda *terms: len(set(map(_key, terms))) == len(terms), "all_different"),
+    "element": TermOperator(NUMBER, _element, "element"),
 }
 
 PARTIAL = frozenset(("floordiv", "mod", "pow", "element"))

@@ -16,14 +16,14 @@ from robochoc.run.defaults import AUTO
 from robochoc.run.options import CentralSolverName, Options, Runtime, ScheduleName
 from robochoc.run.orchestrator import solve
 from robochoc.run.scenario import Environment
-from robochoc.solver.compile import Limits
+from robochoc.solver.compile import CompileLimits
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
-NO_LIMITS = Limits()
+NO_LIMITS = CompileLimits()
 """The default limits on the compilation of domains."""
 _OPTIONS = frozenset(one.name for one in fields(Options))
 
@@ -52,7 +52,7 @@ class Solvable(ABC):
         count: bool = False,
         central_with: str = CentralSolverName.ACE,
         cache: bool = True,
-        local: Limits = NO_LIMITS,
+        local: CompileLimits = NO_LIMITS,
         schedule: str = ScheduleName.CONCURRENT,
         delay: int = 0,
         channel: ChannelModel | None = None,

@@ -27,7 +27,7 @@ from robochoc.replay.steps import RecordedRun
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search
 from robochoc.run.improvement import Rank
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_by_class
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_domain import TooManySolutionsError
@@ -204,7 +204,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseA
     result.findings.update({name: one.findings for name, one in protocols.items()})
     team = robots.compiled.team
     withdrawal = given.aside is not None or _places(run, outcome)
-    phase = Phase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
+    phase = RunPhase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
         return evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team), ANY_DEADLINE)

@@ -25,7 +25,7 @@ from robochoc.run.registry import UnknownProtocolError, protocol_by_class, proto
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.cache import SolutionCache
-from robochoc.solver.compile import CompileError, Compiler, CompileTimeoutError, Limits
+from robochoc.solver.compile import CompileError, CompileLimits, Compiler, CompileTimeoutError
 from robochoc.solver.compiled_domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError, UnsupportedError
@@ -68,7 +68,7 @@ class ReplayOptions(NamedTuple):
     team: Team | None = None
     protocols: Mapping[str, type[Protocol]] = MappingProxyType({})
     settings: Mapping[str, str] = MappingProxyType({})
-    limits: Limits | None = None
+    limits: CompileLimits | None = None
     cache: SolutionCache | None = None
     solver: AceProcess | None = None
 

@@ -38,7 +38,7 @@ FAILURES = (
 
 
 @dataclass(frozen=True)
-class Choice:
+class ProtocolChoice:
     """The choice for a team, with the reasons.
 
     Attributes:
@@ -52,7 +52,7 @@ class Choice:
     rejected: tuple[tuple[str, str], ...] = ()
 
 
-def choose(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> Choice:
+def choose(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> ProtocolChoice:
     """Return how to run: `options`, with a protocol and an order where they leave these open.
 
     Args:
@@ -64,31 +64,31 @@ def choose(team: Team, options: Options, *, environment: bool = False, ordered: 
     if options.protocol == AUTO:
         choice = _decided(team, options, environment=environment)
     elif ordered or options.order is not None or options.chosen or options.protocol == CENTRAL:
-        choice = Choice(options)
+        choice = ProtocolChoice(options)
     else:
         facts = Facts(team, environment)
-        choice = Choice(_with_order(options, facts, Order.MAX_DEGREE, "nobody has given the robots an order"))
+        choice = ProtocolChoice(_with_order(options, facts, Order.MAX_DEGREE, "nobody has given the robots an order"))
     if choice.options.order == Order.GIVEN:
         choice = replace(choice, options=replace(choice.options, order=None))
     return choice
 
 
-def choose_without_analysis(team: Team, options: Options) -> Choice:
+def choose_without_analysis(team: Team, options: Options) -> ProtocolChoice:
     """Return the choice when there is no time to analyse a team: the default protocol and the given order."""
     order = None if options.order == Order.GIVEN else options.order
     if options.protocol != AUTO:
-        return Choice(replace(options, order=order))
+        return ProtocolChoice(replace(options, order=order))
     usual = DEFAULT_COST_PROTOCOL if team.kind == ProblemKind.DISWCSP else DEFAULT_PROTOCOL
     chosen = {"protocol": "there was no time to analyse the team"}
-    return Choice(replace(options, protocol=usual, order=order, chosen=chosen))
+    return ProtocolChoice(replace(options, protocol=usual, order=order, chosen=chosen))
 
 
-def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
+def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoice:
     """Return the choice where protocol and order are open."""
     try:
         team = normalized(team)
     except UnboundedCostError:  # the run refuses it
-        return Choice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
+        return ProtocolChoice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
     facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss)
     rejected: dict[str, list[str]] = {}
     for rule in RULES:
@@ -106,17 +106,17 @@ def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
     return _choice(facts, options, (usual, NOBODY), {})
 
 
-def choose_for_private_team(team: Team, options: Options) -> Choice:
+def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
     """Return how to run a team whose constraints are known to its robots alone, who refuse what does not suit them."""
     if options.protocol != AUTO:
-        return Choice(options)
+        return ProtocolChoice(options)
     if options.message_loss:
         name, why = _bearing_loss(options.message_loss, costs=Facts(team).has_costs)
     elif Facts(team).has_costs:
         name, why = DEFAULT_COST_PROTOCOL, "there are costs; the robots keep their constraints, so no more is known"
     else:
         name, why = DEFAULT_PROTOCOL, "it takes all kinds of constraints, and the robots keep theirs"
-    return Choice(replace(options, protocol=name, chosen={"protocol": why}))
+    return ProtocolChoice(replace(options, protocol=name, chosen={"protocol": why}))
 
 
 def _bearing_loss(loss: float, *, costs: bool) -> tuple[str, str]:
@@ -152,11 +152,13 @@ def refusal(name: str, team: Team, options: Options) -> str:
     return ""
 
 
-def _choice(facts: Facts, options: Options, taken: tuple[str, str], rejected: Mapping[str, list[str]]) -> Choice:
+def _choice(
+    facts: Facts, options: Options, taken: tuple[str, str], rejected: Mapping[str, list[str]]
+) -> ProtocolChoice:
     name, why = taken
     chosen = _with_suitable_order(replace(options, protocol=name, chosen={"protocol": why}), facts)
     against = tuple((other, "; ".join(dict.fromkeys(whys))) for other, whys in rejected.items())
-    return Choice(chosen, tuple(_in_words(facts)), against)
+    return ProtocolChoice(chosen, tuple(_in_words(facts)), against)
 
 
 # Orders

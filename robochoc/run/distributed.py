@@ -17,7 +17,7 @@ from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
 from robochoc.run.options import Options
-from robochoc.run.phases import Phase, first_phase, second_phase
+from robochoc.run.phases import RunPhase, first_phase, second_phase
 from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"
@@ -66,14 +66,14 @@ class Deployment(ABC):
         """Return how many seconds are left; None without a limit."""
 
     @abstractmethod
-    def search(self, phase: Phase) -> Search:
+    def search(self, phase: RunPhase) -> Search:
         """Search once, from the beginning, with all robots that are there."""
 
     @abstractmethod
     def remove(self, lost: Mapping[str, str]) -> None:
         """Go on without robots that were lost; `lost` maps their names to the reasons."""
 
-    def confirm(self, phase: Phase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
+    def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
         """Return the central solvers that agree. Raises `RefutedError` where one found something else."""
         return ()
 
@@ -82,7 +82,7 @@ class Deployment(ABC):
         """Return the reason why the robots did not finish before a limit was reached, as far as it is known."""
         return ""
 
-    def solve(self, phase: Phase) -> PhaseAnswer:
+    def solve(self, phase: RunPhase) -> PhaseAnswer:
         """Return the answer of `phase`: search until no robot gets lost, and check what was found.
 
         Raises:
@@ -93,7 +93,7 @@ class Deployment(ABC):
         answer = self.evaluated(phase, search)
         return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
 
-    def evaluated(self, phase: Phase, search: Search) -> PhaseAnswer:
+    def evaluated(self, phase: RunPhase, search: Search) -> PhaseAnswer:
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
         deadline = self.options.deadline if self.left_s() == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.told, deadline))
@@ -101,11 +101,11 @@ class Deployment(ABC):
             return answer.confirmed_as(self.confirm(phase, answer))
         return answer
 
-    def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - as `confirm`
+    def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - as `confirm`
         """Return the answer of `search`, or a better one that was found while it went on."""
         return answer
 
-    def why_unknown(self, phase: Phase, answer: PhaseAnswer) -> str | None:
+    def why_unknown(self, phase: RunPhase, answer: PhaseAnswer) -> str | None:
         """Return why `answer` has no verdict; None if it has one."""
         if answer.verdict != Verdict.UNKNOWN:
             return None
@@ -147,7 +147,7 @@ class Deployment(ABC):
             return None
         return 0 if answer.verdict == Verdict.NO_SOLUTION else answer.count
 
-    def _search_without_losses(self, phase: Phase) -> Search:
+    def _search_without_losses(self, phase: RunPhase) -> Search:
         """Search until a search ends without a loss. Its metrics are those of all searches together."""
         spent = Metrics()
         while True:

@@ -18,7 +18,7 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.listed_optima import put_together
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
 from robochoc.verification.checker import (
@@ -79,7 +79,7 @@ class PhaseAnswer(Answer):
 
 
 def evaluate_search(
-    phase: Phase, search: Search, kind: ProblemKind, told: Callable[[float], Cost], deadline: float | None = None
+    phase: RunPhase, search: Search, kind: ProblemKind, told: Callable[[float], Cost], deadline: float | None = None
 ) -> PhaseAnswer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`. `told` converts a cost to user units.
 
@@ -122,18 +122,18 @@ def evaluate_search(
     )
 
 
-def is_spoiled(phase: Phase, result: SearchResult) -> bool:
+def is_spoiled(phase: RunPhase, result: SearchResult) -> bool:
     """Return whether messages were lost, and the protocol does not bear that: then nothing that it claims holds."""
     return result.metrics.lost_messages > 0 and not phase.traits.bears_loss
 
 
-def why_spoiled(phase: Phase, metrics: Metrics) -> str:
+def why_spoiled(phase: RunPhase, metrics: Metrics) -> str:
     """Return why nothing that the protocol of a spoiled search claims holds."""
     many = metrics.lost_messages
     return f"{many:,} message{'s were' if many != 1 else ' was'} lost, and {phase.name} needs every one"
 
 
-def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> PhaseAnswer:
+def _evaluate_spoiled(phase: RunPhase, search: Search, kind: ProblemKind) -> PhaseAnswer:
     """Return the answer of a search that is spoiled: a solution that passes the check, or that nothing is known.
 
     Where there are costs, a reason goes with a solution: it is what the robots had when they could not go on, not what
@@ -154,7 +154,7 @@ def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> PhaseA
     )
 
 
-def is_proven(phase: Phase, result: SearchResult) -> bool:
+def is_proven(phase: RunPhase, result: SearchResult) -> bool:
     """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost.
 
     Where messages were lost, an incomplete protocol ends without knowing that it has found a solution.
@@ -165,7 +165,7 @@ def is_proven(phase: Phase, result: SearchResult) -> bool:
 
 
 @collection_paused()
-def check_with_files(phase: Phase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Answer | None:
+def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Answer | None:
     """Return the assignment that a search has found, checked against every constraint of every file.
 
     Args:
@@ -206,7 +206,7 @@ def check_with_files(phase: Phase, result: SearchResult, team: Team, compiled: C
 
 
 def _checked_optima(
-    phase: Phase, result: SearchResult, team: Team, compiled: CompiledTeam, cost: Cost | None
+    phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam, cost: Cost | None
 ) -> Optima | None:
     """Return the optima that the robots have listed, if they have, each checked as the assignment was.
 
@@ -248,7 +248,7 @@ def check_assignment(
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
 
 
-def _verdict_of(phase: Phase, result: SearchResult, kind: ProblemKind, found: Answer) -> Verdict:
+def _verdict_of(phase: RunPhase, result: SearchResult, kind: ProblemKind, found: Answer) -> Verdict:
     """Return the verdict on what was found."""
     if is_proven(phase, result):
         minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind == ProblemKind.DISWCSP)
@@ -266,7 +266,7 @@ def _meets_bound(result: SearchResult, found: Answer, told: Callable[[float], Co
     return least is not None and not found.withdrawn and found.verified and found.cost == told(least)
 
 
-def _bound_of(phase: Phase, result: SearchResult, told: Callable[[float], Cost]) -> Cost | None:
+def _bound_of(phase: RunPhase, result: SearchResult, told: Callable[[float], Cost]) -> Cost | None:
     """Return the bound of the cost; where robots may withdraw, the lower bound of the weight of those that do."""
     bound = lower_bound(result.findings)
     withdrawal_cost = phase.parameters.withdrawal_cost

@@ -19,7 +19,7 @@ from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search
 from robochoc.run.options import Options
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.verification.checker import RefutedError
 
 PERIOD_S = 0.1
@@ -225,7 +225,7 @@ class Improvements(SearchWatch):
 
 
 def improvements_of(  # noqa: PLR0913 - what differs between deployments, by names
-    phase: Phase,
+    phase: RunPhase,
     team: Team,
     options: Options,
     *,
@@ -270,7 +270,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
     )
 
 
-def _as_told_one_after_the_other(snapshot: SearchResult, phase: Phase, options: Options) -> SearchResult:
+def _as_told_one_after_the_other(snapshot: SearchResult, phase: RunPhase, options: Options) -> SearchResult:
     """Return `snapshot`, of which nothing is known but what can be checked where messages get lost.
 
     Robots report one after the other, so a message may be lost that no robot has missed yet.

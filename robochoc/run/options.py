@@ -27,7 +27,7 @@ from robochoc.run.option_values import (
     text,
     texts_by_name,
 )
-from robochoc.solver.compile import Limits
+from robochoc.solver.compile import CompileLimits
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
@@ -147,7 +147,7 @@ class Options:
     withdraw: Withdrawal | None = None
     schedule: ScheduleName = ScheduleName.CONCURRENT
     delay: int = 0
-    local: Limits = field(default_factory=Limits)
+    local: CompileLimits = field(default_factory=CompileLimits)
     cache: bool = True
     count: bool = False
     central_with: CentralSolverName = CentralSolverName.ACE
@@ -212,7 +212,7 @@ _CONVERTERS = MappingProxyType(
         "withdraw": optional(one_of(Withdrawal)),
         "schedule": one_of(ScheduleName),
         "delay": count,
-        "local": instance_of(Limits),
+        "local": instance_of(CompileLimits),
         "cache": flag,
         "count": flag,
         "central_with": one_of(CentralSolverName),

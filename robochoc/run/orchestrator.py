@@ -16,7 +16,7 @@ from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
-from robochoc.run.choice import Choice, choose, choose_without_analysis
+from robochoc.run.choice import ProtocolChoice, choose, choose_without_analysis
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, UnfitProtocolError, refuse_unfit
@@ -91,7 +91,7 @@ class PreparedRun:
     """
 
     team: Team
-    choice: Choice
+    choice: ProtocolChoice
     spent_s: float
 
     def solve(

@@ -18,7 +18,7 @@ from robochoc.solver.agent_problem import RunParameters
 
 
 @dataclass(frozen=True)
-class Phase:
+class RunPhase:
     """One phase of a run.
 
     `name` is the protocol's name, `parameters` what all robots are given beside the problem. With `withdrawal`, robots
@@ -37,7 +37,7 @@ class Phase:
         return self.protocol.traits
 
 
-def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Callable[[], float]) -> Phase:
+def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Callable[[], float]) -> RunPhase:
     """Return the search by `protocol`, the one that was asked for.
 
     Args:
@@ -48,10 +48,10 @@ def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Cal
     withdrawal = options.withdraw == Withdrawal.MINIMUM and protocol.traits.costs
     cost = withdrawal_cost() if withdrawal else None
     parameters = RunParameters(options.seed, options.settings, cost, options.dropped)
-    return Phase(options.protocol, protocol, parameters, withdrawal)
+    return RunPhase(options.protocol, protocol, parameters, withdrawal)
 
 
-def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phase:
+def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> RunPhase:
     """Return the search that decides which robots withdraw, for a team without a solution.
 
     The protocol was not asked for, so it gets no settings. For the arguments see `first_phase`.
@@ -60,4 +60,4 @@ def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phas
     protocol = protocol_or_stage(name)
     cost = withdrawal_cost() if protocol.traits.costs else None
     parameters = RunParameters(options.seed, withdrawal_cost=cost, message_loss=options.dropped)
-    return Phase(name, protocol, parameters, withdrawal=True, takes_over=True)
+    return RunPhase(name, protocol, parameters, withdrawal=True, takes_over=True)

@@ -19,15 +19,15 @@ from robochoc.model.problem import Domain, Robot, Team
 from robochoc.protocols.findings import Findings
 from robochoc.run.defaults import PREPROCESSING
 from robochoc.run.options import Options
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 
 
-def preprocessing_phase(options: Options) -> Phase:
+def preprocessing_phase(options: Options) -> RunPhase:
     """Return the search before that of the protocol."""
-    return Phase(PREPROCESSING, protocol_or_stage(PREPROCESSING), RunParameters(options.seed))
+    return RunPhase(PREPROCESSING, protocol_or_stage(PREPROCESSING), RunParameters(options.seed))
 
 
 def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> int:

@@ -22,7 +22,7 @@ from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.options import Runtime
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
@@ -134,14 +134,14 @@ class ThisMachine(Deployment):
         """See `Deployment.remove`."""
         self._scenario.remove(lost.keys())
 
-    def solve(self, phase: Phase) -> PhaseAnswer:
+    def solve(self, phase: RunPhase) -> PhaseAnswer:
         """See `Deployment.solve`. The problem may change, but not while it is decided which robots withdraw."""
         if not phase.withdrawal:
             return self._solve_epochs(phase)
         answer = replace(super().solve(phase), witness=None)  # `witness` is for the whole team's no-solution
         return replace(answer, reason=answer.reason or self._absence_reason(answer, withdrawal=True))
 
-    def search(self, phase: Phase) -> Search:
+    def search(self, phase: RunPhase) -> Search:
         """See `Deployment.search`."""
         team = self._scenario.ordered_team()
         if phase.takes_over and phase.traits.costs and not self._order_requested:
@@ -154,7 +154,7 @@ class ThisMachine(Deployment):
             result = session.search(self.left_s(), self.options.messages)
         return Search(result, partial(check_with_files, phase, result, self._scenario.team, epoch.compiled))
 
-    def confirm(self, phase: Phase, answer: PhaseAnswer) -> tuple[str, ...]:
+    def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:
         """See `Deployment.confirm`."""
         if not self.options.verify:
             return ()
@@ -174,7 +174,7 @@ class ThisMachine(Deployment):
 
     # Epochs
 
-    def _solve_epochs(self, phase: Phase) -> PhaseAnswer:
+    def _solve_epochs(self, phase: RunPhase) -> PhaseAnswer:
         """Return the answer of the last epoch, with what all of them have cost."""
         scenario = self._scenario
         answer, lost = PhaseAnswer(Verdict.UNKNOWN), dict[str, str]()
@@ -222,7 +222,7 @@ class ThisMachine(Deployment):
         missed = f"{left} event{'s' * (left != 1)} had not happened"
         return f"{self._limit_reached(answer.metrics)}, and {missed}"
 
-    def _begin(self, phase: Phase, session: Session, start: EpochStart) -> None:
+    def _begin(self, phase: RunPhase, session: Session, start: EpochStart) -> None:
         """Report that an epoch begins, and watch it."""
         self._start_events.report(phase.protocol, start, session)
         self._watch(phase, start, session)
@@ -233,7 +233,7 @@ class ThisMachine(Deployment):
             self._context.restart()
             self._compiler.deadline = self._context.deadline
 
-    def _watch(self, phase: Phase, start: EpochStart, session: Session) -> None:
+    def _watch(self, phase: RunPhase, start: EpochStart, session: Session) -> None:
         """Have what is found in the epoch that starts published while the search goes on, if that is asked for."""
         before, self._improvements = self._improvements, None
         options, audience = self.options, self._audience
@@ -258,7 +258,7 @@ class ThisMachine(Deployment):
             before=before,
         )
 
-    def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
+    def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
         """See `Deployment.concluded`. Answers published for robots that are now lost do not count."""
         improvements = self._improvements
         return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
@@ -282,13 +282,13 @@ class ThisMachine(Deployment):
             self._cut_short = self.why_unknown(phase, PhaseAnswer(result.verdict, metrics=result.metrics)) or ""
         return whole, SearchResult.of(result.verdict, result.witness, {}, (), 0)
 
-    def _settled(self, phase: Phase, found: SearchResult) -> PhaseAnswer:
+    def _settled(self, phase: RunPhase, found: SearchResult) -> PhaseAnswer:
         """Return the answer of a run that has ended before the protocol began."""
         before = total_preprocessing(self._done)
         answer = PhaseAnswer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
         return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict == Verdict.NO_SOLUTION else answer
 
-    def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> PhaseAnswer:
+    def _answer_of(self, phase: RunPhase, epoch: FinishedEpoch) -> PhaseAnswer:
         """Return the answer of an epoch, checked with the files."""
         check = partial(check_with_files, phase, epoch.result, epoch.team, epoch.epoch.compiled)
         answer = self.evaluated(phase, Search(epoch.result, check))
@@ -320,7 +320,7 @@ class ThisMachine(Deployment):
         """Compile `team` for its next epoch; in a static problem one robot without a local solution decides."""
         return self._compiler.compile(team, every=self._dynamic or bool(self.epochs))
 
-    def _session(self, phase: Phase, compiled: CompiledTeam) -> Session:
+    def _session(self, phase: RunPhase, compiled: CompiledTeam) -> Session:
         """Open a session of the phase's protocol."""
         context = self._context
         request = SessionRequest(

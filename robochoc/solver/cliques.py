@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from enum import StrEnum
 
-from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Network
 from robochoc.solver.propagation import is_small_permutation
 
 
@@ -36,7 +36,7 @@ def demands(network: Network) -> list[Demand]:
     return found
 
 
-def _demand(network: Network, table: Table) -> Demand:
+def _demand(network: Network, table: CodeTable) -> Demand:
     if len(table.scope) != 2:  # noqa: PLR2004 - binary
         return Demand.OTHER
     left, right = (set(network.domains[place]) for place in table.scope)
@@ -75,7 +75,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
     differ = {t.scope: d for t, d in zip(network.tables, demanded, strict=True) if d != Demand.OTHER}
     more = {t.scope for t, d in zip(network.tables, demanded, strict=True) if d == Demand.DIFFER_AND_MORE}
     different: list[Codes] = []
-    compiled: list[Table] = []
+    compiled: list[CodeTable] = []
     for clique in cliques(differ):
         edges = set(itertools.combinations(clique, 2))
         if len(clique) == 2:  # noqa: PLR2004 - an edge has a table already
@@ -83,7 +83,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
         tight = len(clique) == len({code for place in clique for code in network.domains[place]})
         rows = solutions(_within(network, clique)) if tight and edges <= more else None
         if rows is not None:
-            compiled.append(Table(clique, allowed=True, rows=tuple(sorted(rows))))
+            compiled.append(CodeTable(clique, allowed=True, rows=tuple(sorted(rows))))
         elif not is_small_permutation(clique, network.domains):
             different.append(clique)
     said = {pair for scope in different for pair in itertools.combinations(scope, 2)}
@@ -109,7 +109,7 @@ def _grown(clique: list[int], neighbours: dict[int, set[int]], open_still: dict[
     return clique
 
 
-def _forbidden(network: Network, table: Table) -> set[Codes]:
+def _forbidden(network: Network, table: CodeTable) -> set[Codes]:
     if not table.allowed:
         return set(table.rows)
     everything: Iterable[Codes] = itertools.product(*(network.domains[place] for place in table.scope))

@@ -27,7 +27,7 @@ PATIENCE_S = 60.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class CompileLimits:
     """The limits of compiling one robot: the number of local solutions, and ACE's time in seconds.
 
     With `always_ace`, ACE also solves small local problems.
@@ -99,12 +99,12 @@ class Compiler:
 
     def __init__(
         self,
-        limits: Limits | None = None,
+        limits: CompileLimits | None = None,
         cache: SolutionCache | None = None,
         deadline: float | None = None,
         solver: AceProcess | None = None,
     ) -> None:
-        self._limits = limits or Limits()
+        self._limits = limits or CompileLimits()
         self._cache = cache
         self._deadline = deadline
         self._given_solver = solver
@@ -201,7 +201,7 @@ class TeamCompiler:
 
     def __init__(
         self,
-        limits: Limits | None,
+        limits: CompileLimits | None,
         cache: SolutionCache | None,
         deadline: float | None,
         solver: AceProcess | None,

@@ -39,7 +39,7 @@ Costs = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
-class Table:
+class CodeTable:
     """A constraint on the variables at positions `scope`: `rows` are the allowed, or the forbidden, code tuples."""
 
     scope: Codes
@@ -56,7 +56,7 @@ class Network:
     """
 
     domains: tuple[Codes, ...]
-    tables: tuple[Table, ...] = ()
+    tables: tuple[CodeTable, ...] = ()
     different: tuple[Codes, ...] = ()
     formulas: tuple[Formula, ...] = ()
 
@@ -277,7 +277,7 @@ def _connected(names: Iterable[str], scopes: Iterable[Sequence[str]]) -> list[li
 
 @dataclass(frozen=True)
 class _Rows:
-    """A table over values, the counterpart of `Table` over codes."""
+    """A table over values, the counterpart of `CodeTable` over codes."""
 
     scope: tuple[str, ...]
     allowed: bool
@@ -310,14 +310,14 @@ class _Coder:
         self._code = code
         self._rows: dict[Hashable, tuple[Codes, ...]] = {}
 
-    def table(self, held: _Rows) -> Table:
+    def table(self, held: _Rows) -> CodeTable:
         scope = [self._place[name] for name in held.scope]
         order = sorted(range(len(scope)), key=scope.__getitem__)
         alike = id(held.rows), tuple(order)
         if alike not in self._rows:
             code = self._code
             self._rows[alike] = tuple(sorted(tuple([code[row[index]] for index in order]) for row in held.rows))
-        return Table(tuple(sorted(scope)), held.allowed, self._rows[alike])
+        return CodeTable(tuple(sorted(scope)), held.allowed, self._rows[alike])
 
 
 def _formulas(constraints: Iterable[Constraint], domains: Mapping[str, list[int]]) -> Iterator[tuple[int, Formula]]:

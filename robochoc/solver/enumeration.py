@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from robochoc.solver.encoding import Codes, Costs, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Costs, Network
 
 STEPS_EACH = 100_000
 """The maximum steps of every task: about as long as a query to a running ACE."""
@@ -117,7 +117,7 @@ class _Search:
         self._domains = [(1 << len(domain)) - 1 for domain in network.domains]
         self._left = [(1 << len(table.rows)) - 1 for table in network.tables]
 
-    def _by_value(self, table: Table) -> list[dict[int, int]]:
+    def _by_value(self, table: CodeTable) -> list[dict[int, int]]:
         """Return, for each variable of `table` and each bit of its domain, the rows with that value."""
         if not table.allowed:  # after propagation, these have too many allowed rows
             self._budget.spend(self._budget.steps + 1)

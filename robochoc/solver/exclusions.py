@@ -37,7 +37,7 @@ Partners = dict[tuple[str, Choice], Cost]
 """Choices of other robots, and their costs together with one choice of this robot."""
 
 
-class Task(NamedTuple):
+class SharedTask(NamedTuple):
     """A task that at most one robot does; or several, with a `cost` for each pair.
 
     Attributes:
@@ -51,7 +51,7 @@ class Task(NamedTuple):
     cost: Cost = INFINITE
 
 
-def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tuple[Task, ...]]:
+def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tuple[SharedTask, ...]]:
     """Return the number of constraint checks, and the tasks of the robot of `part`, sorted by its first choices.
 
     One check for each pair of values of each constraint. `part.copies` must contain the constraints of lower robots.
@@ -87,13 +87,13 @@ def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tupl
 
 def _task(
     choices: list[Choice], partners: Partners, part: AgentProblem, same: dict[frozenset[Choice], frozenset[Choice]]
-) -> Task:
+) -> SharedTask:
     costs = {*partners.values()}
     if len(costs) > 1:
         raise UnsupportedError(
             f"{part.robot.name} shares a task that costs {min(costs)} with one robot, and {max(costs)} with another"
         )
-    return Task(tuple(choices), _by_robot(partners, part.known.rank, same), costs.pop())
+    return SharedTask(tuple(choices), _by_robot(partners, part.known.rank, same), costs.pop())
 
 
 def allocation_fault(team: Team, *, congestion: bool = False) -> str:

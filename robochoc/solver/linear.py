@@ -29,7 +29,7 @@ _NEGATED = {"le": "gt", "lt": "ge", "ge": "lt", "gt": "le", "eq": "ne", "ne": "e
 
 
 @dataclass(frozen=True)
-class Comparison:
+class LinearComparison:
     """A sum of variables, each times a factor that is not 0, compared with `bound`."""
 
     terms: tuple[tuple[Operand, int], ...]
@@ -45,7 +45,7 @@ class Junction:
     parts: tuple[Formula, ...]
 
 
-Formula = Comparison | Junction
+Formula = LinearComparison | Junction
 TRUE, FALSE = Junction(every=True, parts=()), Junction(every=False, parts=())
 
 
@@ -86,9 +86,9 @@ def is_small(formula: Formula, most: int) -> bool:
     )
 
 
-def comparisons(formula: Formula) -> list[Comparison]:
+def comparisons(formula: Formula) -> list[LinearComparison]:
     """Return all comparisons in `formula`."""
-    if isinstance(formula, Comparison):
+    if isinstance(formula, LinearComparison):
         return [formula]
     return list(itertools.chain.from_iterable(map(comparisons, formula.parts)))
 
@@ -115,7 +115,7 @@ def renamed(
         shift: The amount by which a variable of the result is smaller than that of `formula`.
     """
     match formula:
-        case Comparison(terms, sign, bound):
+        case LinearComparison(terms, sign, bound):
             rest = bound - sum(factor * fixed[name] for name, factor in terms if name in fixed)
             left = tuple((names.get(name, name), factor) for name, factor in terms if name not in fixed)
             return compared(left, sign, rest - shift * sum(factor for _, factor in left))
@@ -128,7 +128,7 @@ def renamed(
 def compared(terms: tuple[tuple[Operand, int], ...], sign: Sign, bound: int) -> Formula:
     """Return a comparison, or a constant truth value if it has no terms."""
     if terms:
-        return Comparison(terms, sign, bound)
+        return LinearComparison(terms, sign, bound)
     holds = {"le": bound >= 0, "eq": bound == 0, "ne": bound != 0}[sign]
     return TRUE if holds else FALSE
 

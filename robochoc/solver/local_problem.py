@@ -36,7 +36,7 @@ from robochoc.solver.shared_constraint import (
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
     from robochoc.solver.cost_table import CostTable
-    from robochoc.solver.exclusions import Task
+    from robochoc.solver.exclusions import SharedTask
 
 LexicographicCost = tuple[int, Cost]
 """The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
@@ -443,7 +443,7 @@ class LocalProblem:
             combinations = constraint.declared(declared, MAX_BOUNDED_ROWS // max(1, len(self.values)))
             self.checks += constraint.evaluate(combinations) * len(self.values)
 
-    def tasks(self, *, congestion: bool = False) -> tuple[Task, ...]:
+    def tasks(self, *, congestion: bool = False) -> tuple[SharedTask, ...]:
         """Return the tasks of the robot. Raises `UnsupportedError`. See `solver/exclusions.py`."""
         from robochoc.solver.exclusions import tasks_of  # noqa: PLC0415 - for auctions only
 

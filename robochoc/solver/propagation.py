@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, Network, Table
+from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, CodeTable, Network
 from robochoc.solver.linear import FALSE, Formula, Operand, conjuncts, holds, operands, renamed
 
 LARGEST_PERMUTATION = 5
@@ -46,7 +46,7 @@ def propagate(network: Network) -> Network:
     return propagate(result) if spelt_out or unary or fewer else result
 
 
-def _simplified(formulas: Sequence[Formula], domains: Sequence[Codes]) -> tuple[tuple[Formula, ...], list[Table]]:
+def _simplified(formulas: Sequence[Formula], domains: Sequence[Codes]) -> tuple[tuple[Formula, ...], list[CodeTable]]:
     """Return `formulas` without variables that have one value; formulas on one variable become tables."""
     fixed: dict[Operand, int] = {place: domain[0] for place, domain in enumerate(domains) if len(domain) == 1}
     parts = [part for formula in formulas for part in conjuncts(renamed(formula, {}, fixed))]
@@ -56,7 +56,7 @@ def _simplified(formulas: Sequence[Formula], domains: Sequence[Codes]) -> tuple[
         if len(operands(part)) == 1:
             (place,) = map(int, operands(part))
             rows = tuple([(code,) for code in domains[place] if holds(part, {place: code})])
-            tables.append(Table((place,), allowed=True, rows=rows))
+            tables.append(CodeTable((place,), allowed=True, rows=rows))
     return wider, tables
 
 
@@ -137,30 +137,30 @@ def is_small_permutation(scope: Codes, domains: Sequence[Codes]) -> bool:
     return len(scope) == len(values) <= LARGEST_PERMUTATION
 
 
-def _spelt_out(scope: Codes, domains: Sequence[Codes]) -> Table:
+def _spelt_out(scope: Codes, domains: Sequence[Codes]) -> CodeTable:
     rows = itertools.product(*(domains[place] for place in scope))
-    return Table(scope, allowed=True, rows=tuple(row for row in rows if len(set(row)) == len(row)))
+    return CodeTable(scope, allowed=True, rows=tuple(row for row in rows if len(set(row)) == len(row)))
 
 
-def _allowing(table: Table, domains: Sequence[Codes]) -> Table:
+def _allowing(table: CodeTable, domains: Sequence[Codes]) -> CodeTable:
     """Return `table` as a table of allowed tuples, unless there are too many."""
     if table.allowed or math.prod(len(domains[place]) for place in table.scope) > MAX_ALLOWED_ROWS:
         return table
     forbidden = set(table.rows)
     rows = itertools.product(*(domains[place] for place in table.scope))
-    return Table(table.scope, allowed=True, rows=tuple(row for row in rows if row not in forbidden))
+    return CodeTable(table.scope, allowed=True, rows=tuple(row for row in rows if row not in forbidden))
 
 
-def _without_fixed(table: Table, domains: Sequence[Codes]) -> Table:
+def _without_fixed(table: CodeTable, domains: Sequence[Codes]) -> CodeTable:
     """Return `table` without variables that have one value, with which all its rows agree."""
     kept = [index for index, place in enumerate(table.scope) if len(domains[place]) > 1]
     if len(kept) == len(table.scope):
         return table
     rows = sorted({tuple([row[index] for index in kept]) for row in table.rows})
-    return Table(tuple([table.scope[index] for index in kept]), table.allowed, tuple(rows))
+    return CodeTable(tuple([table.scope[index] for index in kept]), table.allowed, tuple(rows))
 
 
-def _allows_everything(table: Table, domains: Sequence[Codes]) -> bool:
+def _allows_everything(table: CodeTable, domains: Sequence[Codes]) -> bool:
     if not table.allowed:
         return not table.rows
     return len(table.rows) == math.prod(len(domains[place]) for place in table.scope)

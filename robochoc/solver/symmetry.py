@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from robochoc.solver.encoding import Codes, Component, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Component, Network
 
 LARGEST_GROUP = 96
 _NUMBER = re.compile(r"[0-9]+")
@@ -63,7 +63,7 @@ def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
     all before it are equal for every x.
     """
     highest = _highest(network)
-    demanded: dict[Hashable, Table] = {}
+    demanded: dict[Hashable, CodeTable] = {}
     for symmetry in group:
         source = {target: place for place, target in enumerate(symmetry.image)}
         place = next(place for place in range(len(source)) if source[place] != place or symmetry.reflects)
@@ -71,13 +71,13 @@ def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
         left, right = network.domains[place], network.domains[other]
         rows = {(a, b) for a in left for b in right if a <= (highest - b if symmetry.reflects else b)}
         if place == other:
-            demanded[place, symmetry.reflects] = Table(
+            demanded[place, symmetry.reflects] = CodeTable(
                 (place,), allowed=True, rows=tuple((a,) for a, b in rows if a == b)
             )
         else:
             scope = tuple(sorted((place, other)))
             turned = rows if place < other else {(b, a) for a, b in rows}
-            demanded[scope, symmetry.reflects, place] = Table(scope, allowed=True, rows=tuple(sorted(turned)))
+            demanded[scope, symmetry.reflects, place] = CodeTable(scope, allowed=True, rows=tuple(sorted(turned)))
     return replace(network, tables=(*network.tables, *demanded.values()))
 
 
@@ -120,7 +120,7 @@ def _verifier(network: Network) -> Callable[[Symmetry], bool]:
     highest = _highest(network)
     content: dict[Hashable, frozenset[Codes]] = {}
 
-    def rows(table: Table, order: Codes, *, reflects: bool) -> frozenset[Codes]:
+    def rows(table: CodeTable, order: Codes, *, reflects: bool) -> frozenset[Codes]:
         alike = id(table.rows), order, reflects
         if alike not in content:
             turned = (tuple([row[index] for index in order]) for row in table.rows)

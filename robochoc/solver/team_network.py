@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from robochoc.model.problem import Constraint, ProblemKind, Team
 from robochoc.solver.cliques import with_cliques
-from robochoc.solver.encoding import Codes, Component, Network, Table, components, is_soft
+from robochoc.solver.encoding import Codes, CodeTable, Component, Network, components, is_soft
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.propagation import propagate
 from robochoc.solver.weighted import MAX_CODE, constant_costs, costs_by_scope
@@ -34,10 +34,10 @@ def team_network(team: Team) -> tuple[Network, Codes]:
         raise UnsupportedError(f"{team.name} has a scenario.xml, but an XCSP3 file cannot contain changes")
     place = {name: index for index, name in enumerate(team.variables)}
     domains = {name: tuple(sorted(variable.domain)) for name, variable in team.variables.items()}
-    tables: list[Table] = []
+    tables: list[CodeTable] = []
     different: list[tuple[int, ...]] = []
     soft = [constraint for constraint in team.constraints() if is_soft(constraint) and constraint.variables]
-    charges: list[Table] = []
+    charges: list[CodeTable] = []
     impossible = False
     together = [one.variables for one in soft]
     for part in components(team.variables.values(), team.constraints(), together, may_split=True):
@@ -59,7 +59,7 @@ def team_network(team: Team) -> tuple[Network, Codes]:
     return _readable(network, impossible=impossible), costs
 
 
-def _cost_domains(team: Team, charges: Sequence[Table]) -> list[Codes]:
+def _cost_domains(team: Team, charges: Sequence[CodeTable]) -> list[Codes]:
     """Return the domains of the cost variables: one for each table of `charges`, one for constant costs."""
     domains = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
     constant = constant_costs(team)
@@ -81,12 +81,12 @@ def _readable(network: Network, *, impossible: bool) -> Network:
     """
     if impossible or (safe := propagate(network)).impossible:
         nothing = tuple([(value,) for value in network.domains[0]])
-        network = Network(network.domains, (Table((0,), allowed=False, rows=nothing),))
+        network = Network(network.domains, (CodeTable((0,), allowed=False, rows=nothing),))
     elif any(not table.allowed for table in network.tables):
         network = safe
     bound = {place for table in network.tables for place in table.scope}.union(*network.different)
     free = [place for place in range(len(network.domains)) if place not in bound]
-    anything = [Table((place,), allowed=True, rows=tuple([(v,) for v in network.domains[place]])) for place in free]
+    anything = [CodeTable((place,), allowed=True, rows=tuple([(v,) for v in network.domains[place]])) for place in free]
     return replace(network, tables=(*network.tables, *anything))
 
 
@@ -103,12 +103,12 @@ def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
             )
 
 
-def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[Table]:
+def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint]) -> Iterator[CodeTable]:
     """Return tables of values with a last column of costs, whose variable is added later."""
     for scope, prices in costs_by_scope(part, part.network, soft).items():
         if prices:
             rows = tuple((*part.decoded(codes), int(price)) for codes, price in prices.items())
-            yield Table(tuple([places[member] for member in scope]), allowed=True, rows=rows)
+            yield CodeTable(tuple([places[member] for member in scope]), allowed=True, rows=rows)
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
@@ -125,6 +125,6 @@ def identifiers(names: Sequence[str]) -> list[str]:
     return found
 
 
-def _over_values(table: Table, part: Component, places: Sequence[int]) -> Table:
+def _over_values(table: CodeTable, part: Component, places: Sequence[int]) -> CodeTable:
     scope = tuple([places[member] for member in table.scope])
-    return Table(scope, table.allowed, tuple(part.decoded(row) for row in table.rows))
+    return CodeTable(scope, table.allowed, tuple(part.decoded(row) for row in table.rows))

@@ -15,7 +15,17 @@ from dataclasses import dataclass, replace
 from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.problem import INFINITE, Constraint, Team, Variable, WhenAbsent
-from robochoc.solver.encoding import Codes, Component, Cost, Costs, Network, Table, components, cost_function, is_soft
+from robochoc.solver.encoding import (
+    Codes,
+    CodeTable,
+    Component,
+    Cost,
+    Costs,
+    Network,
+    components,
+    cost_function,
+    is_soft,
+)
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.propagation import propagate
 
@@ -155,7 +165,7 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
         rows, units = _cost_rows({row: price // unit for row, price in prices.items()})
         places = range(len(domains), len(domains) + len(units))
         costs += zip(places, units, strict=True)
-        tables.append(Table((*scope, *places), allowed=True, rows=rows))
+        tables.append(CodeTable((*scope, *places), allowed=True, rows=rows))
         domains += [tuple(sorted(set(column))) for column in [*zip(*rows, strict=True)][len(scope) :]]
     return WeightedComponent(
         part, replace(network, domains=tuple(domains), tables=tuple(tables)), tuple(costs), sum(least.values()), unit
@@ -209,20 +219,20 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
     return found
 
 
-def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table:
+def _unless_absent(table: CodeTable, domains: Sequence[Codes], absent: int) -> CodeTable:
     """Return `table`, extended to allow all tuples in which a variable has the code `absent`."""
     if not table.allowed:
         return table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))
 
 
-def _forbidden_by_absence(part: Component, network: Network, constraint: Constraint) -> Table:
+def _forbidden_by_absence(part: Component, network: Network, constraint: Constraint) -> CodeTable:
     """Return the rows that a hard constraint forbids if robots are absent (`model/absence.py`)."""
     scope = tuple(sorted(part.names.index(name) for name in constraint.variables))
     prices = _prices_in_absence(part, network, scope, [constraint])
     allowed = set(prices)
     rows = _absences([network.domains[place][:-1] for place in scope], len(part.values))
-    return Table(scope, allowed=False, rows=tuple(sorted(row for row in rows if row not in allowed)))
+    return CodeTable(scope, allowed=False, rows=tuple(sorted(row for row in rows if row not in allowed)))
 
 
 def _prices_in_absence(part: Component, network: Network, scope: Codes, charging: Sequence[Constraint]) -> CostRows:
@@ -250,12 +260,12 @@ def _absences(domains: Sequence[Codes], absent: int) -> Iterable[Codes]:
     return (row for row in wider if absent in row)
 
 
-def _all_or_none(network: Network, first: int, others: Iterable[int], absent: int) -> Iterable[Table]:
+def _all_or_none(network: Network, first: int, others: Iterable[int], absent: int) -> Iterable[CodeTable]:
     """Yield tables that require the variables of one robot to be absent together."""
     for other in others:
         rows = itertools.product(network.domains[first], network.domains[other])
         alike = tuple(row for row in rows if (row[0] == absent) == (row[1] == absent))
-        yield Table((first, other), allowed=True, rows=alike)
+        yield CodeTable((first, other), allowed=True, rows=alike)
 
 
 def _join_unary(together: dict[Codes, list[Constraint]]) -> None:

@@ -34,7 +34,7 @@ from robochoc.authority.frames import (
     decode_question,
 )
 from robochoc.authority.keyring import KeyCard, KeyCardError
-from robochoc.communication.control import Conclusion, Counters, Events, Failed, Pause, Ready, Wave
+from robochoc.communication.control import Conclusion, Counters, CounterWave, Events, Pause, Ready, RobotFailed
 from robochoc.communication.network import control_messages as words
 from robochoc.communication.network.constraint_records import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
@@ -110,7 +110,7 @@ def frames(receiver: str) -> Sequence[bytes]:
         Events(events),
         words.DetailedReport(epoch, assigned=True, assignment={"V": 1}, metrics=metrics, findings=findings),
         words.CheckResult(epoch, allowed=True, cost=3),
-        Failed("it broke"),
+        RobotFailed("it broke"),
         words.Objection("A", "a frame", "it is a replay"),
         words.DirectoryRequest(1, _requests()[0].decode()),
         words.JournalRequest(2),
@@ -121,7 +121,7 @@ def frames(receiver: str) -> Sequence[bytes]:
             words.Welcome("incarnation", "run", ("sealed",), observed=True, private=False),
             words.RegistrationDenied("incarnation", "revoked"),
             words.DomainRequest(("V", "W")),
-            words.Task(
+            words.SearchTask(
                 epoch,
                 protocol="abt",
                 order=("A", "B"),
@@ -135,7 +135,7 @@ def frames(receiver: str) -> Sequence[bytes]:
                 cards=(b"card",),
             ),
             words.StartSearch(epoch),
-            Wave(3),
+            CounterWave(3),
             Pause(),
             words.CheckRequest(epoch, {"V": 1}),
             words.Revoked("B"),

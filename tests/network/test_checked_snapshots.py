@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from robochoc.communication.control import Snapshot
+from robochoc.communication.control import RobotSnapshot
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.checked_snapshots import CheckedSnapshots
 from robochoc.communication.network.control_messages import CheckRequest, CheckResult, Recall, ToRobot
 from robochoc.communication.network.framing import FrameRefusedError
-from robochoc.communication.network.members import Members
+from robochoc.communication.network.members import TeamMembers
 from robochoc.communication.network.searcher import SnapshotValues, values_for_recall
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint
@@ -31,7 +31,7 @@ class Round:
     """The snapshots of a search by three robots, and what the master has sent them."""
 
     def __init__(self) -> None:
-        members = Members(ROBOTS)
+        members = TeamMembers(ROBOTS)
         for name, profile in profiles_of(TEAM).items():
             members.register(name, profile, "incarnation").joined = True
         self.state = AuditedSearchState(1, ROBOTS, declared=members.declared(DSA.traits))
@@ -50,7 +50,7 @@ class Round:
 
     def tell(self, number: int, have: dict[str, dict[str, int]], findings: Findings = NO_FINDINGS) -> None:
         for name in ROBOTS:
-            assert not self.state.handle(name, Snapshot(1, number, have[name], 0, findings))
+            assert not self.state.handle(name, RobotSnapshot(1, number, have[name], 0, findings))
 
     def check(self, number: int, *, allowed: bool = True) -> None:
         for name in ROBOTS:
@@ -88,7 +88,7 @@ def test_the_last_cycle_that_all_have_completed_is_asked_for() -> None:
     around = Round()
     around.begin()
     for name, cycle in zip(ROBOTS, (7, 5, 6), strict=True):
-        around.state.handle(name, Snapshot(1, 1, NOW[name], 0, Findings(trail=Trail([], cycle))))
+        around.state.handle(name, RobotSnapshot(1, 1, NOW[name], 0, Findings(trail=Trail([], cycle))))
     assert around.snapshots.advance() is None
     assert around.taken() == [Recall(1, 1), Recall(1, 2, cycle=5)]
     around.tell(2, THEN)
@@ -107,7 +107,7 @@ def test_the_cheapest_that_a_robot_has_heard_of_is_asked_for_and_one_that_does_n
         around.begin()
         first = 2 * number - 1
         for name, one in zip(ROBOTS, (true, false, false), strict=True):
-            around.state.handle(name, Snapshot(1, first, THEN[name], 0, Findings(best=one)))
+            around.state.handle(name, RobotSnapshot(1, first, THEN[name], 0, Findings(best=one)))
         assert around.snapshots.advance() is None or best is None
         recalls = [word for word in around.taken() if isinstance(word, Recall)]
         assert recalls[1:] == ([Recall(1, first + 1, value=best.values["RB"])] if best else []), known

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.control import Counters, Events, Failed, Ready, Wave
+from robochoc.communication.control import Counters, CounterWave, Events, Ready, RobotFailed
 from robochoc.communication.network.control_messages import (
     LATEST,
     CheckRequest,
@@ -28,7 +28,7 @@ from robochoc.communication.network.control_messages import (
     ProtocolMessage,
     Register,
     RegistrationDenied,
-    Task,
+    SearchTask,
     ToMaster,
     ToPeer,
     ToRobot,
@@ -96,8 +96,8 @@ SPECIAL: dict[type[ControlMessage], st.SearchStrategy[ControlMessage]] = {
     Events: st.just(Events([Received(t=1.5, sender="R1", receiver="R2", type="Ok", clock=3)])),
     CheckRequest: st.builds(CheckRequest, NUMBERS, st.dictionaries(TEXTS, NUMBERS)),
     ProtocolMessage: st.builds(ProtocolMessage, NUMBERS, st.integers(0, LATEST), st.binary(max_size=5)),
-    Task: st.builds(
-        Task,
+    SearchTask: st.builds(
+        SearchTask,
         epoch=NUMBERS,
         protocol=TEXTS,
         order=SEVERAL,
@@ -215,7 +215,7 @@ def test_another_life_begins_at_1_for_that_robot_only() -> None:
     master = Framing(MASTER, "run")
     for name in ("R1", "R2"):
         master.accept(name, master.read(name, Framing(name, "run").write(MASTER, Ready(1))).number)
-        master.write(name, Wave(1))
+        master.write(name, CounterWave(1))
     master.forget("R1")
     master.forget("R7")
     assert (master.next_number("R1"), master.next_number("R2")) == (1, 2)
@@ -301,7 +301,7 @@ FRAMES = [
     (sender, receiver, msgspec.msgpack.encode(Frame("run", 1, word)))
     for sender, receiver, word in (
         ("R1", MASTER, Register(PROFILE, "incarnation")),
-        ("R1", MASTER, Failed("why", unsupported=True)),
+        ("R1", MASTER, RobotFailed("why", unsupported=True)),
         ("R1", MASTER, Counters(1, 2, 3, 4)),
         (MASTER, "R1", Leave("over", failed=False)),
         ("R1", "R2", ProtocolMessage(1, 3, b"content")),

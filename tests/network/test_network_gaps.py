@@ -12,7 +12,7 @@ import zenoh
 
 from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.registry import Right, Role
-from robochoc.communication.control import Failed
+from robochoc.communication.control import RobotFailed
 from robochoc.communication.network.access import ALL, frame_key
 from robochoc.communication.network.control_messages import DirectoryRequest, ProtocolMessage, Register
 from robochoc.communication.network.framing import MASTER
@@ -138,7 +138,7 @@ def test_why_a_robot_fails_reaches_other_owners_as_plain_text(tmp_path: Path) ->
     with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
         transport.send(MASTER, frame(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))
         run.wait_until(lambda: "RX3" in run.master.members.robots, "it is not registered")
-        transport.send(MASTER, frame(run, "RX3", MASTER, Failed("\x1b[2J\u202e" + "x" * 1_000_000)))
+        transport.send(MASTER, frame(run, "RX3", MASTER, RobotFailed("\x1b[2J\u202e" + "x" * 1_000_000)))
         with pytest.raises(RobotsLostError) as lost:
             run.wait_for_result()
     assert str(lost.value).startswith(r"RX3 was lost: \x1b[2J\u202exxx")

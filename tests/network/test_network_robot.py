@@ -7,7 +7,7 @@ from typing import cast
 
 import msgspec
 
-from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
+from robochoc.communication.control import Counters, CounterWave, Pause, Ready, RobotFailed
 from robochoc.communication.network.control_messages import (
     Adopt,
     Bye,
@@ -62,7 +62,7 @@ def test_a_run_from_beginning_to_end() -> None:
                 yield StartSearch(1)
                 yield transport.frame(ProtocolMessage(1, 5, ok(1)), "RA")
             case Counters(_, 0, _, 1):
-                yield Wave(7)
+                yield CounterWave(7)
             case Counters(_, 7):
                 yield Pause()
             case DetailedReport():
@@ -109,7 +109,7 @@ def test_what_was_said_in_another_search_is_passed_over() -> None:
         )
     )
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert not transport.heard_of(Failed)
+    assert not transport.heard_of(RobotFailed)
 
 
 def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
@@ -124,7 +124,7 @@ def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
     assert account.assignment == ending.assignment == {"B": 1}
 
 
-@looped("word", [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {}), Recall(1, 1), Adopt(1, 1)])
+@looped("word", [StartSearch(1), CounterWave(1), Pause(), CheckRequest(1, {}), Recall(1, 1), Adopt(1, 1)])
 def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
     ending, transport = played(answering((Joined, [word]), (Objection, [LEAVE])))
     assert not ending.failed

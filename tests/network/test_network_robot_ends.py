@@ -8,7 +8,7 @@ from typing import cast
 import msgspec
 import pytest
 
-from robochoc.communication.control import Failed, Pause, Ready
+from robochoc.communication.control import Pause, Ready, RobotFailed
 from robochoc.communication.network.constraint_records import PredicateRecord, SharedRecord
 from robochoc.communication.network.control_messages import (
     Bye,
@@ -42,12 +42,12 @@ from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.lone_robot import LEAVE, UNPROVEN, Answers, From, answering, chain_of_three, ok, played, task
 
 
-def failing(*said: ControlMessage | Item, protocol: type[Protocol] = ABT) -> Failed:
+def failing(*said: ControlMessage | Item, protocol: type[Protocol] = ABT) -> RobotFailed:
     """Return the failure that RB reports, and ends with, when it receives these once it has joined."""
     end: Answers = [FrameArrived("RA", b"noise"), Leave("that was it", failed=True)]
-    ending, transport = played(answering((Joined, said), (Failed, end)), protocol)
-    (failed,) = transport.heard_of(Failed)
-    assert isinstance(failed, Failed)
+    ending, transport = played(answering((Joined, said), (RobotFailed, end)), protocol)
+    (failed,) = transport.heard_of(RobotFailed)
+    assert isinstance(failed, RobotFailed)
     assert ending == Ending(failed.why, failed=True, assignment={})
     assert isinstance(transport.heard[-1], Bye)
     return failed
@@ -195,7 +195,7 @@ def test_who_fails_does_not_wait_for_a_master_that_is_gone() -> None:
     def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         if isinstance(word, Joined):
             yield FramesLost(MASTER, 1)
-        elif isinstance(word, Failed):
+        elif isinstance(word, RobotFailed):
             transport.router = ""
 
     assert played(script)[0].failed

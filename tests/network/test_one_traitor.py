@@ -27,7 +27,7 @@ from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
 from robochoc.run.networked.machines import Machines, claimed
 from robochoc.run.options import Options
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.verification.checker import RefutedError
@@ -132,7 +132,7 @@ def test_a_verdict_after_all_were_quiet_blames_nobody_and_changes_nothing() -> N
 
 # While they search
 
-PHASE = Phase("abt", ABT, RunParameters())
+PHASE = RunPhase("abt", ABT, RunParameters())
 BROKEN, HELD = CheckResult(1, allowed=False, cost=0, held=1), CheckResult(1, allowed=True, cost=0, held=1)
 
 

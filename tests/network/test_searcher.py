@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import msgspec
 import pytest
 
-from robochoc.communication.control import Conclusion, Counters, Events, Ready, Snapshot
+from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotSnapshot
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.constraint_records import SharedRecord, record_of
@@ -19,10 +19,10 @@ from robochoc.communication.network.control_messages import (
     DetailedReport,
     ProtocolMessage,
     Recall,
-    Task,
+    SearchTask,
     ToMaster,
 )
-from robochoc.communication.network.members import Members
+from robochoc.communication.network.members import TeamMembers
 from robochoc.communication.network.quotas import MIB
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.robot_loop import EVENTS_AT_ONCE
@@ -72,8 +72,10 @@ def chain(cost: float = INFINITE) -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), [*constraints, Constraint("P", PREDEFINED["lt"], ("B", 9), ("B", 9))])
 
 
-def tasks(team: Team, protocol: type[Protocol], parameters: RunParameters = DEFAULT_PARAMETERS) -> dict[str, Task]:
-    members = Members()
+def tasks(
+    team: Team, protocol: type[Protocol], parameters: RunParameters = DEFAULT_PARAMETERS
+) -> dict[str, SearchTask]:
+    members = TeamMembers()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "incarnation")
     return members.tasks(1, protocol.__name__, protocol.traits, parameters)
@@ -327,7 +329,7 @@ def test_a_master_that_recalls_does_not_get_all_cycles() -> None:
     one.report_snapshot(1)
     one.recall(Recall(1, 2))
     one.pause()
-    told, recalled, report = (word for word in around.said if isinstance(word, Snapshot | DetailedReport))
+    told, recalled, report = (word for word in around.said if isinstance(word, RobotSnapshot | DetailedReport))
     assert told.findings.trail is not None
     assert told.findings.trail.entries
     assert recalled.findings.trail == report.findings.trail == Trail([], told.findings.trail.cycle)

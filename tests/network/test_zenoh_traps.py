@@ -15,12 +15,12 @@ import pytest
 import zenoh
 
 from robochoc.authority.admission import InMemoryAuthority
-from robochoc.communication.control import Failed
+from robochoc.communication.control import RobotFailed
 from robochoc.communication.network.access import ALL, access_control
 from robochoc.communication.network.framing import LARGEST_FRAME, MASTER, Framing, MessageTooLargeError
 from robochoc.communication.network.inbox import FrameArrived, Item
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.network.members import Members, RegistrationRefusedError
+from robochoc.communication.network.members import RegistrationRefusedError, TeamMembers
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS
@@ -157,7 +157,7 @@ def test_a_larger_one_is_refused_before_it_is_sent() -> None:
     with pytest.raises(
         MessageTooLargeError, match=r"a message of A to MASTER has 8,388,\d+ bytes, more than 8,388,608"
     ):
-        framing.write(MASTER, Failed("x" * LARGEST_FRAME))
+        framing.write(MASTER, RobotFailed("x" * LARGEST_FRAME))
     assert framing.next_number(MASTER) == 1, "what was not sent leaves no gap"
 
 
@@ -218,4 +218,4 @@ def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
         profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.max_cost, ()
     )
     with pytest.raises(RegistrationRefusedError, match=r"'\*' is not a valid name"):
-        Members().register(profile.name, bad, "incarnation")
+        TeamMembers().register(profile.name, bad, "incarnation")

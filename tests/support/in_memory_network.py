@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import cast
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.control import EpochMessage, Failed, Pause, Wave
+from robochoc.communication.control import CounterWave, EpochMessage, Pause, RobotFailed
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
     CheckRequest,
@@ -24,7 +24,7 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import FrameArrived, Item
-from robochoc.communication.network.members import Members
+from robochoc.communication.network.members import TeamMembers
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.search_result import SearchResult
@@ -88,10 +88,10 @@ class InMemoryNetwork:
     ) -> None:
         self.traitor = traitor
         self.inboxes: dict[str, SimpleQueue[Item]] = {name: SimpleQueue() for name in (*team.order, MASTER)}
-        self.members = Members(team.order)
+        self.members = TeamMembers(team.order)
         self.state = AuditedSearchState()
         self.objections: list[Objection] = []
-        self.failures: dict[str, Failed] = {}
+        self.failures: dict[str, RobotFailed] = {}
         self._protocol = protocol
         self._filters = tuple(filters)
         self._brief = parameters
@@ -125,7 +125,7 @@ class InMemoryNetwork:
             self._searching = state.ordered = True
             self._settle()
             while not (state.verdict or state.counters.quiescent or state.broken_off) and state.wave_due:
-                self._tell_all(Wave(state.counters.start_wave()))
+                self._tell_all(CounterWave(state.counters.start_wave()))
                 self._settle()
             if state.counters.quiescent:
                 state.verdict = state.verdict or Verdict.SOLUTION
@@ -187,7 +187,7 @@ class InMemoryNetwork:
                 self.members.robots[name].shown_later.update(variables)
             case Objection() as objection:
                 self.objections.append(objection)
-            case Failed() as failed:
+            case RobotFailed() as failed:
                 self.failures[name] = failed
             case EpochMessage() as word:
                 self._weigh(name, self.state.handle(name, word))

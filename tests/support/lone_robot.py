@@ -12,12 +12,12 @@ from robochoc.communication.network.control_messages import (
     Joined,
     Leave,
     Register,
+    SearchTask,
     StartSearch,
-    Task,
     Welcome,
 )
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
-from robochoc.communication.network.members import Members
+from robochoc.communication.network.members import TeamMembers
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
@@ -43,8 +43,8 @@ def chain_of_three() -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
 
 
-def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> Task:
-    members = Members()
+def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> SearchTask:
+    members = TeamMembers()
     for robot in chain_of_three().robots:
         members.register(robot.name, profile_of(robot), "incarnation")
     return members.tasks(epoch, protocol.__name__, protocol.traits, DEFAULT_PARAMETERS)["RB"]

@@ -12,9 +12,9 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import FromAce
 from robochoc.solver.compiled_domain import compile_domain
 from robochoc.solver.compiled_team import CompiledTeam
-from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Network
 
-SMALL_NETWORK = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 0),)),))
+SMALL_NETWORK = Network(((0, 1), (0, 1)), (CodeTable((0, 1), allowed=False, rows=((0, 0),)),))
 
 
 def queens_network(n: int) -> Network:
@@ -23,7 +23,7 @@ def queens_network(n: int) -> Network:
     tables = []
     for one, other in itertools.combinations(rows, 2):
         apart = [(a, b) for a, b in itertools.product(rows, rows) if a != b and abs(a - b) != other - one]
-        tables.append(Table((one, other), allowed=True, rows=tuple(apart)))
+        tables.append(CodeTable((one, other), allowed=True, rows=tuple(apart)))
     return Network((tuple(rows),) * n, tuple(tables))
 
 
@@ -48,7 +48,7 @@ def random_network(chance: Random) -> Network:
         likely = chance.uniform(0.4, 0.9) if allowed else chance.uniform(0.05, 0.4)
         rows = {row for row in itertools.product(*(domains[p] for p in scope)) if chance.random() < likely}
         rows |= {tuple(chance.randrange(9) for _ in scope)} if chance.random() < 0.3 else set()
-        tables.append(Table(scope, allowed, tuple(sorted(rows))))
+        tables.append(CodeTable(scope, allowed, tuple(sorted(rows))))
     different = [tuple(sorted(chance.sample(range(size), chance.randint(2, size))))] if size > 1 else []
     return Network(domains, tuple(tables), tuple(different) if chance.random() < 0.4 else ())
 

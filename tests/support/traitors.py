@@ -12,7 +12,7 @@ from dataclasses import replace
 import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Ready
-from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, Task, ToMaster
+from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, SearchTask, ToMaster
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
@@ -155,7 +155,7 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
     begin = Searcher.__init__
 
     def begin_lying(
-        me: Searcher, own: CompiledRobot, task: Task, protocol: type[Protocol], context: RobotContext
+        me: Searcher, own: CompiledRobot, task: SearchTask, protocol: type[Protocol], context: RobotContext
     ) -> None:
         def say(word: ToMaster) -> None:
             for one in lie(me, word):

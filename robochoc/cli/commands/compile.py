@@ -15,7 +15,7 @@ from robochoc.cli.reports.failures import LIMIT, Failure, errors_as_failures, wo
 
 if TYPE_CHECKING:
     from robochoc.solver.cache import SolutionCache
-    from robochoc.solver.compile import CompileTimeoutError, Limits
+    from robochoc.solver.compile import CompileLimits, CompileTimeoutError
     from robochoc.solver.compiled_domain import TooManySolutionsError
 
 
@@ -56,7 +56,7 @@ def compile_team(
     context.exit(worst([_status(folder, bounds, cache, as_json=as_json) for folder in teams_at(paths)]))
 
 
-def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
+def _status(folder: Path, bounds: CompileLimits, cache: SolutionCache | None, *, as_json: bool) -> int:
     try:
         with errors_as_failures(folder):
             return _compile(folder, bounds, cache, as_json=as_json)
@@ -65,7 +65,7 @@ def _status(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_jso
         return failure.exit_code
 
 
-def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_json: bool) -> int:
+def _compile(folder: Path, bounds: CompileLimits, cache: SolutionCache | None, *, as_json: bool) -> int:
     """Compile all robots of the team in `folder`, even if some reach a limit, and return the exit status."""
     from robochoc.cli.reports.compile import print_sizes, sizes_json
     from robochoc.cli.reports.progress import progress_line

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.robots.closed_loop import ClosedLoop
-    from robochoc.run.choice import Choice
+    from robochoc.run.choice import ProtocolChoice
     from robochoc.run.improvement import Audience
     from robochoc.run.options import Options
     from robochoc.run.orchestrator import PreparedRun
@@ -152,7 +152,7 @@ def _observed(
 
 
 def _print_outcome(
-    problem: ReadProblem, outcome: Outcome, request: TeamRequest, choice: Choice, ground: GroundMap | None
+    problem: ReadProblem, outcome: Outcome, request: TeamRequest, choice: ProtocolChoice, ground: GroundMap | None
 ) -> None:
     """Print the outcome, in the original names if the problem was imported.
 

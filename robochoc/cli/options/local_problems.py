@@ -10,7 +10,7 @@ import click
 from robochoc.cli.options.value_types import Number, WholeNumber
 
 if TYPE_CHECKING:
-    from robochoc.solver.compile import Limits
+    from robochoc.solver.compile import CompileLimits
 
 Command = TypeVar("Command", bound=Callable[..., object])
 
@@ -52,10 +52,10 @@ def local_options(command: Command) -> Command:
     return command
 
 
-def limits(local_solutions: int, local_timeout: float, *, always_ace: bool) -> Limits:
+def limits(local_solutions: int, local_timeout: float, *, always_ace: bool) -> CompileLimits:
     """Return the limits that the options set."""
-    from robochoc.solver.compile import Limits
+    from robochoc.solver.compile import CompileLimits
 
     if not local_timeout > 0:
         raise click.UsageError("--local-timeout requires a number of seconds greater than 0")
-    return Limits(local_solutions, local_timeout, always_ace)
+    return CompileLimits(local_solutions, local_timeout, always_ace)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.cli.reports.progress import print_above
 from robochoc.formats import on_one_line
-from robochoc.run.choice import ORDERS_TEXT, Choice, faster_order
+from robochoc.run.choice import ORDERS_TEXT, ProtocolChoice, faster_order
 from robochoc.run.choice_rules import RULES, Rule
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ LONG_S = 5.0
 """Seconds of a search after which the note on a faster order is printed."""
 
 
-def choice_lines(choice: Choice) -> Iterator[str]:
+def choice_lines(choice: ProtocolChoice) -> Iterator[str]:
     """Yield the facts about the team and the reasons against other protocols; nothing if the user named a protocol."""
     if choice.facts:
         yield f"  the team: {'; '.join(choice.facts)}"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
-from robochoc.communication.arrays.layout import Group, Layout
+from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import MessageTally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
@@ -29,7 +29,7 @@ _FLOAT_BITS = np.uint64(11)
 Costs = TypeVar("Costs", Integers, Floats)
 
 
-class Change(NamedTuple):
+class CycleChange(NamedTuple):
     """The rows whose values have changed in a cycle, and their values."""
 
     rows: Integers
@@ -79,7 +79,7 @@ class CycleRun(ABC):
     settings: CycleCount
 
     def __init__(
-        self, layout: Layout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
+        self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         if isinstance(settings, CycleSettings) and settings.anytime == "yes":
             raise UnsupportedError(f"anytime=yes cannot be used with --runtime arrays: {WITHOUT_ANYTIME}")
@@ -88,7 +88,7 @@ class CycleRun(ABC):
         self.values: Integers = np.zeros(layout.many, layout.kind)
         self.cycle = -1
         self.costs: list[float] = []
-        self.changes: list[Change] | None = [] if changes else None
+        self.changes: list[CycleChange] | None = [] if changes else None
         self.best: Integers = self.values
         self.verdict: Verdict | None = None
         self.witness: int | None = None
@@ -119,7 +119,7 @@ class CycleRun(ABC):
         if self.layout.empty.size:
             self.verdict, self.witness = Verdict.NO_SOLUTION, int(self.layout.empty[-1])
         if self.changes is not None:
-            self.changes.append(Change(np.arange(self.layout.many), self.values.copy()))
+            self.changes.append(CycleChange(np.arange(self.layout.many), self.values.copy()))
 
     def step(self) -> None:
         """Run one cycle."""
@@ -130,7 +130,7 @@ class CycleRun(ABC):
         self.cycle += 1
         if self.changes is not None:
             rows = np.flatnonzero(before != self.values)
-            self.changes.append(Change(rows, self.values[rows]))
+            self.changes.append(CycleChange(rows, self.values[rows]))
 
     def end(self) -> None:
         """Compute the cost of the last cycle's values."""
@@ -233,7 +233,7 @@ class CycleRun(ABC):
                 part[lists] = np.maximum(part[lists], told.take(neighbours))
         return heard
 
-    def _settle_alone(self, group: Group) -> None:
+    def _settle_alone(self, group: RobotGroup) -> None:
         """Give robots without neighbours their cheapest values."""
         alone = slice(group.first + group.active, group.last)
         if group.fixed is not None:
@@ -256,7 +256,7 @@ class _Sums:
         self._broken: dict[int, int] = {}
         self._paid: dict[int, int] = {}
 
-    def add(self, layout: Layout, costs: Integers, times: int) -> None:
+    def add(self, layout: ArrayLayout, costs: Integers, times: int) -> None:
         """Add `costs`, each counted by `times` robots."""
         broken = int(layout.costs.broken(costs).sum())
         self._broken[times] = self._broken.get(times, 0) + broken
@@ -270,7 +270,7 @@ class _Sums:
         return sum(paid // times for times, paid in self._paid.items())
 
 
-def _fixed(group: Group) -> Integers:
+def _fixed(group: RobotGroup) -> Integers:
     """Return a copy of the fixed costs of the values of robots with neighbours."""
     if group.fixed is not None:
         return group.fixed[: group.active].copy()

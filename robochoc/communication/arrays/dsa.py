@@ -8,7 +8,7 @@ import numpy as np
 
 from robochoc.communication.arrays.array_types import Flags, Floats, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
-from robochoc.communication.arrays.layout import Group
+from robochoc.communication.arrays.layout import RobotGroup
 from robochoc.protocols.local_search.dsa import DSASettings
 
 
@@ -32,7 +32,7 @@ class ArrayDSA(CycleRun):
     def _weigh(self) -> None:
         self.value_costs()
 
-    def _choose(self, number: int, group: Group, value_costs: Integers) -> None:
+    def _choose(self, number: int, group: RobotGroup, value_costs: Integers) -> None:
         own = group.values(self.values)[: group.active]
         now, lowest = self.present(number, value_costs), least(value_costs)
         cheapest = value_costs == lowest[:, None]
@@ -50,7 +50,7 @@ class ArrayDSA(CycleRun):
         settings = cast("DSASettings", self.settings)
         return np.where(gains, 1.0, settings.probability) if settings.variant in "DE" else settings.probability
 
-    def _sideways(self, number: int, group: Group, now: Integers) -> Flags | bool:
+    def _sideways(self, number: int, group: RobotGroup, now: Integers) -> Flags | bool:
         """Return the robots whose moves without a gain the variant allows (`DSA._probability`)."""
         variant = cast("DSASettings", self.settings).variant
         if variant not in "BD":

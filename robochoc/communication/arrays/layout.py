@@ -1,8 +1,8 @@
 """The layout of a team in arrays: robots with equally many values form a group, sorted by descending degree.
 
-Rows number the robots in this order; `Layout.robots` maps rows to robots. The cost of a value is one integer: the
-number of broken constraints in the high bits, the other costs in the low bits (`Costs`), so that integers compare as
-`LexicographicCost` does.
+Rows number the robots in this order; `ArrayLayout.robots` maps rows to robots. The cost of a value is one integer: the
+number of broken constraints in the high bits, the other costs in the low bits (`IntegerCosts`), so that
+integers compare as `LexicographicCost` does.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _LOW = (1 << _LOW_BITS) - 1
 
 
 @dataclass(frozen=True)
-class Costs:
+class IntegerCosts:
     """Costs as integers: the number of broken constraints, shifted by `bits`, plus all other costs.
 
     A difference of two sums has the same form; its other costs may be negative, and are less than half of the unit.
@@ -35,7 +35,7 @@ class Costs:
     kind: np.dtype[np.integer]
 
     @classmethod
-    def up_to(cls, total: float, constraints: int) -> Costs:
+    def up_to(cls, total: float, constraints: int) -> IntegerCosts:
         """Return the form for robots with at most `constraints` constraints and costs of at most `total`.
 
         Raises:
@@ -96,7 +96,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Block:
+class ConstraintBlock:
     """Constraints of one shape that robots of one group know: a row of costs for each combination of others' values."""
 
     held: KnownConstraints
@@ -105,7 +105,7 @@ class Block:
 
 
 @dataclass
-class Group:
+class RobotGroup:
     """The robots with `size` values: rows `first` to `last` of the team's arrays, the first `active` with neighbours.
 
     `charges` is the unary cost of each value; None: no unary costs. `fixed` also includes constraints over no other
@@ -119,7 +119,7 @@ class Group:
     charges: Integers | None
     fixed: Integers | None = None
     checks: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
-    blocks: list[Block] = field(default_factory=list)
+    blocks: list[ConstraintBlock] = field(default_factory=list)
 
     @property
     def many(self) -> int:
@@ -131,7 +131,7 @@ class Group:
         return values[self.first : self.last]
 
 
-class Layout:
+class ArrayLayout:
     """A team's arrays.
 
     Attributes:
@@ -154,7 +154,7 @@ class Layout:
         self.degrees = degrees[self.robots]
         self.kind = narrowest(int(sizes.max(initial=1)))
         held = [] if self.empty.size else list(description.held)
-        self.costs = Costs.up_to(*_largest(description, held))
+        self.costs = IntegerCosts.up_to(*_largest(description, held))
         self.groups = list(self._groups(held))
 
     @property
@@ -182,7 +182,7 @@ class Layout:
         return rows
 
     @cached_property
-    def links(self) -> list[tuple[Group, Index, Integers, Integers]]:
+    def links(self) -> list[tuple[RobotGroup, Index, Integers, Integers]]:
         """Each group's neighbours, column by column: the robots (within the group), neighbours, places of the links."""
         return [
             (group, lists, self.neighbours[places + self._start(group)], places + self._start(group))
@@ -215,16 +215,16 @@ class Layout:
         order = np.argsort(keys, kind="stable")
         return keys[order], order
 
-    def _start(self, group: Group) -> int:
+    def _start(self, group: RobotGroup) -> int:
         return int(self.starts[group.first]) if group.many else 0
 
-    def _groups(self, held: list[KnownConstraints]) -> Iterator[Group]:
+    def _groups(self, held: list[KnownConstraints]) -> Iterator[RobotGroup]:
         sizes = self.description.sizes[self.robots]
         of = [(one, one.owners.size and one.tables.shape[-1]) for one in held]
         for size in np.unique(sizes):
             first, last = (int(np.searchsorted(sizes, size, side)) for side in ("left", "right"))
             active = int((self.degrees[first:last] > 0).sum())
-            group = Group(int(size), first, last, active, self._charges(first, last, int(size)))
+            group = RobotGroup(int(size), first, last, active, self._charges(first, last, int(size)))
             self._fill(group, [one for one, own in of if own == size])
             yield group
 
@@ -235,7 +235,7 @@ class Layout:
         starts = (np.cumsum(given.sizes) - given.sizes)[self.robots[first:last]]
         return self.costs.of(given.charges[starts[:, None] + np.arange(size)])
 
-    def _fill(self, group: Group, held: list[KnownConstraints]) -> None:
+    def _fill(self, group: RobotGroup, held: list[KnownConstraints]) -> None:
         """Give the group its constraints."""
         group.checks = np.zeros(group.many, np.int64)
         group.fixed = group.charges
@@ -250,7 +250,7 @@ class Layout:
                 group.fixed = fixed.copy()
                 np.add.at(group.fixed, own, rows[one.which])
 
-    def _block(self, group: Group, held: KnownConstraints, own: Integers, rows: Integers) -> Block:
+    def _block(self, group: RobotGroup, held: KnownConstraints, own: Integers, rows: Integers) -> ConstraintBlock:
         order = np.argsort(own, kind="stable")
         shape = held.tables.shape[1:-1]
         strides = tuple(int(np.prod(shape[place + 1 :])) for place in range(len(shape)))
@@ -261,7 +261,7 @@ class Layout:
             chosen = order[places]
             base: Integers | int = (held.which[chosen] * per_table).astype(self.index) if len(held.tables) > 1 else 0
             found.append(Column(lists, base, tuple(np.ascontiguousarray(others[chosen].T)), strides))
-        return Block(held, rows, tuple(found))
+        return ConstraintBlock(held, rows, tuple(found))
 
 
 def _largest(description: Description, held: list[KnownConstraints]) -> tuple[float, int]:

@@ -16,7 +16,7 @@ from robochoc.communication.arrays.array_types import FEW, Floats, Index, Intege
 from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, least
 from robochoc.communication.arrays.description import KnownConstraints
 from robochoc.communication.arrays.jagged import columns
-from robochoc.communication.arrays.layout import Group, Layout
+from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import list_bytes
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
@@ -66,12 +66,12 @@ class Factors:
         return exact_sum(self.tables[(self.which, *(values[column] for column in self.rows.T))])
 
 
-def factors_of(layout: Layout) -> list[Factors]:
+def factors_of(layout: ArrayLayout) -> list[Factors]:
     """Return the functions of a team. The lowest robot of a scope holds its function."""
     return [found for held in layout.description.held if (found := _joined(layout, held)) is not None]
 
 
-def _joined(layout: Layout, held: KnownConstraints) -> Factors | None:
+def _joined(layout: ArrayLayout, held: KnownConstraints) -> Factors | None:
     """Return the functions of the constraints in `held` whose owner is the lowest; None if there are none."""
     if not held.others.shape[1]:
         return None
@@ -111,7 +111,7 @@ class Ports:
     `slots` the edges of each robot, one robot after the other, in the order in which their costs are added up.
     """
 
-    group: Group
+    group: RobotGroup
     owners: Integers
     slots: Integers
     lengths: Integers
@@ -136,7 +136,7 @@ class Ports:
             yield self.slots[starts[there] + left_out], total
 
 
-def ports_of(layout: Layout, factors: list[Factors]) -> tuple[list[Ports], list[list[tuple[Ports, slice]]]]:
+def ports_of(layout: ArrayLayout, factors: list[Factors]) -> tuple[list[Ports], list[list[tuple[Ports, slice]]]]:
     """Return the ports of each group, and for each of `factors` the ports and rows of its robots."""
     found: list[Ports] = []
     sides: list[list[tuple[Ports, slice]]] = [[] for _ in factors]
@@ -161,7 +161,7 @@ def _by_place(factors: Factors, sides: list[tuple[Ports, slice]]) -> list[tuple[
     return [side for _, side in sorted(zip(order, sides, strict=True), key=lambda pair: pair[0])]
 
 
-def _ports(layout: Layout, group: Group, ends: list[tuple[Factors, int]]) -> tuple[Ports, list[slice]]:
+def _ports(layout: ArrayLayout, group: RobotGroup, ends: list[tuple[Factors, int]]) -> tuple[Ports, list[slice]]:
     """Return the ports of `group` at `ends`: functions with the places of their robots."""
     owners = [one.rows[:, place] - group.first for one, place in ends]
     holders = [np.where(place == one.rows.shape[1] - 1, -1, layout.robots[one.rows[:, -1]]) for one, place in ends]
@@ -189,7 +189,7 @@ class ArrayMaxSum(CycleRun):
     """
 
     def __init__(
-        self, layout: Layout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
+        self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         if cast("MaxSumSettings", settings).split:
             raise UnsupportedError("maxsum with --set split has no form as arrays: use --runtime simulator")
@@ -234,7 +234,7 @@ class ArrayMaxSum(CycleRun):
 
     # Equations
 
-    def _prefer(self, group: Group) -> Floats:
+    def _prefer(self, group: RobotGroup) -> Floats:
         """Return the unary cost of each value, with its preference (gamma)."""
         rows = np.arange(group.first, group.first + group.active)
         preferred = np.zeros((group.many, group.size))
@@ -280,7 +280,7 @@ class ArrayMaxSum(CycleRun):
 
     # Counts
 
-    def _cost_alone(self, group: Group) -> Floats | None:
+    def _cost_alone(self, group: RobotGroup) -> Floats | None:
         if group.fixed is None:
             return None
         broken, paid = self.layout.costs.broken(group.fixed), self.layout.costs.paid(group.fixed)

@@ -11,7 +11,7 @@ import numpy as np
 
 from robochoc.communication.arrays.array_types import Flags, Integers
 from robochoc.communication.arrays.cycle_run import nth
-from robochoc.communication.arrays.layout import Block, Group, Layout
+from robochoc.communication.arrays.layout import ArrayLayout, ConstraintBlock, RobotGroup
 from robochoc.communication.arrays.mgm import ArrayGainers
 from robochoc.communication.arrays.tally import integer_bytes, list_bytes
 from robochoc.protocols.local_search.mgm2 import Accept, Go, MGM2Settings, Offer, Reject
@@ -34,7 +34,7 @@ class _Position:
 class _Constraints:
     """The constraints of a block: `rows` as in `Column`, and the robots at each position."""
 
-    def __init__(self, layout: Layout, block: Block) -> None:
+    def __init__(self, layout: ArrayLayout, block: ConstraintBlock) -> None:
         held = block.held
         shape = held.tables.shape[1:-1]
         self.costs = block.rows
@@ -68,7 +68,7 @@ class _Meeting(NamedTuple):
 class PairConstraints:
     """The constraints of the robots of one group, by their other robots."""
 
-    def __init__(self, layout: Layout, group: Group) -> None:
+    def __init__(self, layout: ArrayLayout, group: RobotGroup) -> None:
         self._constraints = [_Constraints(layout, block) for block in group.blocks]
         self.size = group.size
 

@@ -10,7 +10,7 @@ import numpy as np
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.cycle_run import cycles_of
 from robochoc.communication.arrays.description import describe_team
-from robochoc.communication.arrays.layout import Layout
+from robochoc.communication.arrays.layout import ArrayLayout
 from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.search_watch import snapshot_of
 from robochoc.communication.session import Epoch, Session
@@ -148,9 +148,9 @@ class ArraysRun(Session):
         return found
 
 
-def _laid_out(parts: Mapping[str, AgentProblem]) -> Layout:
+def _laid_out(parts: Mapping[str, AgentProblem]) -> ArrayLayout:
     """Return the team's arrays. Raises `UnsupportedError` if its costs or tables are too large."""
     try:
-        return Layout(describe_team(parts))
+        return ArrayLayout(describe_team(parts))
     except UnsupportedError as large:
         raise UnsupportedError(f"{large}: use --runtime simulator") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import islice
 
-from robochoc.communication.control import EpochMessage, Report, Snapshot
+from robochoc.communication.control import EpochMessage, EpochReport, RobotSnapshot
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport
 from robochoc.communication.network.plausibility import (
     NOTHING_DECLARED,
@@ -24,7 +24,7 @@ from robochoc.communication.network.plausibility import (
     total_of,
     widest_gap,
 )
-from robochoc.communication.quiescence import Counts
+from robochoc.communication.quiescence import MessageCounts
 from robochoc.communication.search_state import SearchState
 from robochoc.model.outcome import CheckCounts
 
@@ -61,7 +61,7 @@ class AuditedSearchState(SearchState):
         self._snapshot_checks: dict[str, CheckResult] = {}
         self._snapshot_checked = 0
         self._contradictions: list[Doubt] = []
-        self._still: Counts | None = None
+        self._still: MessageCounts | None = None
         self._still_since = 0.0
         self._asked = 0
 
@@ -71,7 +71,7 @@ class AuditedSearchState(SearchState):
             return self._take_check(name, message)
         return super().handle(name, message)
 
-    def _count(self, name: str, wave: int, counts: Counts) -> str:
+    def _count(self, name: str, wave: int, counts: MessageCounts) -> str:
         """Record counters. The messages received in one wave cannot exceed those sent by the next wave."""
         if fault := fault_of_counters(counts, self.counters.latest(name)):
             return fault
@@ -100,10 +100,10 @@ class AuditedSearchState(SearchState):
         self._contradictions.append(Doubt((self.witness, name), why))
         return ""
 
-    def _take_report(self, name: str, report: Report) -> str:
+    def _take_report(self, name: str, report: EpochReport) -> str:
         if not isinstance(report, DetailedReport):
             return "its message is not for the master"
-        counts = self.counters.latest(name) or Counts(0, 0)
+        counts = self.counters.latest(name) or MessageCounts(0, 0)
         course = FinishedSearch(self.order, counts, self.duration_s, self.by_quiescence, self.drops)
         fault = fault_of_report(name, report, self._declared, course)
         if not fault:
@@ -111,7 +111,7 @@ class AuditedSearchState(SearchState):
             super()._take_report(name, report)
         return fault
 
-    def _take_snapshot(self, name: str, snapshot: Snapshot) -> str:
+    def _take_snapshot(self, name: str, snapshot: RobotSnapshot) -> str:
         return fault_of_snapshot(name, snapshot, self._declared, self.order) or super()._take_snapshot(name, snapshot)
 
     def _take_check(self, name: str, check: CheckResult) -> str:

@@ -15,16 +15,16 @@ import msgspec
 from robochoc.communication.control import (
     Conclusion,
     Counters,
+    CounterWave,
     EpochMessage,
+    EpochReport,
     Events,
-    Failed,
     GoOn,
     Pause,
     Ready,
-    Report,
-    Snapshot,
+    RobotFailed,
+    RobotSnapshot,
     TakeSnapshot,
-    Wave,
     WentOn,
 )
 from robochoc.communication.network.profile import Profile, Ranges
@@ -76,7 +76,7 @@ class Exchanged(NamedTuple):
     clock: int = 0
 
 
-class DetailedReport(Report, frozen=True):
+class DetailedReport(EpochReport, frozen=True):
     """A report with data for its check by the master. In private runs `assignment` and findings are empty.
 
     `assigned`: the robot has values. `exchanged` counts the messages with each other robot, so that the master can
@@ -173,7 +173,7 @@ class DomainRequest(_Message, frozen=True):
     variables: tuple[str, ...]
 
 
-class Task(EpochMessage, frozen=True):
+class SearchTask(EpochMessage, frozen=True, tag="Task"):
     """A search: the robots' common knowledge (see `solver/agent_problem.py`), the protocol, and its parameters."""
 
     protocol: str
@@ -194,7 +194,7 @@ class StartSearch(EpochMessage, frozen=True):
 
 
 class Recall(EpochMessage, frozen=True):
-    """Requests a `Snapshot` with this `number`: the robot's present values.
+    """Requests a `RobotSnapshot` with this `number`: the robot's present values.
 
     With a `cycle`: its values in that cycle of its protocol. With a `value`: the values of its variables behind this
     value, which others see.
@@ -281,11 +281,11 @@ ToMaster = (
     | Counters
     | Conclusion
     | WentOn
-    | Snapshot
+    | RobotSnapshot
     | Events
     | DetailedReport
     | CheckResult
-    | Failed
+    | RobotFailed
     | Objection
     | LostFrames
     | DirectoryRequest
@@ -296,9 +296,9 @@ ToRobot = (
     Welcome
     | RegistrationDenied
     | DomainRequest
-    | Task
+    | SearchTask
     | StartSearch
-    | Wave
+    | CounterWave
     | TakeSnapshot
     | GoOn
     | Pause

@@ -18,7 +18,7 @@ from typing import Self
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
-from robochoc.communication.control import EpochMessage, Events, Failed, Pause
+from robochoc.communication.control import EpochMessage, Events, Pause, RobotFailed
 from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.checked_snapshots import CheckedSnapshots
@@ -47,7 +47,7 @@ from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item,
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
-from robochoc.communication.network.members import Member, Members
+from robochoc.communication.network.members import Member, TeamMembers
 from robochoc.communication.network.registrar import Registrar
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.search_result import Progress, RobotsLostError, SearchResult
@@ -91,7 +91,7 @@ class Master(MasterLoop):
         admission: Admission,
         identity: Identity,
         endpoint: str,
-        members: Members,
+        members: TeamMembers,
         settings: NetworkSettings = NetworkSettings(),
         *,
         observer: Observer | None = None,
@@ -354,7 +354,7 @@ class Master(MasterLoop):
                 self._note_failure(name, self.members.show(name, variables))
             case Events(events):
                 self.events.relay_from(name, events)
-            case Failed(why, unsupported, elsewhere):
+            case RobotFailed(why, unsupported, elsewhere):
                 refusal = TooLargeError if elsewhere else UnsupportedError
                 self._note_failure(name, why, refusal if unsupported else None)
             case Objection() | LostFrames() if not self.events.may_report_others(name):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
-from robochoc.communication.network.control_messages import Task
+from robochoc.communication.network.control_messages import SearchTask
 from robochoc.communication.network.plausibility import Declarations
 from robochoc.communication.network.profile import (
     Profile,
@@ -27,7 +27,7 @@ from robochoc.solver.agent_problem import RunParameters
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-    """Return the receivers of each robot of a team besides the master. See `Members.reach`."""
+    """Return the receivers of each robot of a team besides the master. See `TeamMembers.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
     met = possible_neighbours(profiles)
@@ -84,7 +84,7 @@ class Member:
         return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
-class Members:
+class TeamMembers:
     """All registered robots, by name.
 
     `expected` are the only allowed robots (None: all that the Authority admits), `number` is the size of the team.
@@ -292,7 +292,7 @@ class Members:
         """Return the receivers of each robot: all others, if the protocol writes to non-neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
-    def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, Task]:
+    def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, SearchTask]:
         """Return the task of each robot for a search, in priority order."""
         order = self.order
         shown = {name: self.robots[name].robot for name in order}
@@ -302,7 +302,7 @@ class Members:
         links = {name: self._links(name) for name in order} if traits.tree else None
         cards = tuple(member.card for member in self.robots.values() if member.card)
         return {
-            name: Task(
+            name: SearchTask(
                 epoch,
                 protocol,
                 order,

@@ -15,11 +15,11 @@ from itertools import chain
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.communication.control import Snapshot
+from robochoc.communication.control import RobotSnapshot
 from robochoc.communication.network.control_messages import Charge, CheckResult, DetailedReport, Exchanged
 from robochoc.communication.network.framing import LARGEST_FRAME
 from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
-from robochoc.communication.quiescence import Counts
+from robochoc.communication.quiescence import MessageCounts
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
 from robochoc.model.outcome import CheckCounts
@@ -73,7 +73,7 @@ class FinishedSearch(NamedTuple):
     """
 
     order: Collection[str]
-    counts: Counts
+    counts: MessageCounts
     duration_s: float
     by_quiescence: bool
     lossy: bool = False
@@ -82,7 +82,7 @@ class FinishedSearch(NamedTuple):
 # Reports of one robot
 
 
-def fault_of_counters(counts: Counts, before: Counts | None) -> str:
+def fault_of_counters(counts: MessageCounts, before: MessageCounts | None) -> str:
     """Return why `counts` are invalid for a robot that had reported `before`; empty if they are valid."""
     if min(counts) < 0 or max(counts) > LARGEST_COUNT:
         return f"it has reported {counts.sent:,} messages sent and {counts.received:,} received, which is impossible"
@@ -105,7 +105,7 @@ def fault_of_report(name: str, account: DetailedReport, declared: Declarations, 
     )
 
 
-def fault_of_snapshot(name: str, snapshot: Snapshot, declared: Declarations, order: Collection[str]) -> str:
+def fault_of_snapshot(name: str, snapshot: RobotSnapshot, declared: Declarations, order: Collection[str]) -> str:
     """Return why `snapshot` of the robot `name` is invalid; empty if it is valid."""
     if not 0 <= snapshot.lost <= LARGEST_COUNT:
         return "it has reported counts that cannot be"
@@ -148,10 +148,10 @@ def _fault_of_exchange(name: str, account: DetailedReport, course: FinishedSearc
     return ""
 
 
-def total_of(account: DetailedReport) -> Counts:
+def total_of(account: DetailedReport) -> MessageCounts:
     """Return the total counts of messages that a robot has reported."""
     exchanged = account.exchanged.values()
-    return Counts(sum(one.sent for one in exchanged), sum(one.received for one in exchanged))
+    return MessageCounts(sum(one.sent for one in exchanged), sum(one.received for one in exchanged))
 
 
 def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:

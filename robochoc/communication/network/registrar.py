@@ -6,7 +6,7 @@ from robochoc.communication.network.control_messages import RegistrationDenied, 
 from robochoc.communication.network.facilitator import DirectoryFacilitator
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
-from robochoc.communication.network.members import Members, RegistrationRefusedError
+from robochoc.communication.network.members import RegistrationRefusedError, TeamMembers
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.settings import NetworkSettings
 
@@ -25,7 +25,7 @@ class Registrar:
 
     def __init__(
         self,
-        members: Members,
+        members: TeamMembers,
         connection: MasterConnection,
         facilitator: DirectoryFacilitator,
         events: MasterEvents,

@@ -1,8 +1,8 @@
 """A robot in a run across machines: it registers with the master, and searches when the master orders the start.
 
-It knows only its own file; names, order and interfaces of the team are in the master's `Task`. This module contains the
-loop around the search, which is in `searcher.py`. All frames that wait in the inbox are one packet. The robot ends when
-the master orders it, and by itself if the master is absent for longer than its patience.
+It knows only its own file; names, order and interfaces of the team are in the master's `SearchTask`. This module
+contains the loop around the search, which is in `searcher.py`. All frames that wait in the inbox are one packet. The
+robot ends when the master orders it, and by itself if the master is absent for longer than its patience.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from robochoc.authority.identity import Identity
 from robochoc.authority.keyring import UnknownPeerError
-from robochoc.communication.control import Failed, GoOn, Pause, TakeSnapshot, Wave
+from robochoc.communication.control import CounterWave, GoOn, Pause, RobotFailed, TakeSnapshot
 from robochoc.communication.filters import NotGenuineError
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
@@ -38,8 +38,8 @@ from robochoc.communication.network.control_messages import (
     Register,
     RegistrationDenied,
     Revoked,
+    SearchTask,
     StartSearch,
-    Task,
     ToMaster,
     ToPeer,
     Welcome,
@@ -128,12 +128,12 @@ class NetworkRobot:
             )
         except UnsupportedError as refusal:
             why = on_one_line(str(refusal), LONGEST_REASON)
-            self._fail(Failed(why, unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
+            self._fail(RobotFailed(why, unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
             return Ending(why, failed=True, assignment={})
         except Exception as error:  # noqa: BLE001 - the master has to know of any error
             where = traceback.extract_tb(error.__traceback__)[-1]
             why = on_one_line(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})", LONGEST_REASON)
-            self._fail(Failed(why))
+            self._fail(RobotFailed(why))
             return Ending(why, failed=True, assignment={})
 
     # The loop
@@ -267,12 +267,12 @@ class NetworkRobot:
     def _obey_in_search(self, order: ControlMessage) -> None:
         searcher = self._searcher
         match order:
-            case Task():
+            case SearchTask():
                 self._take_task(order)
             case StartSearch(epoch) if searcher and epoch == searcher.epoch:
                 self._settings.stage("searching")
                 searcher.start(time.monotonic())
-            case Wave(number) if searcher:
+            case CounterWave(number) if searcher:
                 searcher.report_counters(number)
             case GoOn() if searcher:
                 searcher.go_on()
@@ -314,7 +314,7 @@ class NetworkRobot:
             self._settings.stage("registered, waiting for the others")
         self._send_to_master(Joined(welcome.incarnation, self._channel.card))
 
-    def _take_task(self, task: Task) -> None:
+    def _take_task(self, task: SearchTask) -> None:
         """Enter a new epoch."""
         welcome = self._registration.welcome
         if welcome is None:
@@ -340,7 +340,7 @@ class NetworkRobot:
 
     # The end
 
-    def _fail(self, message: Failed) -> None:
+    def _fail(self, message: RobotFailed) -> None:
         """Report to the master why this robot cannot continue, and wait for a `Leave` for a short time."""
         if self._registration.welcome is None:
             return

@@ -14,7 +14,7 @@ from itertools import islice
 
 import msgspec
 
-from robochoc.communication.control import RobotMessage, Snapshot
+from robochoc.communication.control import RobotMessage, RobotSnapshot
 from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.network.constraint_records import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.network.control_messages import (
@@ -26,7 +26,7 @@ from robochoc.communication.network.control_messages import (
     Exchanged,
     ProtocolMessage,
     Recall,
-    Task,
+    SearchTask,
     ToMaster,
     ToPeer,
 )
@@ -130,7 +130,7 @@ class Searcher(RobotLoop):
 
     bundle_bytes = LARGEST_FRAME // 4
 
-    def __init__(self, own: CompiledRobot, task: Task, protocol: type[Protocol], context: RobotContext) -> None:
+    def __init__(self, own: CompiledRobot, task: SearchTask, protocol: type[Protocol], context: RobotContext) -> None:
         super().__init__(task.epoch, observed=context.observed)
         self._own = own
         self._robot = own.robot
@@ -319,7 +319,7 @@ class Searcher(RobotLoop):
         self._snapshot_values.note(order.number, values)
         findings = NO_FINDINGS if private else self._findings(host.protocol)
         lost = 0 if host.dropper is None else host.dropper.count
-        self._send_to_master(Snapshot(self.epoch, order.number, values, lost, findings))
+        self._send_to_master(RobotSnapshot(self.epoch, order.number, values, lost, findings))
 
     def adopt(self, number: int, *, published: bool) -> None:
         """Keep the values of a snapshot; see `SnapshotValues.adopt`. Raises `FrameRefusedError`."""

@@ -17,15 +17,15 @@ from typing import assert_never
 
 from robochoc.communication.control import (
     Begin,
-    Change,
+    EpochChange,
     EpochMessage,
     Events,
-    Failed,
     FromParent,
     FromRobot,
     OpenQueues,
     Pause,
     Ready,
+    RobotFailed,
     pack_change,
 )
 from robochoc.communication.host import message_decoder
@@ -148,7 +148,7 @@ class ProcessesRun(Session, MasterLoop):
             elif robot.ended:  # after its report, so the previous epoch was not affected
                 self._lose(name, robot.describe_end())
             else:
-                self._send(robot, Change(self.state.epoch, pack_change(part, epoch.invalidated), left))
+                self._send(robot, EpochChange(self.state.epoch, pack_change(part, epoch.invalidated), left))
 
     def _new_state(self, epoch: int, order: Sequence[str]) -> SearchState:
         """Return the state of a new search."""
@@ -270,7 +270,7 @@ class ProcessesRun(Session, MasterLoop):
             case Events(events):
                 for event in events if robot.name not in self._behind else ():
                     self._observe(event)
-            case Failed(why, unsupported, elsewhere):
+            case RobotFailed(why, unsupported, elsewhere):
                 refusal = TooLargeError if elsewhere else UnsupportedError
                 raise refusal(why) if unsupported else RobotsLostError({robot.name: why})
             case never:

@@ -15,7 +15,9 @@ from typing import assert_never
 from robochoc.communication.control import (
     QUEUES_AT_ONCE,
     Begin,
-    Change,
+    CounterWave,
+    EpochChange,
+    EpochReport,
     FromParent,
     FromRobot,
     GoOn,
@@ -23,9 +25,7 @@ from robochoc.communication.control import (
     Pause,
     QueueFrom,
     QueuesTo,
-    Report,
     TakeSnapshot,
-    Wave,
     unpack_change,
 )
 from robochoc.communication.host import Host
@@ -160,7 +160,7 @@ class QueueRobot(RobotLoop):
                     self._flush(self._writers[robot])
             case QueueFrom(robot):
                 self._open_reader(robot, QueueReader(self._link.take_fd()))
-            case Wave(number):
+            case CounterWave(number):
                 self.report_counters(number)
             case TakeSnapshot(number):
                 self.report_snapshot(number)
@@ -168,7 +168,7 @@ class QueueRobot(RobotLoop):
                 self.go_on()
             case Pause():
                 self.pause()
-            case Change():
+            case EpochChange():
                 self._change(order)
             case never:
                 assert_never(never)
@@ -179,9 +179,9 @@ class QueueRobot(RobotLoop):
             metrics = self._host.metrics()
             if self._measured:
                 metrics = replace(metrics, memory=own_memory())
-            self._send_to_master(Report(self.epoch, assignment, metrics, findings))
+            self._send_to_master(EpochReport(self.epoch, assignment, metrics, findings))
 
-    def _change(self, order: Change) -> None:
+    def _change(self, order: EpochChange) -> None:
         """Enter the next epoch, with a changed problem and no message in transit."""
         part, invalidated = unpack_change(order.change)
         for name in order.gone:

@@ -17,7 +17,7 @@ from contextlib import suppress
 from itertools import islice
 from typing import NamedTuple
 
-from robochoc.communication.control import Failed
+from robochoc.communication.control import RobotFailed
 from robochoc.communication.host import Host
 from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queue_robot import QueueRobot
@@ -98,10 +98,10 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
         observed, bounds = start.observed, start.bounds
         QueueRobot(host, link, start.epoch, observed=observed, bounds=bounds, measured=measured, parent=parent).run()
     except UnsupportedError as refusal:
-        link.send(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
+        link.send(RobotFailed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
     except Exception as error:  # noqa: BLE001 - the parent has to know of any error
         where = traceback.extract_tb(error.__traceback__)[-1]
-        link.send(Failed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
+        link.send(RobotFailed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
     link.finish()
 
 

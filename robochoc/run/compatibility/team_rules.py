@@ -35,7 +35,7 @@ class UnfitProtocolError(TransferableError, UnsupportedError):
 
 
 @dataclass(frozen=True)
-class Case:
+class RunCase:
     """A team, the options, and the traits of the protocol."""
 
     team: Team
@@ -90,7 +90,7 @@ class TeamRule(NamedTuple):
     one could do it; with `complete`, one that proves its answers.
     """
 
-    refuses: Callable[[Case], object]
+    refuses: Callable[[RunCase], object]
     why: str
     instead: str = ""
     other_protocol: bool = False
@@ -172,7 +172,7 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
     Raises:
         UnfitProtocolError: where another protocol could do it.
     """
-    case = Case(team, options, traits)
+    case = RunCase(team, options, traits)
     for rule in TEAM_RULES:
         if rule.refuses(case):
             why = rule.why.format(team=team.name, protocol=options.protocol, case=case)
@@ -183,7 +183,7 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
             _refuse_constraints(epoch, name, able)
 
 
-def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
+def _takers(case: RunCase) -> Iterator[tuple[str, Traits]]:
     """Yield all protocols that must support the constraints: the protocol, and those that take over from it."""
     options, traits = case.options, case.traits
     taken_over = case.minimum_withdrawal and not traits.costs

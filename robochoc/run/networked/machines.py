@@ -26,11 +26,11 @@ from robochoc.run.evaluation import PhaseAnswer, Search, is_proven
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from robochoc.verification.checker import RefutedError
 
 
-class Snapshot(NamedTuple):
+class TeamSnapshot(NamedTuple):
     """A snapshot by its `number`: the `values` of all variables, and those by the robots' names."""
 
     number: int
@@ -38,7 +38,7 @@ class Snapshot(NamedTuple):
     assignments: Mapping[str, dict[str, int]]
 
 
-NO_SNAPSHOT = Snapshot(0, {}, {})
+NO_SNAPSHOT = TeamSnapshot(0, {}, {})
 _NAMED = 5
 """No more robots than these are named in a message."""
 
@@ -116,7 +116,7 @@ class Machines(Deployment):
             self._begin_time()
             self._improvements = None
 
-    def search(self, phase: Phase) -> Search:
+    def search(self, phase: RunPhase) -> Search:
         """See `Deployment.search`. Raises `RefutedError` when robots contradict each other."""
         if self._observer:
             self._observer(Began(t=0, protocol=phase.name, minimises=True if phase.traits.costs else UNSET))
@@ -131,7 +131,7 @@ class Machines(Deployment):
 
     # Answers while the robots search
 
-    def _watch(self, phase: Phase) -> Improvements:
+    def _watch(self, phase: RunPhase) -> Improvements:
         """Return the object that stores the best answer of a search, and publishes it from the deadline on."""
         team = registered_team(self._master, self._name)
         options, audience = self.options, self._audience
@@ -161,7 +161,7 @@ class Machines(Deployment):
             keep=keep,
         )
 
-    def _check_snapshot(self, phase: Phase, snapshot: SearchResult) -> Answer | None:
+    def _check_snapshot(self, phase: RunPhase, snapshot: SearchResult) -> Answer | None:
         """Return the robots' assignment at a snapshot, which all of them have checked; None if a check fails.
 
         Raises:
@@ -176,7 +176,7 @@ class Machines(Deployment):
         if (without and not phase.withdrawal) or not all(check.allowed for check in found.checks.values()):
             return None
         values = merged_values(snapshot.assignments)
-        self._snapshot = Snapshot(found.number, values, snapshot.assignments)
+        self._snapshot = TeamSnapshot(found.number, values, snapshot.assignments)
         cost = sum(check.cost for check in found.checks.values())
         return Answer(
             Verdict.UNKNOWN,
@@ -193,7 +193,7 @@ class Machines(Deployment):
         number = self._kept.number if answer.assignment is self._kept.values else 0
         self._master.adopt(number, f"{answer.verdict}{withdrawn}")
 
-    def concluded(self, phase: Phase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
+    def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
         """See `Deployment.concluded`. The best that robots have checked may be what they had at a snapshot."""
         improvements = self._improvements
         if improvements is None:
@@ -215,7 +215,7 @@ class Machines(Deployment):
             robots.append(replace(robot, variables=(*robot.variables, *shown)))
         return Team(self._name, (*robots, *self._gone))
 
-    def _check(self, phase: Phase, result: SearchResult) -> Answer | None:
+    def _check(self, phase: RunPhase, result: SearchResult) -> Answer | None:
         """Return the values that robots have reported, once every robot has checked its own constraints.
 
         Raises:

@@ -8,7 +8,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.quiescence import Counts, FourCounters
+from robochoc.communication.quiescence import FourCounters, MessageCounts
 from tests.support.examples import examples
 
 ROBOTS = ("A", "B", "C", "D")
@@ -20,10 +20,10 @@ class Network:
     def __init__(self, chance: Random, budget: int) -> None:
         self.chance = chance
         self.budget = budget
-        self.counts = dict.fromkeys(ROBOTS, Counts(0, 0))
+        self.counts = dict.fromkeys(ROBOTS, MessageCounts(0, 0))
         self.flying: list[str] = []
         self.orders: dict[str, deque[int]] = {name: deque() for name in ROBOTS}
-        self.answers: dict[str, deque[tuple[int, Counts]]] = {name: deque() for name in ROBOTS}
+        self.answers: dict[str, deque[tuple[int, MessageCounts]]] = {name: deque() for name in ROBOTS}
         for name in ROBOTS:
             self.speak(name, chance.randint(0, 2))
 
@@ -69,25 +69,25 @@ def test_quiet_is_declared_when_it_is_true_and_only_then(seed: int, budget: int)
 
 def test_nobody_is_quiet_before_all_have_been_heard() -> None:
     counters = FourCounters(("A", "B"))
-    counters.update("A", Counts(0, 0))
+    counters.update("A", MessageCounts(0, 0))
     assert not counters.due
 
 
 def test_the_silent_are_those_of_whom_nothing_is_known_then_those_that_owe_an_answer() -> None:
     counters = FourCounters(("B", "A", "C"))
-    counters.update("B", Counts(2, 1))
-    assert (counters.silent, counters.latest("A"), counters.latest("B")) == (("A", "C"), None, Counts(2, 1))
+    counters.update("B", MessageCounts(2, 1))
+    assert (counters.silent, counters.latest("A"), counters.latest("B")) == (("A", "C"), None, MessageCounts(2, 1))
     assert (counters.total, counters.sent) == (None, 2)
-    counters.update("A", Counts(0, 1))
-    counters.update("C", Counts(1, 1))
+    counters.update("A", MessageCounts(0, 1))
+    counters.update("C", MessageCounts(1, 1))
     assert (counters.silent, counters.is_wave_open) == ((), False)
-    assert (counters.total, counters.sent) == (Counts(3, 3), 3)
+    assert (counters.total, counters.sent) == (MessageCounts(3, 3), 3)
     wave = counters.start_wave()
-    counters.answer("A", wave, Counts(0, 1))
+    counters.answer("A", wave, MessageCounts(0, 1))
     assert (counters.silent, counters.is_wave_open) == (("B", "C"), True)
 
 
-def waved(counters: FourCounters, a: Counts, b: Counts) -> int:
+def waved(counters: FourCounters, a: MessageCounts, b: MessageCounts) -> int:
     """Ask A and B, who have counted this; return the number of the wave."""
     wave = counters.start_wave()
     counters.answer("A", wave, a)
@@ -95,7 +95,7 @@ def waved(counters: FourCounters, a: Counts, b: Counts) -> int:
     return wave
 
 
-def heard(a: Counts, b: Counts) -> FourCounters:
+def heard(a: MessageCounts, b: MessageCounts) -> FourCounters:
     """Return the counters once A and B have reported this by themselves."""
     counters = FourCounters(("A", "B"))
     counters.update("A", a)
@@ -104,37 +104,37 @@ def heard(a: Counts, b: Counts) -> FourCounters:
 
 
 def test_an_answer_to_an_older_wave_is_counted_and_ends_nothing() -> None:
-    counters = heard(Counts(1, 1), Counts(1, 1))
-    older = waved(counters, Counts(2, 1), Counts(2, 1))
+    counters = heard(MessageCounts(1, 1), MessageCounts(1, 1))
+    older = waved(counters, MessageCounts(2, 1), MessageCounts(2, 1))
     assert not counters.quiescent
-    counters.update("A", Counts(2, 2))
-    counters.update("B", Counts(2, 2))
+    counters.update("A", MessageCounts(2, 2))
+    counters.update("B", MessageCounts(2, 2))
     newer = counters.start_wave()
     assert newer == older + 1
-    counters.answer("A", newer, Counts(2, 2))
-    counters.answer("B", older, Counts(2, 2))
+    counters.answer("A", newer, MessageCounts(2, 2))
+    counters.answer("B", older, MessageCounts(2, 2))
     assert (counters.quiescent, counters.silent) == (False, ("B",))
-    counters.answer("B", newer, Counts(2, 2))
+    counters.answer("B", newer, MessageCounts(2, 2))
     assert counters.quiescent
 
 
 def test_a_wave_that_finds_the_same_is_not_enough_while_messages_are_under_way() -> None:
-    counters = heard(Counts(1, 0), Counts(0, 0))
-    waved(counters, Counts(1, 0), Counts(0, 0))  # as the count is wanted
+    counters = heard(MessageCounts(1, 0), MessageCounts(0, 0))
+    waved(counters, MessageCounts(1, 0), MessageCounts(0, 0))  # as the count is wanted
     assert not counters.quiescent
 
 
 def test_a_wave_begun_before_all_were_heard_has_nothing_to_be_compared_with() -> None:
     counters = FourCounters(("A", "B"))
-    waved(counters, Counts(0, 0), Counts(0, 0))
+    waved(counters, MessageCounts(0, 0), MessageCounts(0, 0))
     assert not counters.quiescent
     assert counters.due
-    waved(counters, Counts(0, 0), Counts(0, 0))
+    waved(counters, MessageCounts(0, 0), MessageCounts(0, 0))
     assert counters.quiescent
 
 
 def test_one_balanced_wave_is_not_enough() -> None:
-    counters = heard(Counts(1, 0), Counts(0, 1))
-    waved(counters, Counts(1, 0), Counts(1, 1))  # B has spoken since
+    counters = heard(MessageCounts(1, 0), MessageCounts(0, 1))
+    waved(counters, MessageCounts(1, 0), MessageCounts(1, 1))  # B has spoken since
     assert not counters.quiescent
     assert not counters.due

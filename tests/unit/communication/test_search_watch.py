@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.communication.control import Snapshot
+from robochoc.communication.control import RobotSnapshot
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.plausibility import Declarations
 from robochoc.communication.search_state import SearchState
@@ -14,8 +14,10 @@ from tests.support.cases import looped
 NAMES = ("A", "B")
 
 
-def has(value: int, number: int = 1, *, epoch: int = 0, lost: int = 0, findings: Findings = NO_FINDINGS) -> Snapshot:
-    return Snapshot(epoch, number, {f"x{value}": value}, lost, findings)
+def has(
+    value: int, number: int = 1, *, epoch: int = 0, lost: int = 0, findings: Findings = NO_FINDINGS
+) -> RobotSnapshot:
+    return RobotSnapshot(epoch, number, {f"x{value}": value}, lost, findings)
 
 
 def test_a_snapshot_is_what_all_robots_have_answered() -> None:
@@ -51,13 +53,13 @@ def test_what_was_not_asked_for_is_a_fault_and_of_another_epoch_it_is_nothing() 
     ("said", "fault"),
     [
         (has(9), "it has reported values that it cannot have"),
-        (Snapshot(0, 1, {"x1": 1, "x2": 2}, 0, NO_FINDINGS), "it has reported a value of x2, which is B's"),
+        (RobotSnapshot(0, 1, {"x1": 1, "x2": 2}, 0, NO_FINDINGS), "it has reported a value of x2, which is B's"),
         (has(1, lost=-1), "it has reported counts that cannot be"),
         (has(1, findings=Findings(bound=-1)), "it has reported impossible costs"),
         (has(1, findings=Findings(best=Incumbent(1, {"C": (1,)}))), "it has reported a robot that is not in the team"),
     ],
 )
-def test_what_a_robot_across_machines_cannot_have_is_refused(said: Snapshot, fault: str) -> None:
+def test_what_a_robot_across_machines_cannot_have_is_refused(said: RobotSnapshot, fault: str) -> None:
     shown = {name: {variable: Domain(variable, (range(1, 3),))} for name, variable in (("A", "x1"), ("B", "x2"))}
     state = AuditedSearchState(0, NAMES, None, Declarations(shown=shown))
     state.start_snapshot()

@@ -18,7 +18,7 @@ from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Withdrawal
 from robochoc.run.distributed import Deployment, solve_distributed
 from robochoc.run.evaluation import PhaseAnswer, Search
-from robochoc.run.phases import Phase
+from robochoc.run.phases import RunPhase
 from tests.support.random_outcomes import drawn
 
 HEADER = Outcome(Verdict.UNKNOWN, team="team", protocol="abt", runtime="simulator", seed=0)
@@ -39,7 +39,7 @@ class MadeUp(Deployment):
         robots: str = "ABC",
     ) -> None:
         self.options = options
-        self.phases: list[Phase] = []
+        self.phases: list[RunPhase] = []
         self._results = list(results)
         self._found = found
         self._robots = set(robots)
@@ -66,7 +66,7 @@ class MadeUp(Deployment):
     def left_s(self) -> float | None:
         return None
 
-    def search(self, phase: Phase) -> Search:
+    def search(self, phase: RunPhase) -> Search:
         self.phases.append(phase)
         return Search(self._results.pop(0), lambda: self._found)
 

@@ -29,7 +29,7 @@ from robochoc.solver import ace as front
 from robochoc.solver import central, propagation
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import Strategy
-from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Network, Table
+from robochoc.solver.encoding import MAX_ALLOWED_ROWS, CodeTable, Network
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
 from tests.support.complex_problems import complex_team
 from tests.support.faults import open_descriptors
@@ -41,13 +41,13 @@ from tests.support.solver_networks import SMALL_NETWORK, brute_force, queens_net
 STRATEGIES: tuple[Strategy, Strategy] = ("default", "static")
 TABLES_AT_MOST = (MAX_ALLOWED_ROWS, 5)
 """With the second, most tables of forbidden tuples stay what they are."""
-_FORBIDDEN = Table((0, 1), allowed=False, rows=((0, 3), (0, 4), (3, 1), (5, 1)))
-MISCOUNTED = Network(((0, 3, 5), (1, 3, 4), (2,)), (_FORBIDDEN, Table((0, 2), allowed=False, rows=((0, 2),))))
-EMPTIED = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 5),)),))
+_FORBIDDEN = CodeTable((0, 1), allowed=False, rows=((0, 3), (0, 4), (3, 1), (5, 1)))
+MISCOUNTED = Network(((0, 3, 5), (1, 3, 4), (2,)), (_FORBIDDEN, CodeTable((0, 2), allowed=False, rows=((0, 2),))))
+EMPTIED = Network(((0, 1), (0, 1)), (CodeTable((0, 1), allowed=True, rows=((0, 5),)),))
 IMPOSSIBLE = (
     Network(((0, 1), ())),
     EMPTIED,
-    Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=()),)),
+    Network(((0, 1), (0, 1)), (CodeTable((0, 1), allowed=True, rows=()),)),
     Network(((0,), (0,)), different=((0, 1),)),
 )
 HARD_MODEL_BYTES = 5_000
@@ -203,7 +203,7 @@ def test_solutions_can_be_counted_only(ace: AceProcess) -> None:
 
 def test_variables_that_no_table_looks_at_take_every_value_in_their_places(ace: AceProcess) -> None:
     network = Network(
-        ((7, 8), (0, 1), (4,), (0, 1), (2, 5, 6)), (Table((1, 3), allowed=True, rows=((0, 0), (0, 1), (1, 0))),)
+        ((7, 8), (0, 1), (4,), (0, 1), (2, 5, 6)), (CodeTable((1, 3), allowed=True, rows=((0, 0), (0, 1), (1, 0))),)
     )
     answer = ace.solve(network)
     assert (answer.found, answer.complete) == (18, True)
@@ -224,7 +224,7 @@ def test_what_is_plainly_impossible_needs_no_process(*, count_only: bool) -> Non
 
 
 def test_what_is_plain_needs_no_process() -> None:
-    network = Network(((0, 1), (3,), (0, 2)), (Table((0, 1), allowed=True, rows=((1, 3),)),))
+    network = Network(((0, 1), (3,), (0, 2)), (CodeTable((0, 1), allowed=True, rows=((1, 3),)),))
     with AceProcess(always=True) as solver:
         assert not solver.submit(network)
         assert solver.answer().solutions == ((1, 3, 0), (1, 3, 2))

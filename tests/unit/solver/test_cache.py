@@ -21,7 +21,7 @@ from robochoc.solver import cache as cache_module
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compilation, CompiledFrom, Compiler
-from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Network
 from tests.support.cases import looped
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT, robochoc_within
@@ -30,8 +30,8 @@ from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
 OTHERS = (
     Network(((0, 1), (0, 1))),
     Network(((0, 1), (0, 2)), SMALL_NETWORK.tables),
-    Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 0),)),)),
-    Network(((0, 1), (0, 1)), (Table((0, 1), allowed=False, rows=((0, 1),)),)),
+    Network(((0, 1), (0, 1)), (CodeTable((0, 1), allowed=True, rows=((0, 0),)),)),
+    Network(((0, 1), (0, 1)), (CodeTable((0, 1), allowed=False, rows=((0, 1),)),)),
     Network(((0, 1), (0, 1)), SMALL_NETWORK.tables, different=((0, 1),)),
 )
 WRITER = """

@@ -21,7 +21,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import AceSolutions
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.cliques import cliques, with_cliques
-from robochoc.solver.encoding import Codes, Component, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Component, Network
 from robochoc.solver.errors import SolverLostError
 from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetries
 from robochoc.solver.team_network import identifiers
@@ -48,7 +48,7 @@ def random_network(chance: Random, names: Sequence[str], images: Sequence[Symmet
                 turned = moved if scope == tuple(sorted(scope)) else {(b, a) for a, b in moved}
                 kept = wanted.setdefault(tuple(sorted(scope)), set(itertools.product(codes, codes)))
                 kept &= turned
-    tables = (Table(scope, allowed=True, rows=tuple(sorted(rows))) for scope, rows in wanted.items())
+    tables = (CodeTable(scope, allowed=True, rows=tuple(sorted(rows))) for scope, rows in wanted.items())
     return Network(tuple(codes for _ in names), tuple(tables))
 
 
@@ -91,7 +91,7 @@ def test_symmetries_are_found_and_broken_without_losing_an_orbit(batch: int) -> 
 
 
 def test_a_wrong_guess_is_no_symmetry() -> None:
-    network = Network(((0, 1), (0, 1)), (Table((0, 1), allowed=True, rows=((0, 1), (1, 1))),))
+    network = Network(((0, 1), (0, 1)), (CodeTable((0, 1), allowed=True, rows=((0, 1), (1, 1))),))
     assert symmetries(Component(("V1", "V2"), (0, 1), network)) == ()
 
 
@@ -116,7 +116,7 @@ def test_cliques_made_explicit_keep_the_solutions() -> None:
                 rows = [row for row in itertools.product(domain, domain) if row[0] != row[1] or kind > 0.7]
                 if kind > 0.4:
                     rows = [row for row in rows if chance.random() < 0.8]
-                tables.append(Table(scope, allowed=True, rows=tuple(rows)))
+                tables.append(CodeTable(scope, allowed=True, rows=tuple(rows)))
         network = Network(tuple(domain for _ in range(size)), tuple(tables))
         every = set(brute_force(network))
         assert set(brute_force(with_cliques(network, lambda _: None))) == every

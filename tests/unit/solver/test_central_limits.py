@@ -23,7 +23,7 @@ from robochoc.solver import central
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import BEST
 from robochoc.solver.central import CentralAnswer, CentralSolver
-from robochoc.solver.encoding import Network, Table
+from robochoc.solver.encoding import CodeTable, Network
 from robochoc.solver.errors import SolverTimeoutError
 from robochoc.solver.weighted import weighted_components
 from robochoc.verification.checker import assignment_cost, robots_without_values, violations
@@ -133,7 +133,7 @@ def test_a_step_of_a_robot_without_an_end_ends_with_the_time(step: str, monkeypa
 
 
 def test_the_choice_of_a_protocol_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.run.orchestrator.decided", endless)
+    monkeypatch.setattr("robochoc.run.orchestrator.choose", endless)
     outcome = solve(small(), Options(protocol="auto", runtime=Runtime.SIMULATOR, timeout=SOON_S))
     assert (outcome.verdict, outcome.protocol) == (Verdict.UNKNOWN, "sfb")
     assert outcome.chosen == {"protocol": "there was no time to analyse the team"}
@@ -164,7 +164,7 @@ def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -
 
 def test_what_was_found_for_another_task_is_not_told(warm: AceProcess) -> None:
     rows = tuple((a, b, (a + b) % 3) for a in range(3) for b in range(3))
-    network = Network(((0, 1, 2), (0, 1, 2), (0, 1, 2)), (Table((0, 1, 2), allowed=True, rows=rows),))
+    network = Network(((0, 1, 2), (0, 1, 2), (0, 1, 2)), (CodeTable((0, 1, 2), allowed=True, rows=rows),))
     assert warm.submit(network, costs=((2, 1),))
     assert warm.answer().solutions[0] in rows
     (part,) = weighted_components(hard().variables.values(), list(hard().constraints()))

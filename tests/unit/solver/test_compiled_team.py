@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.network.members import Members
+from robochoc.communication.network.members import TeamMembers
 from robochoc.communication.network.profile import profile_of, ranges_of, restrict_to_team
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
@@ -147,9 +147,9 @@ def test_what_is_heard_in_words_that_cannot_be_is_passed_over() -> None:
 # Machines
 
 
-def all_shown(team: Team) -> Members:
+def all_shown(team: Team) -> TeamMembers:
     """All of `team`, registered, and asked for what they had not shown."""
-    members = Members(team.order)
+    members = TeamMembers(team.order)
     for robot in team.robots:
         members.register(robot.name, profile_of(robot), "visit")
     for name, variables in members.unseen().items():
@@ -189,7 +189,7 @@ def test_who_is_left_shows_what_it_showed_and_keeps_its_place() -> None:
 def test_an_order_does_not_change_when_somebody_is_lost() -> None:
     """Without Z, the parent of A, natural order would have A before B."""
     robots = (Robot("B", ()), Robot("Z", (), children=(Child("A"),)), Robot("A", (), parents=(Parent("Z"),)))
-    members = Members(["A", "B", "Z"])
+    members = TeamMembers(["A", "B", "Z"])
     for robot in robots:
         members.register(robot.name, profile_of(robot), "visit")
     members.closed = True

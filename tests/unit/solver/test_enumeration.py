@@ -19,9 +19,9 @@ from robochoc.solver import ace as front
 from robochoc.solver.ace import AceProcess, SolvedBy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import CentralSolver
-from robochoc.solver.compile import CompiledFrom, Compiler, Limits
+from robochoc.solver.compile import CompiledFrom, CompileLimits, Compiler
 from robochoc.solver.compiled_domain import TooManySolutionsError
-from robochoc.solver.encoding import Costs, Network, Table
+from robochoc.solver.encoding import CodeTable, Costs, Network
 from robochoc.solver.enumeration import (
     STEPS_BEFORE_ACE,
     STEPS_EACH,
@@ -229,7 +229,7 @@ def test_what_all_tasks_may_take_together_is_used_up(monkeypatch: pytest.MonkeyP
 def test_wide_domains_take_steps_before_they_take_memory(width: int) -> None:
     """The bits of 60,000 values, and of the rows that have them, would be more than a gigabyte."""
     domain = tuple(range(width))
-    equal = Table((0, 1), allowed=True, rows=tuple((code, code) for code in domain))
+    equal = CodeTable((0, 1), allowed=True, rows=tuple((code, code) for code in domain))
     network = Network((domain, domain), (equal,))
     tracemalloc.start()
     try:
@@ -249,7 +249,7 @@ def test_two_variables_of_five_values_take_no_time_limit_and_no_cache(tmp_path: 
     cache = SolutionCache(tmp_path / "cache")
     team = pair_of_five()
     for _ in range(2):
-        with Compiler(Limits(time_s=1e-9), cache) as compiler:
+        with Compiler(CompileLimits(time_s=1e-9), cache) as compiler:
             compilation = compiler.compile(team.robots[0])
         assert (compilation.source, compilation.domain.total) == (CompiledFrom.ENUMERATED, 10)
     assert not list(cache.files())
@@ -258,9 +258,9 @@ def test_two_variables_of_five_values_take_no_time_limit_and_no_cache(tmp_path: 
 @pytest.mark.usefixtures("no_process")
 def test_local_solutions_are_limited_as_by_ace() -> None:
     robot = pair_of_five("ne").robots[0]
-    with Compiler(Limits(solutions=20)) as compiler:
+    with Compiler(CompileLimits(solutions=20)) as compiler:
         assert compiler.compile(robot).domain.total == 20
-    with Compiler(Limits(solutions=19)) as compiler, pytest.raises(TooManySolutionsError, match="more than 19"):
+    with Compiler(CompileLimits(solutions=19)) as compiler, pytest.raises(TooManySolutionsError, match="more than 19"):
         compiler.compile(robot)
 
 

@@ -14,7 +14,7 @@ from robochoc.model.problem import INFINITE, Team
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.encoding import cost_function
 from robochoc.solver.errors import UnsupportedError
-from robochoc.solver.exclusions import Evaluations, Task, allocation_fault, tasks_of
+from robochoc.solver.exclusions import Evaluations, SharedTask, allocation_fault, tasks_of
 from tests.support.allocation_problems import random_allocation, random_congestion
 from tests.support.examples import count
 from tests.support.problems import team_of
@@ -36,7 +36,7 @@ def soft(*scope: str, rows: Mapping[tuple[int, int], int]) -> Constraint:
     return Constraint("s", relation, scope, scope)
 
 
-def tasks_in(team: Team, robot: str, *, congestion: bool = False) -> tuple[Task, ...]:
+def tasks_in(team: Team, robot: str, *, congestion: bool = False) -> tuple[SharedTask, ...]:
     return tasks_of(agent_problems(team, shared_scopes=True)[robot], congestion=congestion)[1]
 
 
@@ -46,16 +46,16 @@ ALLOCATION = team_of(THREE, [not_the_same("A", "B"), not_the_same("A", "C"), not
 
 def test_a_task_has_the_own_choices_and_those_of_all_others_that_exclude_them_in_priority_order() -> None:
     assert tasks_in(ALLOCATION, "RA") == (
-        Task(((0, 1),), {"RB": frozenset({(0, 1)})}),
-        Task(((0, 2),), {"RB": frozenset({(0, 2)}), "RC": frozenset({(0, 2)})}),
+        SharedTask(((0, 1),), {"RB": frozenset({(0, 1)})}),
+        SharedTask(((0, 2),), {"RB": frozenset({(0, 2)}), "RC": frozenset({(0, 2)})}),
     )
     assert [list(task.others) for task in tasks_in(ALLOCATION, "RC")] == [["RA", "RB"]]
 
 
 def test_two_values_that_exclude_the_same_are_two_ways_to_do_one_task() -> None:
     team = team_of({"A": (0, 1, 2), "B": (0, 7)}, [conflicts("A", "B", rows=[(1, 7), (2, 7)])])
-    assert tasks_in(team, "RA") == (Task(((0, 1), (0, 2)), {"RB": frozenset({(0, 7)})}),)
-    assert tasks_in(team, "RB") == (Task(((0, 7),), {"RA": frozenset({(0, 1), (0, 2)})}),)
+    assert tasks_in(team, "RA") == (SharedTask(((0, 1), (0, 2)), {"RB": frozenset({(0, 7)})}),)
+    assert tasks_in(team, "RB") == (SharedTask(((0, 7),), {"RA": frozenset({(0, 1), (0, 2)})}),)
 
 
 def test_a_robot_that_shares_nothing_has_no_task() -> None:
@@ -163,7 +163,7 @@ def test_tasks_are_what_brute_force_finds(runs: int) -> None:
     assert found > runs
 
 
-def others_of(team: Team, robot: str, task: Task) -> dict[str, frozenset[tuple[int, int]]]:
+def others_of(team: Team, robot: str, task: SharedTask) -> dict[str, frozenset[tuple[int, int]]]:
     """Return which choices of other robots cost something together with the first own choice of `task`."""
     shown = {one.name: one.interface for one in team.robots}
     place, value = task.own[0]

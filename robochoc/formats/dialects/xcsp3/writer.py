@@ -11,7 +11,7 @@ from lxml import etree
 from robochoc.model.costs import flat_units, normalized
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.encoding import Codes, Network, Table
+from robochoc.solver.encoding import Codes, CodeTable, Network
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.team_network import identifiers, team_network
 from robochoc.solver.weighted import MAX_CODE
@@ -74,6 +74,6 @@ def _as_told(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes
     ]
     if constant:
         costs = (*costs, len(domains))
-        tables.append(Table((len(domains),), allowed=True, rows=((constant,),)))
+        tables.append(CodeTable((len(domains),), allowed=True, rows=((constant,),)))
         domains.append((constant,))
     return replace(network, domains=tuple(domains), tables=tuple(tables)), costs
