@@ -205,7 +205,7 @@ def test_epochs_of_an_imported_scenario_have_original_names(tmp_path: Path) -> N
     for wrong, message in ((team, "is the folder of a team, and"), (tmp_path / "none.yaml", "none.yaml")):
         with pytest.raises(InvalidInputError, match=message):
             load(wrong, files[1])
-    assert "name it with the file of the variables" in robochoc_within("solve", files[1]).stderr
+    assert "import it together with the problem" in robochoc_within("solve", files[1]).stderr
 
 
 def test_a_file_that_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
@@ -217,7 +217,7 @@ def test_a_file_that_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
                 (PYDCOP.replace("pairs", "p\xe4rs").encode("latin-1"), "{file}: is not UTF-8 (save it in UTF-8)"),
                 (
                     PYDCOP.replace("min", "Minimise").encode(),
-                    "{file}:2: has the objective 'Minimise' (write objective: min)",
+                    "{file}:2: has the unknown objective 'Minimise' (write objective: min)",
                 ),
                 (b"print()\n", "{file}: has an unknown format ("),
             ]:

@@ -40,7 +40,7 @@ def test_a_file_becomes_a_team(tmp_path: Path) -> None:
 
 def test_mistakes_and_a_reader_out_of_time_leave_no_team(tmp_path: Path) -> None:
     store, found = opened(PROBLEM.replace("x * y", "x * z"), tmp_path)
-    assert "'z', which is no variable" in found.mistakes
+    assert "'z', which is not a variable" in found.mistakes
     _, late = opened(PROBLEM, tmp_path, within_s=0.0)
     assert "t.yaml could not be read within 0 s" in late.mistakes
     assert list(store.folder.iterdir()) == []

@@ -1,4 +1,4 @@
-"""Constraints of pyDCOP's files: functions and tables, as costs of tuples, predicates or functions of ours."""
+"""Read the constraints of pyDCOP's files: functions and tables, as costs of tuples, predicates or cost functions."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from robochoc.model.expression import Expression
 from robochoc.model.expression.bounds import Interval, bounds
 
 MAX_CELLS = 5_000_000
-"""The maximum number of tuples of all tables that functions make."""
+"""The maximum number of tuples of all tables made from functions."""
 
 
 @dataclass(frozen=True)
 class ParsedConstraint:
-    """The costs of a constraint of the file.
+    """A constraint of the file.
 
     Attributes:
         name: Its name.
         scope: Its variables.
-        what: Its costs: a table, a predicate, or an expression over X0, X1, ...
-        line: Where it stands.
+        costs: Its costs: a table, a predicate, or an expression over X0, X1, ...
+        line: Its line in the file.
     """
 
     name: str
     scope: tuple[str, ...]
-    what: ExactCostTable | ViolationCost | Expression
+    costs: ExactCostTable | ViolationCost | Expression
     line: int
 
 
@@ -49,10 +49,10 @@ class ConstraintReader:
     Attributes:
         values: The values of each variable.
         fixed: The values of external variables.
-        infinity: Costs of at least so much forbid.
+        infinity: Costs of at least this are infinite. None: no finite cost is.
         maximize: Whether costs are maximised.
-        folder: Where Python files stand. None: they may not be executed.
-        incomplete: The constraints whose tables leave tuples out.
+        folder: The folder of Python files. None: these may not be executed.
+        incomplete: The constraints whose tables lack tuples and a default.
     """
 
     values: Mapping[str, DomainValues]
@@ -67,7 +67,7 @@ class ConstraintReader:
     def read(self, name: str, node: Node) -> ParsedConstraint:
         """Return the constraint in `node`. Raises `MistakeError`."""
         if not node.is_mapping:
-            raise MistakeError("is no mapping", "write type: and function:, or variables: and values:")
+            raise MistakeError("is not a mapping", "write type: and function:, or variables: and values:")
         kind = node.get("type")
         match kind.scalar if kind else None:
             case "intention":
@@ -77,12 +77,13 @@ class ConstraintReader:
             case None:
                 raise MistakeError("has no type", "write type: intention, or type: extensional")
             case other:
-                raise MistakeError(f"is of the type '{shortened(str(other))}'", "intention and extensional are known")
+                what = f"has the unknown type '{shortened(str(other))}'"
+                raise MistakeError(what, "write type: intention, or type: extensional")
 
     def function(
         self, name: str, node: Node, variables: Collection[str], sources: Node | None = None
     ) -> ParsedConstraint:
-        """Return the costs that the function in `node` says for some of `variables`."""
+        """Return the constraint with the function in `node` over some of `variables`."""
         if isinstance(node.scalar, (bool, int, Fraction, float)):
             return ParsedConstraint(name, (), ExactCostTable(name, {}, self._amount(node.scalar), 1), node.line)
         if not isinstance(node.scalar, str):
@@ -104,15 +105,15 @@ class ConstraintReader:
         if node is None:
             return {}
         if self.folder is None:
-            what = f"would execute the Python file '{shortened(str(node.scalar))}'"
-            raise MistakeError(what, "import it with --allow-code if you trust it", node.line)
+            what = f"requires the Python file '{shortened(str(node.scalar))}', which would be executed"
+            raise MistakeError(what, "use --allow-code if you trust this file", node.line)
         path = str(node.scalar)
         if path not in self._sources:
             self._sources[path] = load_functions(self.folder / path)
         return self._sources[path]
 
     def _is_bounded(self, simple: ViolationCost | Expression, scope: Sequence[str]) -> bool:
-        """Return whether no cost of an expression can reach the infinity."""
+        """Return whether all costs of an expression are below the infinity."""
         if isinstance(simple, ViolationCost) or self.infinity is None:
             return True
         limits = {}
@@ -126,10 +127,10 @@ class ConstraintReader:
         size = self._size(function.scope)
         self._cells += size
         if size > MAX_TUPLES or self._cells > MAX_CELLS:
-            what = f"has a function of {size} combinations of values"
+            what = f"has a function with {size} combinations of values, too many for a table"
             hint = (
-                f"tables have at most {MAX_TUPLES}, all together {MAX_CELLS}; functions of integers with + - * abs min"
-                " max, comparisons and conditions need none"
+                f"use at most {MAX_TUPLES} in a table and {MAX_CELLS} in all tables, or a function of integers with"
+                " + - * abs min max, comparisons and conditions, which requires no table"
             )
             raise MistakeError(what, hint)
         rows = {}
@@ -138,7 +139,7 @@ class ConstraintReader:
             arguments = {one: known[code] for one, known, code in zip(function.scope, scalars, codes, strict=True)}
             value = function.value(arguments)
             if not isinstance(value, (int, Fraction, float)):
-                raise MistakeError(f"has a function that gives {value!r:.40}", "costs are numbers")
+                raise MistakeError(f"has a function with the value {value!r:.40}", "write a function of numbers")
             rows[codes] = self._amount(value)
         if not function.scope:
             return ExactCostTable(name, {}, rows[()], 1)
@@ -153,7 +154,7 @@ class ConstraintReader:
         rows: dict[tuple[int, ...], Amount] = {}
         for cost, tuples in values.named():
             if not isinstance(cost, (int, Fraction, float)):
-                what = f"has the cost '{shortened(str(cost))}', which is no number"
+                what = f"has the cost '{shortened(str(cost))}', which is not a number"
                 raise MistakeError(what, "write COST: v w | v w", values.key_line(cost))
             amount = self._amount(cost)
             for codes in self._tuples(scope, tuples):
@@ -166,7 +167,7 @@ class ConstraintReader:
         elif isinstance(default.scalar, (int, Fraction, float)):
             amount = self._amount(default.scalar)
         else:
-            raise MistakeError("has a default that is no number", "write default: 100", default.line)
+            raise MistakeError("has a default that is not a number", "write default: 100", default.line)
         return ParsedConstraint(name, scope, ExactCostTable(name, rows, amount, self._size(scope)), line)
 
     def _scope(self, node: Node, line: int) -> tuple[str, ...]:
@@ -179,21 +180,21 @@ class ConstraintReader:
                 what = f"has the unknown variable '{shortened(one)}'"
                 raise MistakeError(what, suggestion(one, list(self.values), "variables"), line)
         if len(set(scope)) < len(scope):
-            raise MistakeError("has a variable twice in its scope", "name each once", line)
+            raise MistakeError("has a variable twice in its scope", "name each variable once", line)
         return scope
 
     def _tuples(self, scope: Sequence[str], node: Node) -> Iterator[tuple[int, ...]]:
         codes = [self.values[one].codes for one in scope]
         for place, words in _tuple_words(scope, node):
             if len(words) != len(scope):
-                what = f"has the tuple '{shortened(' '.join(words))}' of {len(words)} values instead of {len(scope)}"
+                what = f"has the tuple '{shortened(' '.join(words))}' with {len(words)} values instead of {len(scope)}"
                 raise MistakeError(what, "separate values by blanks, and tuples by '|'", place)
             try:
                 yield tuple([known[one] for known, one in zip(codes, words, strict=True)])
             except KeyError as error:
                 bad = str(error.args[0])
                 where = next(one for one, known, given in zip(scope, codes, words, strict=True) if given not in known)
-                what = f"has the value '{shortened(bad)}', which {shortened(where)} has not"
+                what = f"has the value '{shortened(bad)}', which is not in the domain of {shortened(where)}"
                 raise MistakeError(what, suggestion(bad, list(self.values[where].codes), "values"), place) from None
 
     def _amount(self, amount: Amount) -> Amount:
@@ -206,10 +207,10 @@ class ConstraintReader:
 
 
 def _tuple_words(scope: Sequence[str], node: Node) -> Iterator[tuple[int, list[str]]]:
-    """Yield the tuples that follow a cost, as words, and their lines."""
+    """Yield the words of the tuples of a cost, with their lines."""
     for one in node.items if node.items is not None else [node]:
         if not one.is_scalar:
-            raise MistakeError("has a list or a mapping where tuples should stand", "write v w | v w", one.line)
+            raise MistakeError("has a list or a mapping instead of tuples", "write v w | v w", one.line)
         if isinstance(one.scalar, str) and len(scope) == 1:
             yield from ((one.line, [part.strip()]) for part in one.scalar.split("|"))
         elif isinstance(one.scalar, str):
@@ -222,22 +223,23 @@ def load_functions(path: Path) -> dict[str, Callable[..., Value]]:
     """Execute the Python file at `path`, and return its functions.
 
     Raises:
-        MistakeError: if that fails.
+        MistakeError: if the execution fails.
     """
     spec = importlib.util.spec_from_file_location("source", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise MistakeError(f"the source {shortened(str(path))} is no Python file", "it stands beside the first file")
+        what = f"the source {shortened(str(path))} is not a Python file"
+        raise MistakeError(what, "put it in the folder of the first file of the problem")
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # noqa: BLE001 - whatever the user's code raises
         what = f"the source {shortened(str(path))} fails: {type(error).__name__}: {shortened(str(error))}"
-        raise MistakeError(what, "mend the Python file") from None
+        raise MistakeError(what, "correct the Python file") from None
     return {name: _with_exact_numbers(thing) for name, thing in vars(module).items() if callable(thing)}
 
 
 def _with_exact_numbers(function: Callable[..., object]) -> Callable[..., Value]:
-    """Return `function` of Python's own numbers as one of exact ones."""
+    """Return `function` with exact numbers as arguments and result."""
 
     def call(*arguments: Value) -> Value:
         try:
@@ -248,6 +250,6 @@ def _with_exact_numbers(function: Callable[..., object]) -> Callable[..., Value]
             return Fraction(repr(result)) if result == result else result  # noqa: PLR0124 - only NaN differs from itself
         if result is None or isinstance(result, (int, float, str)):
             return result
-        raise NoValueError(f"a {type(result).__name__} is no number")
+        raise NoValueError(f"the result is of the type {type(result).__name__}, not a number")
 
     return call

@@ -1,4 +1,4 @@
-"""Domains of pyDCOP's files: integers stay integers, all other values get names."""
+"""Read the domains of pyDCOP's files: integers stay integers, all other values become symbols."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _HINT = "write values: [R, G] or [0..4]"
 
 @dataclass(frozen=True)
 class DomainValues:
-    """The values of a domain, as the file has them, and as integers.
+    """The values of a domain, as in the file and as integers.
 
     Attributes:
-        domain: The domain here.
-        scalars: The values of the file, by the integers here.
+        domain: The domain in the team.
+        scalars: The values in the file, by their integers in the team.
     """
 
     domain: Domain
@@ -31,18 +31,18 @@ class DomainValues:
 
     @cached_property
     def codes(self) -> dict[str, int]:
-        """The integers here, by the words that tables of the file use: what Python's `str` says of the values."""
+        """The integers in the team, by the words in tables of the file: Python's `str` of the values."""
         return {shown(value): code for code, value in self.scalars.items()}
 
     @property
     def kind(self) -> type | None:
-        """The type of all values. None: they are of several."""
+        """The type of all values. None: they have several types."""
         kinds = {type(value) for value in self.scalars.values()}
         return kinds.pop() if len(kinds) == 1 else None
 
 
 class Domains:
-    """The domains of a problem. All symbols are known before the first domain is made."""
+    """The domains of a problem, with one numbering of all symbols."""
 
     def __init__(self, nodes: Mapping[str, Node]) -> None:
         """Read domains, by their names. Raises `MistakeError`."""
@@ -58,7 +58,7 @@ class Domains:
 
     @property
     def renamed(self) -> Iterable[tuple[str, str]]:
-        """Return symbols that have other names here, with their originals."""
+        """Return the symbols with new names, each with its original."""
         return self._symbols.changed.items()
 
     def _label(self, value: Scalar) -> str:
@@ -90,21 +90,23 @@ def _scalars(name: str, node: Node) -> list[Scalar]:
         raise MistakeError(f"the domain '{shortened(name)}' has no values", _HINT, node.line)
     for key in ("type", "initial_value"):
         if remark := node.get(key):
-            remark.skip()  # a word for people, and a value that pyDCOP itself does not read
+            remark.skip()  # a remark, and a value that pyDCOP itself ignores
     for one in values.items:
         if not one.is_scalar:
-            raise MistakeError("a list or a mapping as a value of a domain", "values are numbers and names", one.line)
+            what = f"the domain '{shortened(name)}' has a list or a mapping as a value"
+            raise MistakeError(what, "write numbers and names", one.line)
     found = [one.scalar for one in values.items]
     if len(found) == 1 and isinstance(found[0], str) and ".." in found[0]:
         return list(_range(found[0], values.line))
     if len(found) > MAX_VALUES:
-        raise MistakeError(f"domain {shortened(name)} has more than {MAX_VALUES} values", "make it smaller", node.line)
+        what = f"the domain '{shortened(name)}' has more than {MAX_VALUES} values"
+        raise MistakeError(what, "use a smaller domain", node.line)
     seen: dict[str, Scalar] = {}
     for value, one in zip(found, values.items, strict=True):
         known = seen.setdefault(shown(value), value)
         if type(known) is not type(value):
-            what = f"the domain '{shortened(name)}' has two values that are both written {shortened(shown(value))}"
-            raise MistakeError(what, "give one of them another name", one.line)
+            what = f"the domain '{shortened(name)}' has two different values with the text {shortened(shown(value))}"
+            raise MistakeError(what, "rename one of them", one.line)
     return found
 
 
@@ -113,7 +115,7 @@ def _range(text: str, line: int) -> range:
     try:
         ends = int(first), int(last)
     except ValueError:
-        raise MistakeError(f"'{shortened(text)}' is no range", "write two integers: [0..4]", line) from None
+        raise MistakeError(f"'{shortened(text)}' is not a range", "write two integers: [0..4]", line) from None
     try:
         check_integer(ends[0])
         check_integer(ends[1])
@@ -122,5 +124,5 @@ def _range(text: str, line: int) -> range:
     found = range(ends[0], ends[1] + 1)
     if not 0 < ends[1] - ends[0] + 1 <= MAX_VALUES:
         what = "is empty" if ends[1] < ends[0] else f"has more than {MAX_VALUES} values"
-        raise MistakeError(f"the range {shortened(text)} {what}", "make it smaller or larger", line)
+        raise MistakeError(f"the range {shortened(text)} {what}", f"write from 1 to {MAX_VALUES} values", line)
     return found

@@ -1,4 +1,4 @@
-"""The files of one problem: parts that belong together, a distribution, a scenario."""
+"""The files of one problem: the problem in one or several files, a distribution, a scenario."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "exter
 
 @dataclass(frozen=True)
 class SourceText:
-    """Files that are read as one text.
+    """The text of one or several files that are read as one.
 
     Attributes:
-        files: Each with the number of lines before it.
+        files: The files, each with the number of lines before it.
         text: The text.
     """
 
@@ -28,7 +28,7 @@ class SourceText:
     text: str
 
     def read(self, read: Callable[[Node], Read], repeated: Repeated) -> Read:
-        """Return the result of `read` for the files. Raises `InvalidInputError` for a part that `read` does not use."""
+        """Return the result of `read` for the text. Raises `InvalidInputError` for a part that `read` does not use."""
         with self.located():
             return read_yaml(self.text, read, repeated=repeated)
 
@@ -42,7 +42,7 @@ class SourceText:
             raise InvalidInputError([Diagnostic(path, line, mistake.message, mistake.hint)]) from None
 
     def place(self, line: int) -> tuple[str, int]:
-        """Return the file that `line` of the text stands in, and the line there."""
+        """Return the file of a line of the text, and the number of the line in this file."""
         found, before = next(((path, start) for path, start in reversed(self.files) if start < line), self.files[0])
         return encodable(str(found)), max(0, line - before)
 
@@ -52,9 +52,9 @@ class ProblemFiles:
     """The files of a problem.
 
     Attributes:
-        problem: The problem: several files count as one.
-        distribution: Who hosts what.
-        scenario: What happens.
+        problem: The problem, in one or several files.
+        distribution: The variables that each agent hosts, if there is such a file.
+        scenario: The events, if there is such a file.
     """
 
     problem: SourceText
@@ -63,7 +63,7 @@ class ProblemFiles:
 
 
 def sections(text: str) -> set[str]:
-    """Return the keys of the root mapping: those at the beginning of lines, or in braces (as in JSON)."""
+    """Return the keys of the root mapping: at the beginning of lines, or in braces (as in JSON)."""
     return root_keys(text) if _is_in_braces(text) else set(_SECTION.findall(text))
 
 
@@ -76,24 +76,25 @@ def _is_in_braces(text: str) -> bool:
 
 
 def read_files(paths: Sequence[Path]) -> ProblemFiles:
-    """Return the files at `paths` in their parts. Raises `InvalidInputError`."""
+    """Read the files at `paths`, and sort them by content. Raises `InvalidInputError`."""
     texts: dict[str, list[tuple[Path, str]]] = {"problem": [], "distribution": [], "scenario": []}
     total = 0
     for path in paths:
         text = file_text(path)
         total += len(text)
         if total > MAX_BYTES:
-            raise _invalid(path, f"makes more than {MAX_BYTES // 2**20} MiB", "import a smaller problem")
+            what = f"and the files before it have more than {MAX_BYTES // 2**20} MiB together"
+            raise _invalid(path, what, "import a smaller problem")
         texts[_kind(text)].append((path, text))
     if not texts["problem"]:
         raise _invalid(
             paths[0],
-            "is no problem",
-            "name it with the file of the variables and constraints: robochoc import PROBLEM FILE -o FOLDER",
+            "is not a problem but a distribution or a scenario",
+            "import it together with the problem: robochoc import PROBLEM FILE -o FOLDER",
         )
     for kind in ("distribution", "scenario"):
         if len(texts[kind]) > 1:
-            raise _invalid(texts[kind][1][0], f"is a second {kind}", "name one")
+            raise _invalid(texts[kind][1][0], f"is a second {kind}", f"import one {kind}")
     return ProblemFiles(
         _join(texts["problem"]),
         _join(texts["distribution"]) if texts["distribution"] else None,

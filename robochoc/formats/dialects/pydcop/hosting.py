@@ -1,4 +1,4 @@
-"""The owners of a pyDCOP problem's variables: by the distribution, by hints, or by the order of both."""
+"""The owners of a pyDCOP problem's variables: by a regular expression, the distribution, hints, or in turn."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class VariableOwners:
 
     Attributes:
         agents: The agents, in the order of the file.
-        variables: The variables, likewise.
-        constraints: Names that may be hosted, too, and have no owner here.
+        variables: The variables, in the order of the file.
+        constraints: The constraints; a file may host them, too, but here they have no owners.
         owners: The agent of each variable.
-        notes: What was decided here.
+        notes: Notes on the decisions made.
     """
 
     agents: list[str]
@@ -30,40 +30,40 @@ class VariableOwners:
     notes: list[ConversionNote] = field(default_factory=list)
 
     def assign_by_pattern(self, pattern: str) -> None:
-        """Let variables belong together that `pattern` finds the same in: its first group, or all of its match."""
+        """Group the variables by the first group of the match of `pattern`, or by the whole match."""
         self.owners = owners_by(pattern, self.variables)
         self.agents = list(dict.fromkeys(self.owners.values()))
 
     def assign_by_agent(self, node: Node, what: str) -> None:
-        """Take the owners from a mapping of agents to what they host. Those that are known stay."""
+        """Read owners from a mapping of agents to the names that they host. Variables with an owner keep it."""
         if not node.is_mapping:
-            raise MistakeError(f"the {what} is no mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
+            raise MistakeError(f"the {what} is not a mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
         found: dict[str, str] = {}
         variables, agents = set(self.variables), set(self.agents)
         for agent, hosted in _named(node):
             if agent not in agents:
-                message = f"the {what} names the agent '{shortened(agent)}', which the problem has not"
+                message = f"the {what} names the agent '{shortened(agent)}', which is not in the problem"
                 raise MistakeError(message, suggestion(agent, self.agents, "agents"), hosted.line)
             for name in _names(hosted):
                 if name in variables:
                     if found.setdefault(name, agent) != agent:
                         message = f"the {what} gives '{shortened(name)}' to {shortened(found[name])} and to {agent}"
-                        raise MistakeError(message, "let one of them have it", hosted.line)
+                        raise MistakeError(message, "give it to one of them", hosted.line)
                 elif name not in self.constraints and what != "distribution":
-                    message = f"the {what} names '{shortened(name)}', which is no variable and no constraint"
+                    message = f"the {what} names '{shortened(name)}', which is neither a variable nor a constraint"
                     raise MistakeError(message, suggestion(name, list(self.variables), "variables"), hosted.line)
         for name, agent in found.items():
             self.owners.setdefault(name, agent)
 
     def assign_remaining(self) -> None:
-        """Give what nobody owns to the agents that own least, in their order; without agents, each gets its own."""
+        """Give each variable without an owner to the agent with the fewest; without agents, to its own robot."""
         left = [name for name in self.variables if name not in self.owners]
         if not left:
             return
         if not self.agents:
             self.agents = list(self.variables)
             self.owners.update((name, name) for name in left)
-            self.notes.append(ConversionNote("owner", "there are no agents: each variable is a robot's of its own"))
+            self.notes.append(ConversionNote("owner", "there are no agents: each variable gets its own robot"))
             return
         load = dict.fromkeys(self.agents, 0)
         for agent in self.owners.values():
@@ -74,22 +74,22 @@ class VariableOwners:
             number, place, agent = least[0]
             self.owners[name] = agent
             heapreplace(least, (number + 1, place, agent))
-        text = f"the file says no owner of {len(left)} variables: agents that had least took them, in their order"
+        text = f"{len(left)} variables have no owner in the file: given in turn to the agents with the fewest"
         self.notes.append(ConversionNote("owner", text))
 
     def robots(self) -> dict[str, list[str]]:
-        """Return the variables of each agent that owns some. The others are left out, and noted."""
+        """Return the variables of each agent that owns some; add a note on the other agents."""
         owned: dict[str, list[str]] = {agent: [] for agent in self.agents}
         for name in self.variables:
             owned[self.owners[name]].append(name)
         idle = [agent for agent, names in owned.items() if not names]
         if idle:
-            self.notes.append(ConversionNote("dropped", f"agents that own no variable: {shortened(' '.join(idle))}"))
+            self.notes.append(ConversionNote("dropped", f"agents without variables: {shortened(' '.join(idle))}"))
         return {agent: names for agent, names in owned.items() if names}
 
 
 def agent_names(node: Node | None) -> list[str]:
-    """Return the agents in `node`: a list, or a mapping to attributes that only concern pyDCOP's distribution."""
+    """Return the agents in `node`: a list, or a mapping to attributes, which only concern pyDCOP's distribution."""
     if node is None or node.is_empty:
         return []
     if not node.is_mapping:
@@ -114,10 +114,12 @@ def _names(node: Node) -> Iterator[str]:
 
 
 def name_text(key: Scalar, line: int) -> str:
-    """Return a name. Raises `MistakeError` unless it is one: YAML takes `no` and `on` for truth values."""
+    """Return a key as a name. Raises `MistakeError` if it is not a name: YAML reads `no` and `on` as truth values."""
     if isinstance(key, int) and not isinstance(key, bool):
         return str(key)
     if not isinstance(key, str) or not key:
-        what = f"'{shortened(str(key))}' where a name should stand"
-        raise MistakeError(what, "YAML takes yes, no, on, off, true and false for truth values: write quotes", line)
+        what = f"expected a name, found '{shortened(str(key))}'"
+        raise MistakeError(
+            what, "put the name in quotes: YAML reads yes, no, on, off, true, false as truth values", line
+        )
     return key

@@ -1,6 +1,6 @@
 """Functions of pyDCOP's files: Python's syntax, parsed by `ast`, interpreted here, and never executed.
 
-What is allowed is listed (`_Compiler`); all else is refused by its name. Numbers are exact (`python_values`).
+`_Compiler` lists the allowed syntax; anything else is refused by its name. Numbers are exact (`python_values`).
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from robochoc.formats.dialects.pydcop.python_values import (
 MAX_LENGTH = 1_000_000
 """The maximum number of characters of a function."""
 MAX_NODES = 50_000
-"""The maximum number of its operators and terms."""
+"""The maximum number of operators and terms of a function."""
 MAX_DEPTH = 300
-"""The maximum depth of its nesting."""
+"""The maximum depth of nesting of a function."""
 MAX_STEPS = 5_000_000
 """The maximum number of steps of a function, for all arguments together.
 
@@ -44,10 +44,10 @@ Each pass of a loop counts, depending on the length of its body, and so does eac
 operation reads.
 """
 _NODES_A_STEP = 10
-"""The number of operators and terms of a loop's body that are done in one step."""
+"""The number of operators and terms of a loop's body that count as one step."""
 
 SourceFunction = Callable[..., Value]
-"""A function that is called by its name."""
+"""A function called by its name."""
 
 _Names = dict[str, Value]
 _Closure = Callable[[_Names], Value]
@@ -55,7 +55,7 @@ _Statement = Callable[[_Names], "Value | _NoReturn"]
 
 
 class _NoReturn:
-    """What a statement gives that is no `return`."""
+    """The result of a statement that does not return."""
 
 
 _CONTINUE = _NoReturn()
@@ -76,16 +76,16 @@ class PythonFunction:
         fixed: Mapping[str, Value] = MappingProxyType({}),
         source_functions: Mapping[str, SourceFunction] = MappingProxyType({}),
     ) -> None:
-        """Read a function, as pyDCOP does: an expression, or statements with `return`.
+        """Read a function as in pyDCOP: an expression, or statements with `return`.
 
         Args:
             source: The text.
-            variables: The names that variables have.
-            fixed: Names that stand for values.
-            source_functions: Functions of a Python file, which the text calls `source.NAME`. They are executed.
+            variables: The names of variables.
+            fixed: The values of names that are constants.
+            source_functions: Functions of a Python file, called `source.NAME` in the text. They are executed.
 
         Raises:
-            MistakeError: if it is no Python, is too long, or has what is not allowed.
+            MistakeError: if the text is not valid Python, is too long, or uses syntax that is not allowed.
         """
         self.body = _parsed(source)
         names = [node for node in _nodes(self.body) if isinstance(node, ast.Name)]
@@ -104,10 +104,10 @@ class PythonFunction:
         )
 
     def value(self, arguments: Mapping[str, Value]) -> Value:
-        """Return what the function gives for `arguments`.
+        """Return the value of the function for `arguments`.
 
         Raises:
-            MistakeError: if it gives nothing, as for a division by zero.
+            MistakeError: if the function has no value, for example because of a division by zero.
         """
         try:
             self._compiler.step(self._steps)
@@ -123,21 +123,22 @@ class PythonFunction:
     def _refuse(self, why: str, arguments: Mapping[str, Value]) -> NoReturn:
         where = ", ".join(f"{name}={arguments[name]!s:.20}" for name in self.scope)
         what = f"the function has no value{f' at {where}' if where else ''}: {shortened(why)}"
-        raise MistakeError(what, "a function has a value for all values of its variables")
+        raise MistakeError(what, "write a function with a value for all values of its variables")
 
 
 def _parsed(source: str) -> list[ast.stmt]:
     if len(source) > MAX_LENGTH:
-        raise MistakeError("a function is too long", f"{MAX_LENGTH} characters are allowed")
+        raise MistakeError("the function is too long", f"write at most {MAX_LENGTH} characters")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the user's text: "\d" in a string
+            warnings.simplefilter("ignore")  # warnings on the user's text, such as "\d" in a string
             body = ast.parse(source.lstrip()).body
     except SyntaxError as error:
-        what = f"the function is no Python: {error.msg}, in its line {error.lineno}"
+        what = f"the function is not valid Python: {error.msg}, in its line {error.lineno}"
         raise MistakeError(what, "write an expression, or lines with a return") from None
     except (ValueError, RecursionError, MemoryError):
-        raise MistakeError("the function is no Python, or is nested too deeply", "write a shorter one") from None
+        what = "the function is not valid Python, or is nested too deeply"
+        raise MistakeError(what, "write a shorter function") from None
     _check_size(body)
     returns = any(isinstance(node, ast.Return) for node in _nodes(body))
     if not returns and not (len(body) == 1 and isinstance(body[0], ast.Expr)):
@@ -153,7 +154,7 @@ def _check_size(body: Sequence[ast.stmt]) -> None:
         count += 1
         if count > MAX_NODES or depth > MAX_DEPTH:
             what = "nested too deeply" if depth > MAX_DEPTH else "too long"
-            raise MistakeError(f"the function is {what}", "write a shorter one")
+            raise MistakeError(f"the function is {what}", "write a shorter function")
         waiting += [(child, depth + 1) for child in ast.iter_child_nodes(node)]
 
 
@@ -167,7 +168,7 @@ def _nodes(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
 
 
 class _Compiler:
-    """Makes closures of trees. Each kind of node that is allowed has its line here."""
+    """Compiles syntax trees to closures. Each allowed kind of node has a case here."""
 
     def __init__(
         self,
@@ -183,7 +184,7 @@ class _Compiler:
         self._steps = MAX_STEPS
 
     def block(self, body: Sequence[ast.stmt]) -> _Statement:
-        """Return statements that run one after the other, until one returns."""
+        """Return a closure that runs statements in order until one returns."""
         parts = [self._statement(one) for one in body]
 
         def run(names: _Names) -> Value | _NoReturn:
@@ -232,7 +233,7 @@ class _Compiler:
         return run
 
     def expression(self, node: ast.expr) -> _Closure:  # noqa: C901, PLR0911, PLR0912 - one case for each kind of node
-        """Return what computes an expression."""
+        """Return a closure that computes an expression."""
         match node:
             case ast.Constant(value=value):
                 return self._constant(node, value)
@@ -286,16 +287,16 @@ class _Compiler:
             return lambda _: value
         if name not in self._variables and name not in self._stored:
             if name in FUNCTIONS:
-                raise MistakeError(f"the function '{name}' is not called", "write its arguments in parentheses")
+                raise MistakeError(f"the function '{name}' has no arguments", "write its arguments in parentheses")
             hint = suggestion(name, sorted({*self._variables, *self._stored}), "variables")
-            raise MistakeError(f"the function has '{shortened(name)}', which is no variable", hint)
+            raise MistakeError(f"the function contains '{shortened(name)}', which is not a variable", hint)
         return lambda names: names[name]
 
     def _call(self, name: str, functions: Mapping[str, SourceFunction], arguments: Sequence[ast.expr]) -> _Closure:
         called = functions.get(name)
         if called is None:
-            allowed = f"these are allowed: {shortened(' '.join(functions))}"
-            raise MistakeError(f"the function calls '{shortened(name)}'", allowed)
+            what = f"the function calls '{shortened(name)}', which is not allowed"
+            raise MistakeError(what, f"use only {shortened(' '.join(functions))}")
         if any(isinstance(one, ast.Starred) for one in arguments):
             _refuse(arguments[0])
         read = self._members if name in AGGREGATES and len(arguments) == 1 else self.expression
@@ -311,7 +312,7 @@ class _Compiler:
         return call
 
     def _members(self, node: ast.expr) -> _Closure:
-        """Return an expression that is only asked for its members: here a set is one, each member once."""
+        """Return an expression of which only the members are used; it may be a set, with each member once."""
         if not isinstance(node, ast.Set):
             return self.expression(node)
         made = [self.expression(one) for one in node.elts]
@@ -377,14 +378,14 @@ class _Compiler:
         raise NoValueError("only lists, texts and dictionaries have items")
 
     def step(self, number: int) -> None:
-        """Count steps. Raises `NoValueError` when there are too many."""
+        """Count steps. Raises `NoValueError` if there are too many."""
         self._steps -= number
         if self._steps < 0:
-            raise NoValueError("it takes too many steps")
+            raise NoValueError(f"it requires more than {MAX_STEPS:,} steps")
 
 
 def _steps_of(body: Sequence[ast.AST]) -> int:
-    """Return the number of steps of a loop's body, without those of loops within it."""
+    """Return the number of steps of a loop's body, without the steps of inner loops."""
     return 1 + sum(isinstance(node, ast.expr | ast.stmt) for node in _nodes(body)) // _NODES_A_STEP
 
 
@@ -410,7 +411,7 @@ def _binary(meaning: Callable[..., Value], left: _Closure, right: _Closure) -> _
 
 
 def _short_circuit(parts: Sequence[_Closure], *, is_and: bool) -> _Closure:
-    """Return what `and` or `or` gives: the first value that decides, or the last."""
+    """Return the value of `and` or `or`: the first value that decides, or the last."""
 
     def decide(names: _Names) -> Value:
         value: Value = None
@@ -435,5 +436,5 @@ def _refuse(node: ast.AST) -> NoReturn:
         case _:
             pass
     line = getattr(node, "lineno", 1)
-    hint = "arithmetic, comparisons, conditions, lists and loops over them are allowed, and a few functions"
-    raise MistakeError(f"the function has {what}, in its line {line}, which is not allowed", hint)
+    hint = "use arithmetic, comparisons, conditions, lists, loops over lists, and the documented functions"
+    raise MistakeError(f"the function contains {what}, in its line {line}, which is not allowed", hint)

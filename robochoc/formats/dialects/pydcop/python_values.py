@@ -1,8 +1,8 @@
-"""Python's operators and a few of its functions on the values of pyDCOP's functions: exact, and bounded.
+"""Python's operators and some of its functions on the values of pyDCOP's functions: exact, and bounded.
 
 Numbers are integers and fractions: `0.1 + 0.2` is 0.3 here. Only infinities are floats.
 
-Each operation is one call of C code, which nothing can interrupt. Its cost is therefore bounded by the size of its
+Each operation is one call of C code, which cannot be interrupted. Its cost is therefore bounded by the size of its
 operands: numbers have at most `MAX_BITS` bits, and lists and dictionaries are `BoundedTuple` and `BoundedDict`, whose
 size counts nested members as often as they can be reached.
 """
@@ -20,20 +20,20 @@ Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict[
 """The value of an expression. Lists and dictionaries are always `BoundedTuple` and `BoundedDict`."""
 
 MAX_BITS = 1024
-"""The maximum size of a number, and of its denominator."""
+"""The maximum size of a number, and of its denominator, in bits."""
 MAX_ITEMS = 100_000
 """The maximum size of a value: the number of its members, those of its members included."""
 MAX_NESTING = 50
 """The maximum depth of lists in lists."""
 _MAX_COLLISIONS = 16
-"""The maximum number of different keys with one hash: with more of them, a look-up is a search."""
+"""The maximum number of different keys with one hash: with more, a lookup becomes a search."""
 
 _DECIMAL = re.compile(r"\s*[+-]?[0-9]{1,18}(\.[0-9]{1,18})?\s*")
 _PLACES = 18
 
 
 class NoValueError(Exception):
-    """The function has no value for these arguments; says why."""
+    """The function has no value for these arguments; the message is the reason."""
 
 
 class _Sized:
@@ -82,11 +82,11 @@ def number(value: Value) -> int | Fraction | float:
     """Return `value`. Raises `NoValueError` unless it is a number."""
     if isinstance(value, (int, Fraction, float)):
         return value
-    raise NoValueError(f"{_shown(value)} is no number")
+    raise NoValueError(f"{_shown(value)} is not a number")
 
 
 def bounded(value: Value) -> Value:
-    """Return `value`. Raises `NoValueError` for a number that is too large, and for what is none at all."""
+    """Return `value`. Raises `NoValueError` for a number that is too large, and for NaN."""
     if isinstance(value, Fraction):
         large = value.numerator.bit_length() > MAX_BITS or value.denominator.bit_length() > MAX_BITS
     elif isinstance(value, float):
@@ -99,7 +99,7 @@ def bounded(value: Value) -> Value:
 
 
 def literal(value: object) -> Value:
-    """Return a constant of the source as a value; a float as the decimal that it shows. Raises `NoValueError`."""
+    """Return a constant of the source as a value; a float as its decimal text. Raises `NoValueError`."""
     if isinstance(value, float):
         return value if math.isinf(value) else Fraction(repr(value))
     if value is None or isinstance(value, (int, str)):
@@ -115,7 +115,7 @@ def divide(left: Fraction | float, right: Fraction | float) -> Value:
 
 
 def power(base: Fraction | float, exponent: Fraction | float) -> Value:
-    """Return the power. It is bounded before it is computed. Roots are floats, as Python has them."""
+    """Return the power; its size is checked before it is computed. Roots are computed as floats, as in Python."""
     if isinstance(base, float) or isinstance(exponent, float):
         raise NoValueError("a power of infinity")
     if exponent != int(exponent):
@@ -141,9 +141,9 @@ ARITHMETIC: dict[type[ast.operator], Callable[..., Value]] = {
     ast.BitOr: operator.or_,
     ast.BitXor: operator.xor,
 }
-"""What two numbers make."""
+"""The arithmetic operators on two numbers."""
 SIGNS: dict[type[ast.unaryop], Callable[..., Value]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
-"""What a sign makes of a number."""
+"""The signs of a number."""
 COMPARISONS: dict[type[ast.cmpop], Callable[..., bool]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
@@ -156,7 +156,7 @@ COMPARISONS: dict[type[ast.cmpop], Callable[..., bool]] = {
     ast.Is: operator.eq,
     ast.IsNot: operator.ne,
 }
-"""What two values say. `is` compares as `==` does: values of domains are equal or not."""
+"""The comparisons of two values. `is` means `==`, since equal values of domains need not be one object."""
 
 
 def _round(value: Value, places: Value = None) -> Value:
@@ -164,14 +164,14 @@ def _round(value: Value, places: Value = None) -> Value:
     if places is None:
         return round(rounded)
     if not isinstance(places, int) or abs(places) > _PLACES:
-        raise NoValueError("round takes at most 18 places")
+        raise NoValueError(f"round supports at most {_PLACES} places")
     return round(Fraction(rounded), places)
 
 
 def _int(value: Value) -> Value:
     if isinstance(value, str):
         if not _DECIMAL.fullmatch(value) or "." in value:
-            raise NoValueError(f"{_shown(value)} is no integer")
+            raise NoValueError(f"{_shown(value)} is not an integer")
         return int(value)
     return int(number(value))
 
@@ -184,13 +184,13 @@ def _float(value: Value) -> Value:
     if value.strip().lower() in ("-inf", "-infinity"):
         return -math.inf
     if not _DECIMAL.fullmatch(value):
-        raise NoValueError(f"{_shown(value)} is no number")
+        raise NoValueError(f"{_shown(value)} is not a number")
     return Fraction(value)
 
 
 def _range(*ends: Value) -> Value:
     if not all(isinstance(end, int) for end in ends):
-        raise NoValueError("range takes integers")
+        raise NoValueError("range requires integers")
     values = range(*[int(number(end)) for end in ends])
     if len(values[: MAX_ITEMS + 1]) > MAX_ITEMS:  # `len` of a range has at most 63 bits
         raise NoValueError("a range is too long")
@@ -223,13 +223,13 @@ FUNCTIONS: dict[str, Callable[..., Value]] = {
     "round": _round,
     "sum": _sum,
 }
-"""Python's functions that may be called."""
+"""The allowed functions of Python."""
 AGGREGATES = frozenset({"all", "any", "len", "max", "min", "sum"})
-"""Those that ask a set for its members alone, in whatever order they are."""
+"""The functions whose result does not depend on the order of a set's members."""
 
 
 def distinct(values: Iterable[Value]) -> BoundedTuple:
-    """Return each of `values` once. Raises `NoValueError` for values that cannot be in a set."""
+    """Return the different `values`. Raises `NoValueError` for values that cannot be in a set."""
     by_hash: dict[int, list[Value]] = {}
     try:
         for value in values:
@@ -244,7 +244,7 @@ def distinct(values: Iterable[Value]) -> BoundedTuple:
 
 
 def items(value: Value) -> tuple[Value, ...]:
-    """Return the members over which a loop runs. Raises `NoValueError` unless `value` is a list or a text."""
+    """Return the members of `value` for a loop. Raises `NoValueError` unless it is a list, dictionary or text."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, (str, dict)):

@@ -1,4 +1,4 @@
-"""pyDCOP's YAML as a team (its documentation: "File formats")."""
+"""Read pyDCOP's YAML as a team (see "File formats" in pyDCOP's documentation)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.problem import ProblemKind, ScenarioEvent, Team
 
 _REMARKS = ("description", "inputs")
-"""Sections with remarks for people, or about the programs that wrote the file."""
+"""Sections with remarks for people, or about the program that wrote the file."""
 _WISHES = ("host_with", "may_host")
 """Distribution hints that do not affect owners."""
 _DISTRIBUTE_REMARKS = ("inputs", "status", "cost", "duration", "communication_cost", "hosting_cost")
@@ -44,7 +44,7 @@ _OBJECTIVE = "write objective: min, or objective: max"
 _DROPPED = {
     "routes": "routes between agents",
     "hosting_costs": "costs of hosting",
-    "events": "the events in the problem's own file: give a scenario its own",
+    "events": "the events in the file of the problem: write them to a file of their own",
     "replica_dist": "replicas",
 }
 
@@ -88,7 +88,7 @@ class _PydcopReader:
         reader = ConstraintReader(values, self._external(domains), self._infinity(), maximize, self._folder())
         costs = list(self._costs(reader, nodes))
         if reader.incomplete:
-            text = f"tuples that a table without default leaves out are forbidden: {_first_names(reader.incomplete)}"
+            text = f"unlisted tuples of tables without default are forbidden: {_first_names(reader.incomplete)}"
             self._notes.append(ConversionNote("default", text))
         robots = self._robots(list(values))
         team = self._team(values, costs, robots, maximize=maximize)
@@ -115,19 +115,21 @@ class _PydcopReader:
             text = str(known)
             meant = next((short for short in ("min", "max") if text.strip().lower().startswith(short)), None)
             hint = f"write objective: {meant}" if meant else _OBJECTIVE
-            raise MistakeError(f"has the objective '{shortened(text)}'", hint, node.line)
+            raise MistakeError(f"has the unknown objective '{shortened(text)}'", hint, node.line)
         return known == "max"
 
     def _infinity(self) -> int | None:
-        """Return the infinity of the options, or the one that an exported file names."""
+        """Return the infinity of the options, or of the file if it was exported by robochoc."""
         node = self._root.get("infinity")
         if self._options.infinity is not None or node is None:
             if node is not None:
                 node.skip()
             return self._options.infinity
         if isinstance(node.scalar, bool) or not isinstance(node.scalar, int) or node.scalar < 1:
-            raise MistakeError("has an infinity that is no number", "write infinity: 10000", node.line)
-        self._notes.append(ConversionNote("infinity", f"costs from {node.scalar} on forbid, as the file says"))
+            raise MistakeError(
+                "has an infinity that is not an integer of 1 or more", "write infinity: 10000", node.line
+            )
+        self._notes.append(ConversionNote("infinity", f"costs from {node.scalar} on are infinite, as in the file"))
         return node.scalar
 
     def _folder(self) -> Path | None:
@@ -138,7 +140,7 @@ class _PydcopReader:
         for name, node in _section(self._root, "external_variables"):
             values, initial = _values(name, node, domains), node.get("initial_value")
             if initial is None or initial.scalar not in values.scalars.values():
-                what = f"the external variable '{shortened(name)}' has no initial_value of its domain"
+                what = f"the external variable '{shortened(name)}' has no initial_value, or one outside its domain"
                 raise MistakeError(what, "write initial_value: and a value of its domain", node.line)
             fixed[name] = initial.scalar
         if fixed:
@@ -196,7 +198,7 @@ class _PydcopReader:
     ) -> Team:
         scale = Scale(_amounts(costs))
         if scale.rounds:
-            text = f"some costs have more than {scale.places} decimal places, and were rounded to that many"
+            text = f"some costs were rounded to {scale.places} decimal places"
             self._notes.append(ConversionNote("rounded", text))
         places = self._variable_names
         variables = {
@@ -230,7 +232,7 @@ class _PydcopReader:
 
 
 class _ConstraintBuilder:
-    """Makes constraints of costs. Equal predicates and functions are one object."""
+    """Builds the team's constraints. Equal predicates and functions are one object."""
 
     def __init__(self, names: NameMap, scale: Scale) -> None:
         self._names = names
@@ -238,28 +240,28 @@ class _ConstraintBuilder:
         self._made: dict[tuple[str, Expression], Predicate | Function] = {}
         self.constant = 0
 
-    def constraint(self, costs: ParsedConstraint) -> Constraint | None:
-        """Return a constraint. None: it is a constant, which has been added. Raises `MistakeError`."""
-        scope = tuple(map(self._names.allowed, costs.scope))
-        name = xml_name(costs.name)
-        with _error_context(f"the constraint {shortened(costs.name)}", costs.line):
-            match costs.what:
+    def constraint(self, parsed: ParsedConstraint) -> Constraint | None:
+        """Return a constraint. None: it was a constant cost, now part of `constant`. Raises `MistakeError`."""
+        scope = tuple(map(self._names.allowed, parsed.scope))
+        name = xml_name(parsed.name)
+        with _error_context(f"the constraint {shortened(parsed.name)}", parsed.line):
+            match parsed.costs:
                 case ExactCostTable() as table:
                     made = relation(table, len(scope), self._scale)
                     if isinstance(made, int):
                         self.constant += made
                         return None
                     if not scope:
-                        raise MistakeError("forbids everything", "delete it, and the problem has a solution")
+                        raise MistakeError("forbids all assignments", "delete it, or write a finite cost")
                     scope = scope[: made.arity]
-                    return Constraint(name, made, scope, scope, ConstraintModel.TKC, line=costs.line)
+                    return Constraint(name, made, scope, scope, ConstraintModel.TKC, line=parsed.line)
                 case ViolationCost(body, cost):
                     predicate = self._predicate(name, scope, body)
                     units = self._scale.units(cost)
-                    return Constraint(name, predicate, scope, scope, ConstraintModel.TKC, units, costs.line)
+                    return Constraint(name, predicate, scope, scope, ConstraintModel.TKC, units, parsed.line)
                 case body:
                     function = self._definition(Function, name, scope, body)
-                    return Constraint(name, function, scope, scope, ConstraintModel.TKC, line=costs.line)
+                    return Constraint(name, function, scope, scope, ConstraintModel.TKC, line=parsed.line)
 
     def _predicate(self, name: str, scope: Sequence[str], body: Expression) -> Predicate | Function:
         for known in PREDEFINED.values():
@@ -277,7 +279,7 @@ class _ConstraintBuilder:
 
 
 def _over_formals(body: Expression) -> Expression:
-    """Return a predefined predicate's body over X0 and X1."""
+    """Return the body of a predefined predicate with X0 and X1 for X and Y."""
     match body:
         case Apply(operator, (Name("X"), Name("Y"))):
             return Apply(operator, (Name("X0"), Name("X1")))
@@ -287,7 +289,7 @@ def _over_formals(body: Expression) -> Expression:
 
 def _amounts(costs: Iterable[ParsedConstraint]) -> Iterator[int | Fraction | float]:
     for one in costs:
-        match one.what:
+        match one.costs:
             case ExactCostTable() as table:
                 yield from table.amounts()
             case ViolationCost(_, cost):
@@ -308,11 +310,11 @@ def _is_soft(constraint: Constraint) -> bool:
 
 def _values(name: str, node: Node, domains: Domains) -> DomainValues:
     domain = _mapping(node, f"the variable '{shortened(name)}'").get("domain")
-    wanted = shown(domain.scalar) if domain is not None else ""
-    if wanted not in domains.all:
-        what = f"the variable '{shortened(name)}' has no domain that is known"
-        raise MistakeError(what, suggestion(wanted, list(domains.all), "domains"), node.line)
-    return domains.all[wanted]
+    domain_name = shown(domain.scalar) if domain is not None else ""
+    if domain_name not in domains.all:
+        what = f"the variable '{shortened(name)}' has no domain, or an unknown one"
+        raise MistakeError(what, suggestion(domain_name, list(domains.all), "domains"), node.line)
+    return domains.all[domain_name]
 
 
 def _section(root: Node, name: str) -> Iterator[tuple[str, Node]]:
@@ -325,7 +327,7 @@ def _section(root: Node, name: str) -> Iterator[tuple[str, Node]]:
 
 def _mapping(node: Node, what: str) -> Node:
     if not node.is_mapping:
-        raise MistakeError(f"{what} is no mapping", "write NAME: VALUE, one a line", node.line)
+        raise MistakeError(f"{what} is not a mapping", "write NAME: VALUE, one a line", node.line)
     return node
 
 
@@ -336,10 +338,10 @@ def _leave_out(node: Node, part: str, name: str, found: Mapping[str, list[str]])
 
 
 def _read_distribution(root: Node, hosting: VariableOwners) -> None:
-    """Read a distribution; leave out the remarks that pyDCOP's `distribute` adds."""
+    """Read a distribution; ignore the remarks added by pyDCOP's `distribute`."""
     for key in _DISTRIBUTE_REMARKS:
-        if told := root.get(key):
-            told.skip()
+        if remark := root.get(key):
+            remark.skip()
     hosting.assign_by_agent(root.needed("distribution", "the file"), "distribution")
 
 
@@ -349,7 +351,7 @@ def _ignore_duplicate_key(_line: int, _key: str) -> None:
 
 @contextmanager
 def _error_context(what: str, line: int) -> Iterator[None]:
-    """Say of a `MistakeError` raised inside what it is about, and where that stands."""
+    """Add `what`, and `line` if it has none, to a `MistakeError` raised inside."""
     try:
         yield
     except MistakeError as mistake:

@@ -20,17 +20,17 @@ def read_scenario(
     Args:
         root: The file.
         team: The team at its start.
-        names: The names of robots, for those of agents.
+        names: Maps the names of agents to those of robots.
         agents: All agents of the problem, also those without variables.
-        notes: What is left out is noted here.
+        notes: Notes on ignored parts are added to this list.
 
     Raises:
-        MistakeError: if it is none.
+        MistakeError: if the scenario is not valid.
     """
     there, events, delays, left_out = {robot.name for robot in team.robots}, [], 0, 0
     listed, inputs = root.get("events"), root.get("inputs")
     if inputs is not None:
-        inputs.skip()  # of the program that wrote the file
+        inputs.skip()  # a remark of the program that wrote the file
     if listed is None or listed.items is None:
         raise MistakeError("has no events", "write events: and a list of them", root.line)
     for event in listed.items:
@@ -47,7 +47,7 @@ def read_scenario(
                 there.remove(robot)
                 changes.append(RemoveAgent(robot))
         if not there:
-            raise MistakeError("removes the last robot", "let one robot stay", event.line)
+            raise MistakeError("an event removes the last robot", "keep at least one robot", event.line)
         if changes:
             events.append(ScenarioEvent(tuple(changes)))
     notes += _notes(len(events), delays, left_out)
@@ -56,7 +56,7 @@ def read_scenario(
 
 def _notes(events: int, delays: int, left_out: int) -> Iterator[ConversionNote]:
     if events:
-        text = "with pyDCOP other agents take the variables of one that leaves; here they leave with their robot"
+        text = "in pyDCOP other agents take over the variables of a removed agent; here they leave with their robot"
         yield ConversionNote("scenario", text)
     if delays:
         yield ConversionNote(

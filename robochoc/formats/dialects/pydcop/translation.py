@@ -26,11 +26,11 @@ _CALLS = {"abs": (1, 1), "min": (2, 99), "max": (2, 99)}
 
 @dataclass(frozen=True)
 class VariableInfo:
-    """What is known of a variable: its domain here, and the kind of its values in the file.
+    """A variable's domain in the team, and the type of its values in the file.
 
     Attributes:
         domain: Its domain.
-        kind: The type of all its values. None: they are of several.
+        kind: The type of all its values. None: they have several types.
     """
 
     domain: Domain
@@ -38,23 +38,23 @@ class VariableInfo:
 
 
 class ViolationCost(NamedTuple):
-    """A predicate, and what it costs where it does not hold."""
+    """A predicate, and the cost of its violation."""
 
     body: Expression
     cost: Amount
 
 
 class _NotTranslatableError(Exception):
-    """It has no counterpart here."""
+    """The function has no counterpart among robochoc's expressions."""
 
 
 def translate(
     body: Sequence[ast.stmt], scope: Sequence[str], variables: Mapping[str, VariableInfo], fixed: Mapping[str, Value]
 ) -> ViolationCost | Expression | None:
-    """Return what the statements of a function say, over formal parameters X0, X1, ... in the order of `scope`.
+    """Translate the statements of a function, with formal parameters X0, X1, ... in the order of `scope`.
 
     Returns:
-        A predicate and its cost, or an expression whose value is the cost. None: a table must say it.
+        A predicate and its cost, or an expression whose value is the cost. None: the function requires a table.
     """
     try:
         return _Translator(scope, variables, fixed).cost(_as_expression(body))
@@ -63,7 +63,7 @@ def translate(
 
 
 def _as_expression(body: Sequence[ast.stmt]) -> ast.expr:
-    """Return one expression for statements that only choose what to return."""
+    """Return one expression for statements that only choose the value to return."""
     match body:
         case [ast.Expr(value=value)] | [ast.Return(value=ast.expr() as value), *_]:
             return value
@@ -85,7 +85,7 @@ class _Translator:
         self._parts = 0
 
     def cost(self, node: ast.expr) -> ViolationCost | Expression:
-        """Return a predicate with its cost where one of two costs is 0, and an integer expression otherwise."""
+        """Return a predicate with its cost if one of two costs is 0, otherwise an integer expression."""
         match node:
             case ast.IfExp(test=test, body=then, orelse=otherwise):
                 first, second = _amount(then), _amount(otherwise)
@@ -98,7 +98,7 @@ class _Translator:
         return self.integer(node)
 
     def integer(self, node: ast.expr) -> Expression:  # noqa: C901, PLR0911, PLR0912 - one case for each kind of node
-        """Return an integer expression. Booleans count 0 and 1, as in Python."""
+        """Return an integer expression. Booleans are 0 and 1, as in Python."""
         match node:
             case ast.Constant(value=bool(value)):
                 return Constant(int(value))
@@ -154,7 +154,7 @@ class _Translator:
                 return self._checked(Apply(name, (self.integer(left), self.integer(right))))
 
     def _have_equal_codes(self, one: str, other: str) -> bool:
-        """Return whether equal codes of two variables are equal values."""
+        """Return whether equal integers of two variables in the team are equal values in the file."""
         kind = self._kind(one)
         return kind is not None and kind is self._kind(other)
 
@@ -164,14 +164,14 @@ class _Translator:
     def _apply(self, operator: str, arguments: Sequence[ast.expr]) -> Expression:
         made = [self.integer(one) for one in arguments]
         if operator in ("add", "mul") and isinstance(made[0], Apply) and made[0].operator == operator:
-            made = [*made[0].arguments, *made[1:]]  # a long sum is one sum, not a deep tree
+            made = [*made[0].arguments, *made[1:]]  # keep a long sum flat
         return self._checked(Apply(operator, tuple(made)))
 
     def _conditional(self, condition: Expression, then: Expression, otherwise: Expression) -> Expression:
         return self._checked(Apply("if", (condition, then, otherwise)))
 
     def _checked(self, expression: Expression) -> Expression:
-        """Return `expression`. Raises `_NotTranslatableError` where it is too long or its value too large."""
+        """Return `expression`. Raises `_NotTranslatableError` if it is too long or its value too large."""
         self._parts += 1
         low, high = bounds(expression, self._limits)
         if self._parts > _MAX_PARTS or low < -_LARGEST or high > _LARGEST or _depth(expression) > MAX_DEPTH // 2:
@@ -184,7 +184,7 @@ def _depth(expression: Expression) -> int:
 
 
 def _amount(node: ast.expr) -> Amount | None:
-    """Return the number that `node` is. None: it is none."""
+    """Return the value of `node`. None: it is not a number."""
     match node:
         case ast.Constant(value=value):
             amount: Value = literal(value)

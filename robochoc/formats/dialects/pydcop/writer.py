@@ -1,11 +1,11 @@
-"""Teams as pyDCOP's YAML: tables, owners, a scenario of robots that leave.
+"""Write teams as pyDCOP's YAML: tables, owners, a scenario of robots that leave.
 
-The file has the section `distribution` of a distribution file, too, so it may be given to pyDCOP as both: with several
-variables a robot, pyDCOP finds no distribution by itself for DPOP. For algorithms over factors (Max-Sum) it does
+The file also has the section `distribution` of a distribution file, so it can be given to pyDCOP as both: if a robot
+has several variables, pyDCOP itself finds no distribution for DPOP. For algorithms over factors (Max-Sum) it does
 (`adhoc`): the hints name the owners, and the capacities suffice.
 
-pyDCOP has no hard constraints. What forbids costs an infinity that no sum of the other costs reaches, and the file
-names it: `infinity: 10000`. pyDCOP passes over that; here the costs from there on forbid again.
+pyDCOP has no hard constraints. A forbidden tuple gets a cost that no sum of the other costs reaches, and the file
+states this cost: `infinity: 10000`. pyDCOP ignores this key; an import makes costs from it on infinite again.
 """
 
 from __future__ import annotations
@@ -32,16 +32,17 @@ from robochoc.solver.errors import UnsupportedError
 CAPACITY = 1000
 """The capacity of an agent for each variable, constraint and value: more than any algorithm of pyDCOP needs."""
 LIMIT = 2**31 - 1
-"""The cost that counts as the worst in pyDCOP's DPOP."""
+"""The worst cost in pyDCOP's DPOP."""
 LEAST_INFINITY = 10_000
-"""What forbids costs at least so much: pyDCOP's own convention."""
+"""The minimum cost of a forbidden tuple: pyDCOP's own convention."""
 
 
 def write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the files of `team`.
 
     Raises:
-        UnsupportedError: if costs or a constraint's table are too large, or robots join in its scenario.
+        UnsupportedError: if costs or a constraint's table are too large, or its scenario has other changes than robots
+            that leave.
     """
     del options
     file = f"{team.name}.yaml"
@@ -64,11 +65,11 @@ def _problem(team: Team) -> Iterator[str]:
     if (infinity if forbids else most) >= LIMIT:
         more = ", and forbidden tuples cost ten times as much" if forbids else ""
         what = f"costs may add up to {most - 1:,}{more}"
-        raise UnsupportedError(f"{what}: pyDCOP's costs end at {LIMIT:,}; use smaller costs")
+        raise UnsupportedError(f"{what}: pyDCOP's costs are below {LIMIT:,}; use smaller costs")
     yield f"name: {_quoted(team.name)}"
     yield f"objective: {'max' if maximize else 'min'}"
     if forbids:
-        yield f"# {'Costs of minus this or less' if maximize else 'Costs of this or more'} forbid."
+        yield f"# {'Costs of minus this or less' if maximize else 'Costs of this or more'} are infinite."
         yield f"infinity: {infinity}"
     yield "domains:"
     for name, variable in team.variables.items():
@@ -111,8 +112,8 @@ def _constraint(one: TabulatedConstraint, team: Team, forbidden_cost: str) -> It
     if len(one.table.rows) < one.table.size:
         yield f"    default: {_cost(one.table.default, forbidden_cost)}"
     yield "    values:" if by_cost else "    values: {}"
-    for told, tuples in by_cost.items():
-        yield f"      {told}: {_quoted(' | '.join(tuples))}"
+    for cost_text, tuples in by_cost.items():
+        yield f"      {cost_text}: {_quoted(' | '.join(tuples))}"
 
 
 def _cost(cost: Amount, forbidden_cost: str) -> str:
@@ -135,7 +136,7 @@ def _scenario(team: Team) -> Iterator[str]:
         yield "    actions:"
         for change in event.changes:
             if not isinstance(change, RemoveAgent):
-                raise UnsupportedError("pyDCOP's scenarios only remove agents: this one has other changes")
+                raise UnsupportedError("pyDCOP's scenarios only remove agents: remove other changes from scenario.xml")
             yield f"      - {{type: remove_agent, agent: {_quoted(change.name)}}}"
 
 

@@ -1,4 +1,4 @@
-"""The entries of a list of robots and tasks, each read and checked: what is wrong is said with its line."""
+"""Read and check the entries of a list of robots and tasks; a mistake is reported with its line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robochoc.formats.yaml_tree import Node, Scalar, shown
 Point = tuple[Fraction, ...]
 
 MOST = 10**12
-"""No number is larger."""
+"""The maximum of every number."""
 MAX_PLACES = 9
 _PLANE, _SPACE = 2, 3
 _Choice = TypeVar("_Choice", bound=StrEnum)
@@ -26,12 +26,12 @@ class RobotEntry:
     """A robot.
 
     Attributes:
-        line: Where it stands.
-        at: Its place; empty: its ways are nothing.
-        skills: What it can do.
-        capacity: The room that it has. None: for any load.
-        most: The number of tasks that it does at most. None: any.
-        speed: The way that it makes in a unit of time.
+        line: Its line in the file.
+        at: Its place; empty: all its ways have length 0.
+        skills: Its skills.
+        capacity: The maximum sum of the loads of its tasks. None: unlimited.
+        most: The maximum number of its tasks. None: unlimited.
+        speed: The length of its way in a unit of time.
     """
 
     line: int
@@ -47,13 +47,13 @@ class TaskEntry:
     """A task.
 
     Attributes:
-        line: Where it stands.
-        at: Its place; empty: the way there is nothing.
-        needs: The skills that it asks of each robot that does it.
-        worth: What it is worth.
-        load: The room that it takes.
-        deadline: When a robot must be there. None: at any time.
-        robots: The number of robots that it asks for.
+        line: Its line in the file.
+        at: Its place; empty: all ways to it have length 0.
+        needs: The skills required of each of its robots.
+        worth: The worth of doing it.
+        load: The part of a robot's capacity that it requires.
+        deadline: The latest time of arrival. None: no deadline.
+        robots: The number of robots required.
     """
 
     line: int
@@ -75,7 +75,7 @@ class Synergy:
 
 
 class EntryReader:
-    """A mapping with known keys. Each is read by a method of its type, which raises `MistakeError`."""
+    """Reads the keys of a mapping by the type of their values. All methods raise `MistakeError`."""
 
     def __init__(self, what: str, node: Node) -> None:
         if not node.is_mapping:
@@ -84,7 +84,7 @@ class EntryReader:
         self._node = node
 
     def point(self, key: str) -> Point:
-        """Return a place of two or three coordinates; empty where there is none."""
+        """Return a place of two or three coordinates; empty if the key is missing."""
         node = self.node(key)
         if node is None:
             return ()
@@ -93,16 +93,16 @@ class EntryReader:
         return tuple(self._number(key, one, -MOST) for one in node.items)
 
     def number(self, key: str, default: Fraction | None, least: int = 0) -> Fraction | None:
-        """Return a decimal of at least `least`; `default` where there is none."""
+        """Return a decimal of at least `least`; `default` if the key is missing."""
         node = self.node(key)
         return default if node is None else self._number(key, node, least)
 
     def required_number(self, key: str, least: int = 0) -> Fraction:
-        """Return a decimal that must be there."""
+        """Return a decimal of at least `least`; the key must be present."""
         return self._number(key, self.required_node(key), least)
 
     def integer(self, key: str, default: int | None, least: int = 0) -> int | None:
-        """Return an integer of at least `least`; `default` where there is none."""
+        """Return an integer of at least `least`; `default` if the key is missing."""
         node = self.node(key)
         if node is None:
             return default
@@ -112,7 +112,7 @@ class EntryReader:
         return value
 
     def flag(self, key: str) -> bool:
-        """Return whether `key` says yes; no where there is none."""
+        """Return a truth value; False if the key is missing."""
         node = self.node(key)
         if node is None:
             return False
@@ -122,7 +122,7 @@ class EntryReader:
         return value
 
     def words(self, key: str) -> tuple[str, ...]:
-        """Return a list of words; a single word is a list of one."""
+        """Return a list of words; a single word is a list of one word."""
         node = self.node(key)
         if node is None:
             return ()
@@ -132,7 +132,7 @@ class EntryReader:
         return tuple(name_text(one.scalar) for one in items)
 
     def choice(self, key: str, kind: type[_Choice]) -> _Choice | None:
-        """Return a member of the enum `kind`; None where there is none."""
+        """Return a member of the enum `kind`; None if the key is missing."""
         node = self.node(key)
         if node is None:
             return None
@@ -142,11 +142,11 @@ class EntryReader:
         raise self._mistake(key, node, suggestion(shown(node.scalar), [one.value for one in kind], "words"))
 
     def node(self, key: str) -> Node | None:
-        """Return the value of `key`."""
+        """Return the value of `key`; None if the key is missing."""
         return self._node.get(key)
 
     def required_node(self, key: str) -> Node:
-        """Return the value of a key that must be there."""
+        """Return the value of `key`, which must be present."""
         return self._node.needed(key, self._what)
 
     def _number(self, key: str, node: Node, least: int) -> Fraction:
@@ -161,19 +161,19 @@ class EntryReader:
 
 
 def name_text(value: Scalar) -> str:
-    """Return a name: YAML reads 7 as a number, and yes as true."""
+    """Return a name as text, even if YAML reads it as a number (7) or a truth value (yes)."""
     return "yes" if value is True else "no" if value is False else shown(value)
 
 
 def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEntry]:
-    """Return the robots in a section; mistakes are noted."""
+    """Return the robots in a section; add mistakes to `mistakes`."""
     found = {}
     for name, one in _named("robots", node):
         with _collecting(one, mistakes):
             entry = EntryReader(f"the robot '{shortened(name)}'", one)
             speed = entry.number("speed", Fraction(1)) or Fraction(0)
             if not speed:
-                raise MistakeError(f"the robot '{shortened(name)}' has the speed 0", "write more than 0", one.line)
+                raise MistakeError(f"the robot '{shortened(name)}' has the speed 0", "write a number above 0", one.line)
             has = frozenset(entry.words("skills"))
             room, most = entry.integer("capacity", None), entry.integer("most", None)
             found[name] = RobotEntry(one.line, entry.point("at"), has, room, most, speed)
@@ -181,7 +181,7 @@ def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEnt
 
 
 def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry]:
-    """Return the tasks in a section; mistakes are noted."""
+    """Return the tasks in a section; add mistakes to `mistakes`."""
     found = {}
     for name, one in _named("tasks", node):
         with _collecting(one, mistakes):
@@ -194,12 +194,12 @@ def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry
 
 
 def read_synergies(node: Node | None, tasks: Collection[str], mistakes: DiagnosticCollector) -> list[Synergy]:
-    """Return the synergies in a section; mistakes are noted."""
+    """Return the synergies in a section; add mistakes to `mistakes`."""
     if node is None:
         return []
     if node.items is None:
         raise MistakeError(
-            "synergies is no list", "write - {tasks: [ONE, OTHER], worth: NUMBER}, one a line", node.line
+            "synergies is not a list", "write - {tasks: [ONE, OTHER], worth: NUMBER}, one a line", node.line
         )
     found = []
     for one in node.items:
@@ -209,19 +209,19 @@ def read_synergies(node: Node | None, tasks: Collection[str], mistakes: Diagnost
             for name in names:
                 if name not in tasks:
                     raise MistakeError(
-                        f"a synergy has the task '{shortened(name)}', which is not there",
+                        f"a synergy has the task '{shortened(name)}', which is not in the list",
                         suggestion(name, tasks, "tasks"),
                         one.line,
                     )
             if len(set(names)) != _PLANE or len(names) != _PLANE:
-                raise MistakeError("a synergy is not of two tasks", "write tasks: [ONE, OTHER]", one.line)
+                raise MistakeError("a synergy does not have two different tasks", "write tasks: [ONE, OTHER]", one.line)
             found.append(Synergy(one.line, (names[0], names[1]), worth))
     return found
 
 
 @contextmanager
 def _collecting(entry: Node, mistakes: DiagnosticCollector) -> Iterator[None]:
-    """Report an error in an entry, and skip the rest of the entry."""
+    """Add a mistake in an entry to `mistakes`, and skip the rest of the entry."""
     with mistakes.at(entry.line):
         try:
             yield
@@ -238,7 +238,7 @@ def _named(section: str, node: Node) -> Iterator[tuple[str, Node]]:
     for key, one in node.named():
         name = name_text(key)
         if name in names:
-            raise MistakeError(f"{section} has '{shortened(name)}' twice", "name one otherwise", one.line)
+            raise MistakeError(f"{section} has '{shortened(name)}' twice", "rename one of them", one.line)
         names.add(name)
         yield name, Node(one.line, {}) if one.is_empty else one
     if not names:

@@ -1,4 +1,4 @@
-"""A list of robots and tasks as a team: who could do what, and what that brings."""
+"""Read a list of robots and tasks as a team: the tasks that each robot can do, and their profits."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from robochoc.model.problem import ProblemKind, Team, Variable
 MAX_NUMBER = 1000
 """The maximum number of robots, and of tasks."""
 MAX_CONSTRAINTS = 200_000
-"""The maximum of the whole team."""
+"""The maximum number of constraints of the team, and of tours."""
 MAX_CREW = 16
-"""The maximum number of robots that could do a task which asks for several: one constraint is over all of them."""
+"""The maximum number of robots able to do a task that requires several: one constraint is over all of them."""
 NONE = "none"
-"""The value of a robot that does no task."""
+"""The value of a robot without a task."""
 _ONLY = "task"
 """The last part of the name of a robot's only variable."""
 
@@ -53,7 +53,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     """
     if len(paths) > 1:
         mistakes = DiagnosticCollector(encodable(str(paths[1])))
-        mistakes.add(0, "is a second list of robots and tasks", "name one file")
+        mistakes.add(0, "is a second list of robots and tasks", "import one file")
         mistakes.finish()
     path = paths[0]
     mistakes = DiagnosticCollector(encodable(str(path)))
@@ -61,7 +61,9 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
     with mistakes.at(0):
         for option, given in (("infinity", options.infinity), ("owner", options.owner)):
             if given is not None:
-                raise MistakeError(f"is a list of tasks, which '{option}' says nothing about", "leave it out")
+                raise MistakeError(
+                    f"is a list of tasks, whose import does not support --{option}", f"leave out --{option}"
+                )
         found = _TeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
     mistakes.finish()
     if found is None:
@@ -71,7 +73,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
 
 @dataclass(frozen=True)
 class _TaskList:
-    """The content of a `tasks.yaml`, read and checked, before a team is made of it."""
+    """The checked content of a `tasks.yaml`."""
 
     name: str
     model: TasksModel
@@ -101,13 +103,13 @@ def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> _TaskL
     robots, tasks = read_robots(head.required_node("robots"), mistakes), read_tasks(listed, mistakes)
     for what, entries in (("robots", robots), ("tasks", tasks)):
         if len(entries) > MAX_NUMBER:
-            raise MistakeError(f"has {len(entries)} {what}", f"{MAX_NUMBER} are allowed")
+            raise MistakeError(f"has {len(entries)} {what}", f"write at most {MAX_NUMBER}")
     synergies = read_synergies(head.node("synergies"), [name_text(name) for name, _ in listed.named()], mistakes)
     model = head.choice("model", TasksModel) or _model(robots, tasks)
     distance = head.choice("distance", Distance) or Distance.STRAIGHT
     places = head.integer("places", 0) or 0
     if places > MAX_PLACES:
-        raise MistakeError(f"has {places} places", f"costs have at most {MAX_PLACES} decimal places")
+        raise MistakeError(f"has costs with {places} decimal places", f"write places: {MAX_PLACES} or less")
     tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
     name = " ".join(head.words("name")) or stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
@@ -115,7 +117,7 @@ def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> _TaskL
 
 
 def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:
-    """Return `assignment` where each robot does one task at most, and each task asks for one robot."""
+    """Return `assignment` if each robot does at most one task, and each task requires one robot; else `several`."""
     alone = all(one.most == 1 for one in robots.values()) and all(one.robots == 1 for one in tasks.values())
     return TasksModel.ASSIGNMENT if alone else TasksModel.SEVERAL
 
@@ -124,18 +126,19 @@ def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: Diagnosti
     known = {len(one.at): one for one in entries if one.at}
     if len(known) > 1:
         line = list(known.values())[1].line
-        mistakes.add(line, "a place has another number of coordinates than others", "write all with two, or three")
+        what = "a place has a different number of coordinates than the places before it"
+        mistakes.add(line, what, "write all places with two coordinates, or all with three")
 
 
 def _check_model(read: _TaskList, mistakes: DiagnosticCollector) -> None:
     if read.model == TasksModel.ASSIGNMENT:
         for name, robot in read.robots.items():
             if robot.most not in (None, 1):
-                what = f"the robot '{shortened(name)}' may do {robot.most} tasks, and the model is assignment"
+                what = f"the robot '{shortened(name)}' may do {robot.most} tasks; the model assignment allows one"
                 mistakes.add(robot.line, what, "write most: 1, or model: several")
         for name, task in read.tasks.items():
             if task.robots > 1:
-                what = f"the task '{shortened(name)}' asks for {task.robots} robots, and the model is assignment"
+                what = f"the task '{shortened(name)}' requires {task.robots} robots; the model assignment allows one"
                 mistakes.add(task.line, what, "write model: several")
     mistakes.finish()
 
@@ -143,7 +146,7 @@ def _check_model(read: _TaskList, mistakes: DiagnosticCollector) -> None:
 def _check_symbols(tasks: Mapping[str, TaskEntry]) -> None:
     for name, task in tasks.items():
         if name == NONE:
-            raise MistakeError(f"a task is called '{NONE}', as no task is", "name it otherwise", task.line)
+            raise MistakeError(f"the name '{NONE}' of a task means no task", "rename the task", task.line)
         try:
             check_symbol(name)
         except MistakeError as mistake:
@@ -157,12 +160,12 @@ def _check_names(variables: Mapping[str, Sequence[Variable]]) -> None:
             if one.name in names:
                 robots = f"{shortened(names[one.name])} and {shortened(robot)}"
                 what = f"the robots {robots} would both have a variable {shortened(one.name)}"
-                raise MistakeError(what, "write robots' names without dots")
+                raise MistakeError(what, "write names of robots without dots")
             names[one.name] = robot
 
 
 class _TeamBuilder:
-    """Makes the team of a list. Tasks are numbered from 1 on, in the order of the file."""
+    """Builds the team of a list. Tasks are numbered from 1, in the order of the file."""
 
     def __init__(self, read: _TaskList) -> None:
         self._read = read
@@ -173,7 +176,7 @@ class _TeamBuilder:
         amounts = [one.worth for one in read.tasks.values()] + [one.worth for one in read.synergies]
         self._scale = Scale([*amounts, Fraction(1, 10**read.places)])
         if self._scale.rounds:
-            text = f"some worths have more than {MAX_PLACES} decimal places, and were rounded to that many"
+            text = f"some worths were rounded to {MAX_PLACES} decimal places"
             self._notes.append(ConversionNote("rounded", text))
 
     def imported(self, options: ImportOptions) -> ImportResult:
@@ -188,11 +191,12 @@ class _TeamBuilder:
             jobs = {self._number[name]: self._job(name, task, workers) for name, task in read.tasks.items()}
             variables, constraints = several(workers, jobs)
         if not variables:
-            raise MistakeError("no robot can do any of the tasks", "look at skills, needs, loads and deadlines")
+            raise MistakeError("no robot can do any of the tasks", "check skills, needs, loads and deadlines")
         _check_names(variables)
         kept = list(itertools.islice(constraints, MAX_CONSTRAINTS + 1))
         if len(kept) > MAX_CONSTRAINTS:
-            raise MistakeError(f"makes more than {MAX_CONSTRAINTS:,} constraints", "write fewer robots, or fewer tasks")
+            what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} constraints"
+            raise MistakeError(what, "write fewer robots, or fewer tasks")
         name = re.sub(r"[^A-Za-z0-9_.-]+", "_", options.name or read.name)[:100].strip("._-") or "team"
         units = CostUnits(maximize=True, places=self._scale.places)
         team: Team = assemble(name, variables, kept, kind=ProblemKind.DISWCSP, costs=units)
@@ -220,27 +224,28 @@ class _TeamBuilder:
         return Worker(own, own, own, profit, robot.capacity, robot.most, together, *self._tours(name, robot, profit))
 
     def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[TaskSet, int], bool]:
-        """Return the lengths of the robot's tours, and whether deadlines leave it no others."""
-        if not self._read.tours or not robot.at:  # a robot without a place has no ways
+        """Return the lengths of the robot's tours, and whether deadlines exclude other sets of tasks."""
+        if not self._read.tours or not robot.at:  # all ways of a robot without a place have length 0
             return {}, False
         numbered = enumerate(self._read.tasks.values(), start=1)
         placed = {number: entry for number, entry in numbered if number in able and entry.at}
         lengths = TourSearch(name, robot, placed, lambda start, end: self._way(start, end, MAX_PLACES)).lengths()
         self._sets += len(lengths)
         if self._sets > MAX_CONSTRAINTS:
-            raise MistakeError(f"makes more than {MAX_CONSTRAINTS:,} tours", "write fewer robots, or smaller most:")
+            what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} tours"
+            raise MistakeError(what, "write fewer robots, or a smaller most:")
         hurries = any(entry.deadline is not None for entry in placed.values())
         return {tasks: round_length(length, self._scale.places) for tasks, length in lengths.items()}, hurries
 
     def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> Job:
         able = sum(self._number[name] in one.profit for one in workers)
         if task.robots > 1 and able > MAX_CREW:
-            what = f"the task '{shortened(name)}' asks for {task.robots} robots, and {able} could do it"
-            raise MistakeError(what, f"let at most {MAX_CREW} be able to", task.line)
+            what = f"the task '{shortened(name)}' requires {task.robots} robots, and {able} robots can do it"
+            raise MistakeError(what, f"use needs: so that at most {MAX_CREW} robots can do it", task.line)
         return Job(self._task_names.allowed(name), task.load, task.robots)
 
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
-        """Return the names in the file of what is called otherwise in the team."""
+        """Return the names in the file, by the names in the team where the two differ."""
         tasks = list(self._read.tasks)
         found = dict(self._robot_names.changed)
         for name, one in zip(self._read.robots, workers, strict=True):
@@ -261,7 +266,7 @@ class _TeamBuilder:
                 self._notes.append(ConversionNote("left out", f"the task {shortened(name)}, which no robot can do"))
 
     def _profit(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:
-        """Return what a task brings a robot, its share of it where it asks for several. None: it cannot do it."""
+        """Return a robot's profit of a task: its share of the worth minus the way. None: it cannot do the task."""
         if not entry.needs <= robot.skills or robot.most == 0:
             return None
         if robot.capacity is not None and entry.load > robot.capacity:
@@ -272,8 +277,8 @@ class _TeamBuilder:
             return None
         worth = self._scale.units(entry.worth)
         if worth % entry.robots:
-            what = f"the task '{shortened(task)}' is worth {entry.worth}, which {entry.robots} robots cannot share"
-            raise MistakeError(what, "write a multiple of their number, or more places", entry.line)
+            what = f"the worth {entry.worth} of '{shortened(task)}' cannot be divided by its {entry.robots} robots"
+            raise MistakeError(what, "write a multiple of their number, or more places:", entry.line)
         way = 0 if self._read.tours else self._way(robot.at, entry.at, self._scale.places)
         return int(worth) // entry.robots - way
 

@@ -1,7 +1,7 @@
-"""The shortest tours of a robot: from where it stands to each set of tasks, in an order that meets all deadlines.
+"""The shortest tours of a robot: from its place to all tasks of a set, in an order that meets all deadlines.
 
-By dynamic programming over sets and their last tasks (Held and Karp, SIAM J. 10, 1962): whoever comes to a task earlier
-is never worse off later. A tour does not lead back.
+By dynamic programming over sets and their last tasks (Held and Karp, SIAM J. 10, 1962): an earlier arrival at a task is
+never worse for the tasks after it. A tour does not lead back.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.tasks.entries import MAX_PLACES, Point, RobotEntry, TaskEntry
 
 MAX_SETS = 4096
-"""The maximum number of sets of tasks that a robot may have time and room for."""
+"""The maximum number of sets of tasks that a robot has time and capacity for."""
 TaskSet = tuple[int, ...]
 """Numbers of tasks, in ascending order."""
 
 
 @dataclass(frozen=True)
 class TourSearch:
-    """The facts on which the tours of one robot depend.
+    """The search for the tours of one robot.
 
     Attributes:
         name: The robot's name.
-        robot: What the list says of it.
-        tasks: The tasks with a place that it can do, by number. The robot has a place, too.
-        way: The length of the way between two places, in units of 10**-MAX_PLACES.
+        robot: The robot, which has a place.
+        tasks: The tasks with a place that the robot can do, by number.
+        way: Returns the length of the way between two places, in units of 10**-MAX_PLACES.
     """
 
     name: str
@@ -36,10 +36,10 @@ class TourSearch:
     way: Callable[[Point, Point], int]
 
     def lengths(self) -> dict[TaskSet, int]:
-        """Return the length of the shortest tour of each set of tasks that the robot has time and room for.
+        """Return the length of the shortest tour of each set of tasks that the robot has time and capacity for.
 
         Raises:
-            MistakeError: where there are too many.
+            MistakeError: if there are more than `MAX_SETS` sets.
         """
         ends: dict[TaskSet, dict[int, int]] = {(): {}}
         level: list[TaskSet] = [()]
@@ -63,7 +63,7 @@ class TourSearch:
         return {tasks: min(found.values()) for tasks, found in ends.items() if tasks}
 
     def _larger_sets(self, tasks: TaskSet) -> Iterator[TaskSet]:
-        """Yield the sets with one more task, of a higher number, that the robot has room for."""
+        """Yield the sets with one more task, of a higher number, that the robot has capacity for."""
         if self.robot.most is not None and len(tasks) >= self.robot.most:
             return
         load = sum(self.tasks[task].load for task in tasks)
@@ -79,7 +79,7 @@ class TourSearch:
         first: Mapping[int, int],
         legs: Mapping[tuple[int, int], int],
     ) -> Iterator[tuple[int, int]]:
-        """Yield the tasks that can be the last of a tour of `tasks`, and how long the shortest of these tours is."""
+        """Yield the possible last tasks of a tour of `tasks`, each with the length of the shortest such tour."""
         for last in tasks:
             before = ends.get(tuple([task for task in tasks if task != last]))
             if before is None:
@@ -92,13 +92,13 @@ class TourSearch:
     def _check_count(self, sets: int) -> None:
         if sets > MAX_SETS:
             raise MistakeError(
-                f"the robot '{shortened(self.name)}' has time and room for more than {MAX_SETS:,} sets of tasks",
-                "write most: or a smaller capacity:, or leave out tours:",
+                f"the robot '{shortened(self.name)}' has time and capacity for more than {MAX_SETS:,} sets of tasks",
+                "write most:, write a smaller capacity:, or delete tours:",
                 self.robot.line,
             )
 
 
 def round_length(length: int, places: int) -> int:
-    """Return a length in units of 10**-MAX_PLACES in units of 10**-places, halves up."""
+    """Convert a length from units of 10**-MAX_PLACES to units of 10**-places, rounding halves up."""
     unit = Fraction(10**places, 10**MAX_PLACES)
     return int(2 * length * unit + 1) // 2

@@ -51,20 +51,20 @@ class Meaning:
     def refusals(self) -> Iterator[str]:
         """Yield parts of the messages of which one is expected."""
         if len({len(one["at"]) for one in (*self.robots.values(), *self.tasks.values()) if one.get("at")}) > 1:
-            yield "another number of coordinates"
+            yield "a different number of coordinates"
             return
         if self.model == "assignment":
             if any(one.get("most", 1) != 1 for one in self.robots.values()):
-                yield "and the model is assignment"
+                yield "the model assignment allows one"
             if any(one.get("robots", 1) > 1 for one in self.tasks.values()):
-                yield "and the model is assignment"
+                yield "the model assignment allows one"
             if "none" in self.tasks:
-                yield "a task is called 'none'"
+                yield "the name 'none' of a task"
         elif not any(self.is_able(one, task) for one in self.robots.values() for task in self.tasks.values()):
             yield "no robot can do any of the tasks"
         for task in self.tasks.values():
             if exact(task["worth"]) * 10**self.places % task.get("robots", 1):
-                yield "cannot share"
+                yield "cannot be divided"
 
     def best(self) -> Fraction:
         """Return the most that the list can bring, over all ways to share the tasks out."""
@@ -212,7 +212,7 @@ def test_random_lists_have_the_meaning_of_the_guide_or_are_refused(count: int, t
             assert any(one in error for one in expected), f"{error}\n{text}"
             refused += 1
             continue
-        assert not [one for one in expected if one != "cannot share"], f"{expected}\n{text}"
+        assert not [one for one in expected if one != "cannot be divided"], f"{expected}\n{text}"
         check_team(team)
         best = meaning.best()
         assert optimum(team) == best, text

@@ -92,15 +92,19 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
         ("skills: [camera]", "skill: [camera]", "3: unknown key 'skill' in robots.bob (did you mean 'skills'?)"),
         ("most: 2", "most: 2.5", "3: the robot 'bob' cannot have '2.5' as 'most' (write a whole number"),
         ("most: 2", "most: yes", "3: the robot 'bob' cannot have 'True' as 'most'"),
-        ("most: 2", "speed: 0", "3: the robot 'bob' has the speed 0 (write more than 0)"),
+        ("most: 2", "speed: 0", "3: the robot 'bob' has the speed 0 (write a number above 0)"),
         ("at: [8, 1]", "at: [8]", "3: the robot 'bob' cannot have this value as 'at' (write at: [X, Y]"),
         ("at: [8, 1]", "at: [8, x]", "3: the robot 'bob' cannot have 'x' as 'at'"),
-        ("at: [8, 1]", "at: [8, 1, 0]", "3: a place has another number of coordinates than others"),
+        ("at: [8, 1]", "at: [8, 1, 0]", "3: a place has a different number of coordinates than the places before it"),
         (", worth: 10", "", "6: the task 'survey' has no worth (write worth:"),
         ("worth: 10", "worth: .inf", "6: the task 'survey' cannot have 'inf' as 'worth'"),
-        ("robots: 2", "robots: 3", "9: the task 'carry' is worth 20, which 3 robots cannot share"),
-        ("[survey, inspect]", "[survey, inspct]", "a synergy has the task 'inspct', which is not there (did you mean"),
-        ("[survey, inspect]", "[survey, survey]", "12: a synergy is not of two tasks"),
+        ("robots: 2", "robots: 3", "9: the worth 20 of 'carry' cannot be divided by its 3 robots"),
+        (
+            "[survey, inspect]",
+            "[survey, inspct]",
+            "a synergy has the task 'inspct', which is not in the list (did you mean",
+        ),
+        ("[survey, inspect]", "[survey, survey]", "12: a synergy does not have two different tasks"),
         ("streets", "street", "13: the file cannot have 'street' as 'distance' (did you mean 'streets'?)"),
         (
             "distance: streets",
@@ -109,8 +113,8 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
         ),
         ("distance: streets", "tour: yes", "13: unknown key 'tour' (did you mean 'tours'?)"),
         (", worth: 10", ", wort: 10", "6: unknown key 'wort' in the task 'survey' (did you mean 'worth'?)"),
-        ("distance: streets", "model: assignment", "may do 2 tasks, and the model is assignment"),
-        ("distance: streets", "places: 10", "has 10 places"),
+        ("distance: streets", "model: assignment", "may do 2 tasks; the model assignment allows one"),
+        ("distance: streets", "places: 10", "has costs with 10 decimal places"),
         ("  bob:", "  ann:", "3: duplicate key 'ann'"),
         ("tasks:\n", "task:\n", "5: unknown key 'task' in the file (did you mean 'tasks'?)"),
         ("robots:\n", "robots: []\nrobot:\n", "1: robots is not a mapping"),
@@ -135,7 +139,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
 @looped(
     ("text", "told"),
     [
-        ("robots: {a: }\ntasks: {none: {worth: 1}}\nmodel: assignment", "2: a task is called 'none', as no task is"),
+        ("robots: {a: }\ntasks: {none: {worth: 1}}\nmodel: assignment", "2: the name 'none' of a task means no task"),
         ("robots: {a: }\ntasks: {t t: {worth: 1}}\nmodel: assignment", "2: 't t'"),
         ("robots: {a: }", "has no tasks"),
         ("robots: 3\ntasks: 4", "1: robots is not a mapping"),
@@ -143,7 +147,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
         ("robots: {a: }\ntasks: {t: 3}", "2: the task 't' is not a mapping"),
         ("robots: {7: , '7': }\ntasks: {t: {worth: 1}}", "robots has '7' twice"),
         ("robots: {a: {most: 0}}\ntasks: {t: {worth: 1}}", "no robot can do any of the tasks"),
-        ("robots: {a: }\ntasks: {t: {worth: 1}}\nsynergies: 3", "3: synergies is no list"),
+        ("robots: {a: }\ntasks: {t: {worth: 1}}\nsynergies: 3", "3: synergies is not a list"),
     ],
 )
 def test_what_cannot_be_a_list_is_refused(text: str, told: str, tmp_path: Path) -> None:
@@ -158,10 +162,10 @@ def test_aliases_are_counted_in_full(tmp_path: Path) -> None:
 
 def test_too_much_is_refused(tmp_path: Path) -> None:
     robots = "".join(f"  r{number}: {{}}\n" for number in range(17))
-    assert "and 17 could do it" in mistakes(f"robots:\n{robots}tasks: {{t: {{worth: 4, robots: 2}}}}", tmp_path)
+    assert "and 17 robots can do it" in mistakes(f"robots:\n{robots}tasks: {{t: {{worth: 4, robots: 2}}}}", tmp_path)
     tasks = "".join(f"  t{number}: {{worth: 1}}\n" for number in range(1001))
-    assert "has 1001 tasks (1000 are allowed)" in mistakes(f"robots: {{a: }}\ntasks:\n{tasks}", tmp_path)
-    with pytest.raises(InvalidInputError, match="which 'infinity' says nothing about"):
+    assert "has 1001 tasks (write at most 1000)" in mistakes(f"robots: {{a: }}\ntasks:\n{tasks}", tmp_path)
+    with pytest.raises(InvalidInputError, match="whose import does not support --infinity"):
         imported(LIST, tmp_path, infinity=3)
 
 
