@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, store_once
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed
 from robochoc.protocols.inference.dpop_tables import PIECE, Codes, Extent, Table, costs_for
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -230,22 +230,10 @@ class CountDPOP(DPOP):
 
     def handle(self, sender: str, message: Message) -> None:
         match cast("Domain | CountDimensions | Proceed | UTIL | Counts | VALUE", message):
-            case Domain(values):
-                store_once(sender, values, self.domains, self.ancestors)
-                self._measure()
-            case CountDimensions() as dimensions:
-                self._check_dimensions(sender, dimensions)
-                store_once(sender, dimensions, self.dimensions, self.children)
-                self.bits_below[sender] = dimensions.bits
-                self._measure()
-            case Proceed(separator):
-                self._proceed(separator)
-            case UTIL(width, costs):
-                self._util_message_handler(sender, width, costs)
             case Counts(width, numbers):
                 self._counts_handler(sender, width, numbers)
-            case VALUE(assignment):
-                self._value_message_handler(assignment)
+            case Domain() | CountDimensions() | Proceed() | UTIL() | VALUE() as others:
+                super().handle(sender, others)
             case never:
                 assert_never(never)
 
@@ -260,6 +248,10 @@ class CountDPOP(DPOP):
         """Compute the bits of this robot's numbers."""
         own = sum(self.problem.behind).bit_length()
         self.bits = min(own + sum(self.bits_below.values()), MOST_BITS)
+
+    def _store_dimensions(self, child: str, dimensions: Dimensions) -> None:
+        super()._store_dimensions(child, dimensions)
+        self.bits_below[child] = cast("CountDimensions", dimensions).bits
 
     def _send_dimensions(self, dimensions: Dimensions) -> None:
         """Send the parent the dimensions of both tables."""

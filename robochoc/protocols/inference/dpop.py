@@ -288,8 +288,7 @@ class DPOP(TreeProtocol):
                 store_once(sender, values, self.domains, self.ancestors)
                 self._measure()
             case Dimensions() as dimensions:
-                self._check_dimensions(sender, dimensions)
-                store_once(sender, dimensions, self.dimensions, self.children)
+                self._store_dimensions(sender, dimensions)
                 self._measure()
             case Proceed(separator):
                 self._proceed(separator)
@@ -343,6 +342,11 @@ class DPOP(TreeProtocol):
     def _send_dimensions(self, dimensions: Dimensions) -> None:
         """Send the parent the dimensions of this robot's table."""
         self.send(self.parent or "", dimensions)
+
+    def _store_dimensions(self, child: str, dimensions: Dimensions) -> None:
+        """Store the dimensions of a child's table."""
+        self._check_dimensions(child, dimensions)
+        store_once(child, dimensions, self.dimensions, self.children)
 
     def _check_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Raise `ValueError` unless `dimensions` are possible."""
@@ -409,17 +413,25 @@ class DPOP(TreeProtocol):
 
     def _proceed(self, separator: Sequence[str]) -> None:
         """Make the tables of this robot's constraints, after the children were allowed to make theirs."""
-        if sorted(separator) != sorted(self._sizes) or self.separator is not None:
-            own = ", ".join(self._sizes)
-            raise ValueError(f"{self.problem.agent} received axes {list(separator)}, but its separator is {own}")
-        if self._need.bytes > self.settings.memory:
-            raise ValueError(f"{self.problem.agent} must proceed, but has no room for its tables")
+        self._check_axes(separator, expected=self.separator is None)
         self.separator = tuple(separator)
         for child in self.children:
-            needed = self.dimensions[child].separator
-            self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in needed)
-            self.send(child, Proceed(list(self._axes[child])))
+            self._let_proceed(child)
         self._start_utils()
+
+    def _check_axes(self, separator: Sequence[str], *, expected: bool) -> None:
+        """Raise `ValueError` unless the axes are `expected` now, those of the separator, and tables fit in memory."""
+        if sorted(separator) != sorted(self._sizes) or not expected:
+            own = ", ".join(self._sizes)
+            raise ValueError(f"{self.problem.agent} received unexpected axes {list(separator)}; its separator is {own}")
+        if self._need.bytes > self.settings.memory:
+            raise ValueError(f"{self.problem.agent} must proceed, but has no room for its tables")
+
+    def _let_proceed(self, child: str) -> None:
+        """Send a child the axes of its table, the nearest robot first."""
+        needed = self.dimensions[child].separator
+        self._axes[child] = tuple(name for name in (self.problem.agent, *(self.separator or ())) if name in needed)
+        self.send(child, Proceed(list(self._axes[child])))
 
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; a leaf computes its table at once."""

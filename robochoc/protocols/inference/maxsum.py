@@ -56,6 +56,7 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -135,11 +136,38 @@ def _rows_in_words(rows: Sequence[Row]) -> str:
     return "; ".join(map(costs_text, rows[:4]))
 
 
-class MaxSum(CycleProtocol):
-    """One agent of Max-Sum: its variable, and the functions of which it is the lowest robot.
+class FactorGraphProtocol(CycleProtocol):
+    """The common base of Max-Sum and Max-Sum_AD: a variable, and the functions of which this robot is the lowest.
 
-    Robots in `above` receive R from this robot and send Q to it; robots in `below` send R and receive Q. `factors` are
-    its functions. `edges` contains the last Q to each function: its own ones first, then those of each robot below.
+    Robots in `above` receive R from this robot and send Q to it; robots in `below` send R and receive Q. `preferred`
+    are the private costs of the values, with their preferences.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        place = order.rank[problem.agent]
+        self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
+        self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
+        self.preferred: Row = []
+        self._domains: dict[str, list[wire.Value]] = {}
+
+    @abstractmethod
+    def _receive_domains(self, messages: Mapping[str, wire.Message]) -> None:
+        """Start the first cycle, once the domains above are known."""
+
+    def start_with(self, preference: float) -> None:
+        """Choose the value with the lowest private cost, and send the domain to the holders of its functions."""
+        self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
+        self.choose(cheapest(self.preferred))
+        self.multicast(self.below, Domain(list(self.problem.values)))
+        self.listen(self.above, self._receive_domains)
+
+
+class MaxSum(FactorGraphProtocol):
+    """One agent of Max-Sum.
+
+    `factors` are its functions. `edges` contains the last Q to each function: its own ones first, then those of each
+    robot below.
     """
 
     messages = Domain | R | Q | AnytimeMessage
@@ -158,14 +186,9 @@ class MaxSum(CycleProtocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        place = order.rank[problem.agent]
-        self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
-        self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
         self.factors: list[Factor] = []
-        self.preferred: Row = []
         self.edges: list[Row] = []
         self._own: list[Row] = []
-        self._domains: dict[str, list[wire.Value]] = {}
         self._last_q: dict[str, Sequence[Row]] = {}
         """The last Q of each robot above."""
         self._last_r: dict[str, Sequence[Row]] = {}
@@ -175,15 +198,9 @@ class MaxSum(CycleProtocol):
         """The number of `edges` of each robot."""
 
     def start_cycles(self) -> None:
-        """Choose the value with the lowest private cost, and send the domain to the holders of its functions."""
-        preference = self.settings.preference
-        self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
-        self.choose(cheapest(self.preferred))
-        self.multicast(self.below, Domain(list(self.problem.values)))
-        self.listen(self.above, self._receive_domains)
+        self.start_with(self.settings.preference)
 
     def _receive_domains(self, messages: Mapping[str, wire.Message]) -> None:
-        """Start the first cycle, once the domains above are known."""
         self._domains = self.checked_domains(messages)
         self._send_r()
 

@@ -50,11 +50,11 @@ from typing import ClassVar, Literal
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
-from robochoc.protocols.inference.maxsum import Q, R
+from robochoc.protocols.inference.maxsum import FactorGraphProtocol, Q, R
 from robochoc.protocols.inference.maxsum_factor import Functions, Row, cheapest, checked, from_zero, total, without_each
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
-from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain, Value
+from robochoc.protocols.shared.cycles import CycleSettings, Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.local_problem import LocalProblem
 
@@ -77,7 +77,7 @@ PERIOD = 3
 """ADSSVP sends no values in every third phase."""
 
 
-class MaxSumAD(CycleProtocol):
+class MaxSumAD(FactorGraphProtocol):
     """One agent of Max-Sum_AD. A cycle is a phase.
 
     `functions` are this robot's, with the last Q from above. `from_below` contains the last R from each robot below,
@@ -99,23 +99,13 @@ class MaxSumAD(CycleProtocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        place = order.rank[problem.agent]
-        self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
-        self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
         self.functions = Functions([], {})
-        self.preferred: Row = []
         self.from_below: dict[str, list[Row]] = {}
         self.own: list[Row] = []
         self._nothing: list[Row] = []
-        self._domains: dict[str, list[wire.Value]] = {}
 
     def start_cycles(self) -> None:
-        """Choose the value with the lowest private cost, and send the domain to the holders of its functions."""
-        preference = self.settings.preference
-        self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
-        self.choose(cheapest(self.preferred))
-        self.multicast(self.below, Domain(list(self.problem.values)))
-        self.listen(self.above, self._receive_domains)
+        self.start_with(self.settings.preference)
 
     def _receive_domains(self, messages: Mapping[str, wire.Message]) -> None:
         """Make this robot's functions from the received domains."""

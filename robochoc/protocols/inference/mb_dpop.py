@@ -222,14 +222,10 @@ class MBDPOP(DPOP):
             case Label() as label:
                 self._store_label(sender, label)
                 self._measure()
-            case Proceed(separator):
-                self._proceed(separator)
             case Context(values):
                 self._receive_context(values)
-            case UTIL(width, costs):
-                self._util_message_handler(sender, width, costs)
-            case VALUE(assignment):
-                self._value_message_handler(assignment)
+            case Proceed() | UTIL() | VALUE() as others:
+                super().handle(sender, others)
             case never:
                 assert_never(never)
 

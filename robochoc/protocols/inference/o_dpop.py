@@ -43,7 +43,7 @@ import numpy as np
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, table_proves
-from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of, store_once
+from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of
 from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -130,23 +130,14 @@ class ODPOP(DPOP):
 
     def handle(self, sender: str, message: Message) -> None:
         match cast("Domain | Dimensions | Proceed | Ask | Good | Done | VALUE", message):
-            case Domain(values):
-                store_once(sender, values, self.domains, self.ancestors)
-                self._measure()
-            case Dimensions() as dimensions:
-                self._check_dimensions(sender, dimensions)
-                store_once(sender, dimensions, self.dimensions, self.children)
-                self._measure()
-            case Proceed(separator):
-                self._proceed(separator)
             case Ask():
                 self._receive_ask(sender)
             case Good(assignment, cost):
                 self._receive_good(sender, assignment, cost)
             case Done():
                 self._receive_bound(sender, math.inf)
-            case VALUE(assignment):
-                self._value_message_handler(assignment)
+            case Domain() | Dimensions() | Proceed() | VALUE() as others:
+                super().handle(sender, others)
             case never:
                 assert_never(never)
 

@@ -254,14 +254,11 @@ class SDPOP(DPOP, DynamicProtocol):
                 self._measure()
             case Dimensions() as dimensions:
                 self._store_dimensions(sender, dimensions)
+                self._measure()
             case Reuse():
                 self._receive_reuse(sender)
-            case Proceed(separator):
-                self._proceed(separator)
-            case UTIL(width, costs):
-                self._util_message_handler(sender, width, costs)
-            case VALUE(assignment):
-                self._value_message_handler(assignment)
+            case Proceed() | UTIL() | VALUE() as others:
+                super().handle(sender, others)
             case never:
                 assert_never(never)
 
@@ -285,7 +282,6 @@ class SDPOP(DPOP, DynamicProtocol):
         self.dimensions[child] = dimensions
         self._reports.add(child)
         self._renewed.add(child)
-        self._measure()
 
     def _receive_reuse(self, child: str) -> None:
         """Reuse a child's table: it did not have to be computed, or is the same after all."""
@@ -330,20 +326,14 @@ class SDPOP(DPOP, DynamicProtocol):
 
     def _proceed(self, separator: Sequence[str]) -> None:
         """Let the children proceed whose tables may have changed, and wait for their tables."""
-        if sorted(separator) != sorted(self._sizes) or not self._computes or self._proceeding:
-            own = ", ".join(self._sizes)
-            raise ValueError(f"{self.problem.agent} received axes {list(separator)}, but its separator is {own}")
-        if self._need.bytes > self.settings.memory:
-            raise ValueError(f"{self.problem.agent} must proceed, but has no room for its tables")
+        self._check_axes(separator, expected=self._computes and not self._proceeding)
         self._proceeding = True
         self._axes_changed = self.separator != tuple(separator)
         self.separator = tuple(separator)
         self._waiting = {*self._renewed}
         for child in self.children:
             if child in self._renewed:
-                needed = self.dimensions[child].separator
-                self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in needed)
-                self.send(child, Proceed(list(self._axes[child])))
+                self._let_proceed(child)
         if self._inputs != self._tabulated:
             tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
             self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
