@@ -25,8 +25,7 @@ from robochoc.app.pages import routes
 from robochoc.app.projects import Projects
 from robochoc.app.store import TeamStore
 from robochoc.app.texts import LANGUAGE, say
-from robochoc.view.address import loopback_socket, secret_path, url_of
-from robochoc.view.redirect import RedirectFile
+from robochoc.view.local_address import RedirectFile, loopback_socket, secret_path, url_of
 
 _RECONNECT_S = 30.0
 """The time for which a disconnected browser finds its page unchanged; later the page is built again."""

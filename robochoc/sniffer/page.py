@@ -14,8 +14,7 @@ from importlib.resources import files
 from typing import Literal
 
 from robochoc.system.plain_text import printable
-from robochoc.view.content_security import content_security_policy
-from robochoc.view.script import labels_script, viewer_script
+from robochoc.view.page_scripts import content_security_policy, labels_script, viewer_script
 
 Mode = Literal["served", "embedded"]
 

@@ -21,7 +21,7 @@ from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Assignment, Robot
 from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.trace import Trace
-from robochoc.view.drawing import path_of, still
+from robochoc.view.drawing import commands_at_home, path_of
 from robochoc.view.scene import DrawnDrone, Scene
 
 _MOST_DRONES = 2_000
@@ -105,7 +105,7 @@ class TraceScene:
 
     def _commands(self) -> list[bytes]:
         homes = zip(self._names, self._field.homes, strict=True)
-        return still(
+        return commands_at_home(
             Scene("", (), tuple(DrawnDrone(name, round(home[0]), home) for name, home in homes), self._field.axes)
         )
 

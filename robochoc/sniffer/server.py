@@ -21,7 +21,7 @@ from tornado.websocket import WebSocketClosedError
 from robochoc.sniffer.page import sniffer_page
 from robochoc.sniffer.page_data import BadRequestError
 from robochoc.sniffer.session import NotBegunError, SnifferSession
-from robochoc.view.address import loopback_socket, secret_path, url_of
+from robochoc.view.local_address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
 POLL_S = 0.1
@@ -60,7 +60,7 @@ async def _serve(
         serving = asyncio.create_task(Server(session, here, token).serve())
         if ready:
             ready(url)
-        async with in_browser(url, wanted=open_browser):
+        async with in_browser(url, enabled=open_browser):
             await serving
 
 

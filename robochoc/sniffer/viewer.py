@@ -17,8 +17,7 @@ from contextlib import suppress
 from typing import Self
 
 from robochoc.system.signals import signals_held
-from robochoc.view.address import loopback_socket, secret_path, url_of
-from robochoc.view.redirect import RedirectFile
+from robochoc.view.local_address import RedirectFile, loopback_socket, secret_path, url_of
 
 _PATIENCE_S = 2.0
 """The time limit for the end of the process."""

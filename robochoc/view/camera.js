@@ -1,16 +1,16 @@
-// Where the scene is looked at from. Lengths are meshcat's: all there is to see has radius 1; y is up.
+// The camera of the scene. Lengths are meshcat's: the scene has radius 1; y is up.
 class Camera {
   static FROM = { overview: [0.7, 0.42, 1], top: [0, 1, 0.001], front: [0, 0.16, 1] };
-  static UPRIGHT = [0.4, 0.55, 1]; // the overview where the window is higher than wide
-  static ROOM = 1.05; // of the view, around all that
-  static NEAR = 7; // cells that are seen around a drone that is followed
+  static UPRIGHT = [0.4, 0.55, 1]; // the overview if the window is higher than wide
+  static ROOM = 1.05; // size of the view, in sizes of the scene
+  static NEAR = 7; // cells that are visible around a followed drone
   static TURN = 450; // milliseconds
 
-  // `free` says which part of the window nothing else covers; `corners` are around all there is to see.
+  // `free` returns the part of the window that nothing else covers; `corners` are points around everything visible.
   constructor(viewer, corners, cell, free, still) {
     const THREE = MeshCat.THREE;
     this.viewer = viewer;
-    this.corners = corners.map(([x, y, z]) => new THREE.Vector3(x, z, -y)); // meshcat's own z is up
+    this.corners = corners.map(([x, y, z]) => new THREE.Vector3(x, z, -y)); // in meshcat's frame z is up
     this.cell = cell;
     this.free = free;
     this.still = still;
@@ -33,7 +33,7 @@ class Camera {
 
   get lens() { return this.viewer.camera; }
 
-  // Go to a view, by its name.
+  // Turn to a view, by its name.
   see(view, atOnce = false) {
     this.followed = null;
     this.say(view);
@@ -41,7 +41,7 @@ class Camera {
     this.turn(...this.from(upright ? Camera.UPRIGHT : Camera.FROM[view]), atOnce);
   }
 
-  // Stay behind `drone`, an object of the scene.
+  // Follow `drone`, an object of the scene.
   follow(drone) {
     this.followed = drone;
     this.say("follow");
@@ -51,7 +51,7 @@ class Camera {
     this.turn(away.add(this.at), this.at.clone());
   }
 
-  // The window has changed: keep the scene in the middle of what is free of it.
+  // After a change of the window: keep the scene in the middle of its free part.
   fit() {
     const { left, top, right, bottom } = this.free();
     const [width, height] = [innerWidth, innerHeight];
@@ -61,7 +61,7 @@ class Camera {
     this.viewer.set_dirty();
   }
 
-  // From where, in a direction, all corners are just seen, and what is in the middle then: [position, target].
+  // The nearest position in a direction from which all corners are visible, with the point in the middle.
   from(direction) {
     const THREE = MeshCat.THREE;
     const back = new THREE.Vector3(...direction).normalize();
@@ -70,7 +70,7 @@ class Camera {
     const seen = this.corners.map((corner) => [corner.dot(right), corner.dot(up), corner.dot(back)]);
     const half = Math.tan(this.lens.fov * Math.PI / 360) / Camera.ROOM;
     const shift = [0, 0];
-    // The least and the greatest slope of a line of sight along an axis of the picture, from a distance.
+    // The least and the greatest slope of lines of sight along an axis of the picture, from a distance.
     const slopes = (axis, distance) => {
       const all = seen.map((corner) => (corner[axis] - shift[axis]) / (distance - corner[2]));
       return [Math.min(...all), Math.max(...all)];
@@ -104,13 +104,13 @@ class Camera {
     this.viewer.set_dirty();
   }
 
-  // Once a frame: go on turning, and after the drone that is followed. True as long as there is more to do.
+  // Once a frame: continue turning, and following a drone. True as long as the camera moves.
   step(time) {
     const { controls } = this.viewer;
     if (this.followed) {
       const moved = this.followed.getWorldPosition(new MeshCat.THREE.Vector3()).sub(this.at);
       this.at.add(moved);
-      if (this.turning) { // both ends of the turn move with it
+      if (this.turning) { // both ends of the turn move with the drone
         this.turning.position.add(moved);
         this.turning.target.add(moved);
       } else {

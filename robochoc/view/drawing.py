@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterator, Sequence
+from html import escape
 from itertools import product
-from typing import assert_never
+from typing import NamedTuple, assert_never
 
 import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.layout import Axis, Point
+from robochoc.system.plain_text import printable
 from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
-from robochoc.view.label import label
 from robochoc.view.meshcat_commands import MeshcatCommands, Track
+from robochoc.view.meshes import HUB, TriangleMesh, box, disc, joined_shapes, prisms, quadrotor
 from robochoc.view.palette import GREY, RED, STONE, UNKNOWN, Colour, colours
 from robochoc.view.playback import DroneState, Playback
-from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, prisms, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
-from robochoc.view.walls import shape_of, walls_of
+from robochoc.view.walls import blocked_cell_faces, mesh_of_faces
+
+_EM = 44
+"""Font size in pixels: sharp at close range, and small in memory."""
+_HEIGHT = 64
+_LONGEST = 24
+
 
 _Corners = npt.NDArray[np.float64]
 """The lowest and the highest x, y and z, a row each."""
@@ -30,80 +38,80 @@ _LINE: Colour = (0.45, 0.52, 0.60)
 _GROUND: Colour = (0.50, 0.56, 0.62)
 _WHITE: Colour = (1, 1, 1)
 _MARGIN = 0.8
-"""Ground around the outermost drones, in cells."""
+"""The width of the ground around the outermost drones, in cells."""
 _EYE = np.array([0.7, -1.0, 0.42])
 """The direction of the camera: in front of row 1, a little to the right, from above."""
 _FIELD_OF_VIEW_DEG = 28
-_ROOM = 1.06
-"""The share of the view for the scene itself: the axes' labels need some."""
+_VIEW_MARGIN = 1.06
+"""The size of the view, in sizes of the scene: the axes' labels need space."""
 _TEXT = 0.045
-"""The height of text, as a part of the scene's radius."""
+"""The height of text, in radii of the scene."""
 _READABLE = 0.03
-"""The least height of text, likewise."""
+"""The least height of text, in radii of the scene."""
 _NAME_WIDTH = 0.8
-"""The greatest width of a drone's name, in cells: its neighbour's needs room, too."""
+"""The greatest width of a drone's name, in cells: the name of its neighbour needs space, too."""
 FPS = 30
 """Frames a second of the animation."""
 _FADE = 25
-"""Frames in which a drone that withdraws turns grey."""
-_CLOSE = 0.002
-"""The largest distance, in cells, between an animated drone and the place where it was flown."""
-_ALIKE = math.radians(0.5)
-"""By which angle, in radians, it may be turned."""
-_IN_THE_WAY = 0.9
+"""The number of frames in which a withdrawing drone turns grey."""
+_CLOSE_CELLS = 0.002
+"""The largest deviation of an animated drone from its flown position, in cells."""
+_ALIKE_RAD = math.radians(0.5)
+"""The largest deviation of its attitude, in radians."""
+_OBSTACLE_SIZE = 0.9
 """The size of an obstacle, in cells."""
 _OPACITIES = {"body": 0.35, "edges": 0.9}
 """Opacities of an obstacle's parts."""
 _BLOCK = 0.94
-"""The width of a blocked cell's block, in cells: one is told from the next."""
+"""The width of a blocked cell's block, in cells: neighbouring blocks are distinguishable."""
 _BLOCK_OPACITY = 0.85
 _WALL_OPACITY = 0.6
 _BESIDE_UNIT = 3.4
-"""The distance of the name of an axis with a unit from its numbers, in their heights: it is wider than one without."""
+"""The distance of the name of an axis with a unit from its numbers, in their heights: such a name is wider."""
 _FLAT = 0.02
-"""The height, in cells, of what lies flat on the ground."""
+"""The height of flat areas on the ground, in cells."""
 
 
 def commands(scene: Scene) -> list[bytes]:
     """Return the packed commands that make meshcat's viewer show `scene` and play its flight once."""
     if scene.playback is None:
-        return _drawn(scene, [drone.end for drone in scene.drones]).commands
-    meshcat = _drawn(scene, [drone.home for drone in scene.drones])
+        return _draw_scene(scene, [drone.end for drone in scene.drones]).commands
+    meshcat = _draw_scene(scene, [drone.home for drone in scene.drones])
     _draw_obstacles(meshcat, [place for _, place in scene.playback.obstacles])
     _animate(meshcat, scene, scene.playback)
     return meshcat.commands
 
 
-def still(scene: Scene) -> list[bytes]:
-    """Return the same without the flight: every drone stays at home."""
-    return _drawn(scene, [drone.home for drone in scene.drones]).commands
+def commands_at_home(scene: Scene) -> list[bytes]:
+    """Return the commands without the flight: every drone stays at home."""
+    return _draw_scene(scene, [drone.home for drone in scene.drones]).commands
 
 
 def path_of(number: int, name: str) -> str:
-    """Return the path in meshcat's tree, below its root, of the drone called `name`: the `number`-th, counted from 0.
+    """Return the path of a drone in meshcat's tree, from its name and its number, counted from 0.
 
-    The number keeps paths apart, and different from names that mean something in JavaScript.
+    The number makes paths unique, and different from names with a meaning in JavaScript.
     """
     return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", name)
 
 
 def corners(scene: Scene) -> list[list[float]]:
-    """Return points around all that is visible, axes' names too, in a frame scaled to radius 1 around the drones."""
-    extent, radius = _measured(scene)
-    names = [2 * name_at - origin for _, _, origin, name_at in _beside(scene.axes, _TEXT * radius)]
+    """Return points around all visible objects and names of axes, in a frame scaled to radius 1 around the drones."""
+    extent, radius = _extent_and_radius(scene)
+    names = [2 * name_at - origin for _, _, origin, name_at in _axis_lines(scene.axes, _TEXT * radius)]
     found: list[list[float]] = ((np.array([*_corners(extent), *names]) - extent.mean(axis=0)) / radius).tolist()
     return found
 
 
 def cell_of(scene: Scene) -> float:
-    """Return the length of a cell in that frame."""
-    return 1 / _measured(scene)[1]
+    """Return the length of a cell in the frame of `corners`."""
+    return 1 / _extent_and_radius(scene)[1]
 
 
-def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
-    """Draw everything, each drone at its point of `points`."""
+def _draw_scene(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
+    """Draw everything, with the drones at `points`."""
     meshcat = MeshcatCommands()
-    extent, radius = _measured(scene)
+    extent, radius = _extent_and_radius(scene)
     _aim(meshcat, extent, radius)
     _draw_ground(meshcat, scene, extent)
     _draw_box(meshcat, scene.axes)
@@ -118,7 +126,7 @@ def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
     return meshcat
 
 
-def _measured(scene: Scene) -> tuple[_Corners, float]:
+def _extent_and_radius(scene: Scene) -> tuple[_Corners, float]:
     """Return the extent of the scene, and the radius of the sphere around it."""
     points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.landing) if point]
     everything = np.array([*points, *_box(scene.axes)])
@@ -136,33 +144,33 @@ def _corners(extent: _Corners) -> _Corners:
 
 
 def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
-    """Scale any scene to radius 1 around the origin, where the lights are, and have the camera see all of it."""
+    """Scale the scene to radius 1 around the origin, where the lights are, and place the camera so that it sees all."""
     x, y, z = (float(part) for part in -extent.mean(axis=0) / radius)
     meshcat.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
     for default in ("/Grid", "/Axes"):
         meshcat.set(default, "visible", value=False)
     around = (_corners(extent) - extent.mean(axis=0)) / radius
-    x, y, z = (float(part) for part in _from_where_to_see(around))
+    x, y, z = (float(part) for part in _camera_position(around))
     camera = "/Cameras/default/rotated/<object>"
     meshcat.set(camera, "fov", _FIELD_OF_VIEW_DEG)
     meshcat.set(camera, "position", [x, z, -y])  # the camera's own y is up
 
 
-def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return where, in the direction of `_EYE`, a camera that looks at the origin has all `corners`."""
+def _camera_position(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the camera position, in the direction of `_EYE`, from which all `corners` are visible."""
     back: npt.NDArray[np.float64] = _EYE / np.linalg.norm(_EYE)
     right = np.cross([0, 0, 1], back)
     right /= np.linalg.norm(right)
     across = np.abs(corners @ np.column_stack([right, np.cross(back, right)])).max(axis=1)
-    distance = corners @ back + _ROOM * across / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
+    distance = corners @ back + _VIEW_MARGIN * across / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
     return back * float(distance.max())
 
 
 def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
-    """Draw a plane, and on it each drone's pad in the colour of its row."""
+    """Draw a plane, and each drone's pad in the colour of its row."""
     (left, front, _), (right, back, _) = extent
     corners = np.array([[left, front, 0], [right, front, 0], [right, back, 0], [left, back, 0]])
-    plane = Shape(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)))
+    plane = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)))
     meshcat.mesh("ground/plane", plane, _GROUND, opacity=0.3)
     meshcat.place("ground/plane", (0, 0, scene.ground - 0.02))
     if scene.drones:
@@ -173,7 +181,7 @@ def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> No
 
 
 def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
-    """Draw the edges, the walls behind and below with their grid, and very faintly every cell."""
+    """Draw the edges, the back and bottom sides with their grid, and every cell very faintly."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
     parts = {
@@ -188,17 +196,17 @@ def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
 
 
 def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
-    """Draw each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
-    for number, axis, origin, name_at in _beside(axes, height):
+    """Draw the name and the numbers of each named axis, beside the edge of the box nearest to the viewer."""
+    for number, axis, origin, name_at in _axis_lines(axes, height):
         for at, text in axis.ticks:
             spot = origin.copy()
             spot[number] = at
-            _write(meshcat, f"axes/{axis.name} {text}", text, spot, height)
-        _write(meshcat, f"axes/{axis.name}", axis.title, name_at, 1.2 * height)
+            _draw_text(meshcat, f"axes/{axis.name} {text}", text, spot, height)
+        _draw_text(meshcat, f"axes/{axis.name}", axis.title, name_at, 1.2 * height)
 
 
-def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
-    """Yield the named axes: number, axis, the middle of the line for its numbers, the point for its name."""
+def _axis_lines(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
+    """Yield the named axes: number, axis, the middle of the line of its numbers, the point of its name."""
     low, high = _box(axes)
     middle = (low + high) / 2
     near = 1.2 * height
@@ -214,7 +222,7 @@ def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _C
 
 
 def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
-    """Return both ends of every line parallel to an axis, where walls meet."""
+    """Return both ends of all lines that are parallel to an axis."""
     ends = []
     for along in range(3):
         across = [walls[axis] if axis != along else walls[axis][[0, -1]] for axis in range(3)]
@@ -227,27 +235,27 @@ def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64
 def _draw_drones(
     meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], points: Sequence[Point], radius: float
 ) -> None:
-    texts = _texts([drone.name for drone in drones], _READABLE * radius)
+    texts = _drone_texts([drone.name for drone in drones], _READABLE * radius)
     drawn = zip(drones, points, texts, row_colours(drones), strict=True)
     for number, (drone, point, text, colour) in enumerate(drawn):
         path = path_of(number, drone.name)
         meshcat.mesh(f"{path}/body", quadrotor(), colour)
         meshcat.place(f"{path}/body", HUB)
-        height = min(_TEXT * radius, _NAME_WIDTH / label(text).aspect)
-        _write(meshcat, f"{path}/name", text, np.array([0, 0, 0.42]), height)
+        height = min(_TEXT * radius, _NAME_WIDTH / label_picture(text).aspect)
+        _draw_text(meshcat, f"{path}/name", text, np.array([0, 0, 0.42]), height)
         meshcat.place(path, point)
 
 
 def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> None:
     for number, place in enumerate(obstacles, 1):
-        meshcat.mesh(f"obstacles/{number}/body", box(place, _IN_THE_WAY), RED, opacity=_OPACITIES["body"])
-        sides = [np.array([at - _IN_THE_WAY / 2, at + _IN_THE_WAY / 2]) for at in place]
+        meshcat.mesh(f"obstacles/{number}/body", box(place, _OBSTACLE_SIZE), RED, opacity=_OPACITIES["body"])
+        sides = [np.array([at - _OBSTACLE_SIZE / 2, at + _OBSTACLE_SIZE / 2]) for at in place]
         meshcat.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
 
 
-def _blocks(scene: Scene) -> dict[float, Shape]:
-    """Return the blocks of blocked cells, those that appear at the same time as one shape, by that time."""
-    found: dict[float, list[Shape]] = {}
+def _blocks(scene: Scene) -> dict[float, TriangleMesh]:
+    """Return the blocks of blocked cells by the time of their appearance, joined to one mesh each."""
+    found: dict[float, list[TriangleMesh]] = {}
     for block in (block for block in scene.blocks if not block.is_cube):
         x, y, top = block.top
         shape = box((x, y, (top + scene.ground) / 2), (_BLOCK, _BLOCK, top - scene.ground))
@@ -255,19 +263,19 @@ def _blocks(scene: Scene) -> dict[float, Shape]:
     return {since_s: joined_shapes(shapes) for since_s, shapes in found.items()}
 
 
-def _walls(scene: Scene) -> Shape | None:
+def _walls(scene: Scene) -> TriangleMesh | None:
     """Return the walls of a three-dimensional map."""
     if scene.faces is not None:
-        return shape_of(scene.faces.reshape(-1, 3))
+        return mesh_of_faces(scene.faces.reshape(-1, 3))
     cubes = [block for block in scene.blocks if block.is_cube]
     places = np.rint(np.array([cube.top for cube in cubes]).reshape(-1, 3)).astype(np.int64)
     sides = np.array([cube.sides for cube in cubes], dtype=np.int64)
     low, high = np.array([axis.low for axis in scene.axes]), np.array([axis.high for axis in scene.axes])
-    return walls_of(places, sides, low, high, _BLOCK)
+    return blocked_cell_faces(places, sides, low, high, _BLOCK)
 
 
 def _draw_walls(meshcat: MeshcatCommands, scene: Scene) -> None:
-    """Draw walls as high as the box, and what nobody knows flat on the ground."""
+    """Draw walls as high as the box, and unknown parts flat on the ground."""
     if scene.walls is None:
         return
     top = scene.axes[2].high + 0.5
@@ -283,17 +291,17 @@ def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None
     tracks: list[Track] = []
     for number, (drone, colour) in enumerate(zip(scene.drones, paint, strict=True)):
         path = path_of(number, drone.name)
-        tracks += _moves(path, playback, number)
+        tracks += _motion_tracks(path, playback, number)
         if playback.states[number]:
-            tracks.append(_painting(f"{path}/body/<object>", playback.states[number], colour))
+            tracks.append(_colour_track(f"{path}/body/<object>", playback.states[number], colour))
     for number, (seen_s, _) in enumerate(playback.obstacles, 1):
         if seen_s > 0:
             tracks += [
-                _appearing(f"obstacles/{number}/{part}/<object>", seen_s, opacity)
+                _appearance_track(f"obstacles/{number}/{part}/<object>", seen_s, opacity)
                 for part, opacity in _OPACITIES.items()
             ]
     tracks += [
-        _appearing(f"blocks/{since_s:g} s/<object>", since_s, _BLOCK_OPACITY)
+        _appearance_track(f"blocks/{since_s:g} s/<object>", since_s, _BLOCK_OPACITY)
         for since_s in _blocks(scene)
         if since_s > 0
     ]
@@ -301,14 +309,16 @@ def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None
         meshcat.animate(tracks, FPS)
 
 
-def _moves(path: str, playback: Playback, number: int) -> Iterator[Track]:
+def _motion_tracks(path: str, playback: Playback, number: int) -> Iterator[Track]:
     """Yield the tracks of a drone's positions and attitudes, if it moves at all."""
     frames = FPS * playback.times
     positions, attitudes = playback.positions[:, number], playback.attitudes[:, number]
-    if np.linalg.norm(positions - positions[0], axis=1).max() > _CLOSE:
-        yield Track(path, "position", "vector3", _keys(frames, positions, position_keys(frames, positions, _CLOSE)))
-    if angle(attitudes, attitudes[0]).max() > _ALIKE:
-        keys = attitude_keys(frames, attitudes, _ALIKE)
+    if np.linalg.norm(positions - positions[0], axis=1).max() > _CLOSE_CELLS:
+        yield Track(
+            path, "position", "vector3", _keys(frames, positions, position_keys(frames, positions, _CLOSE_CELLS))
+        )
+    if angle(attitudes, attitudes[0]).max() > _ALIKE_RAD:
+        keys = attitude_keys(frames, attitudes, _ALIKE_RAD)
         yield Track(f"{path}/body", "quaternion", "quaternion", _keys(frames, attitudes, keys))
 
 
@@ -316,47 +326,47 @@ def _keys(frames: Samples, values: Samples, keys: Keys) -> list[tuple[float, lis
     return [*zip(frames[keys].round(6).tolist(), values[keys].tolist(), strict=True)]
 
 
-def _painting(path: str, states: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
+def _colour_track(path: str, states: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
     """Return the track of a drone's colour."""
     keys: list[tuple[float, Colour]] = [(0, colour)]
-    for at_s, look in states:
+    for at_s, state in states:
         begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
-        keys += [(begin, now), (begin + _FADE, colour_of(look, colour))]
+        keys += [(begin, now), (begin + _FADE, colour_of(state, colour))]
     return Track(path, "material.color", "color", keys)
 
 
-def _appearing(path: str, at_s: float, opacity: float) -> Track:
-    """Return the track of an obstacle that comes into sight."""
+def _appearance_track(path: str, at_s: float, opacity: float) -> Track:
+    """Return the track of an obstacle that becomes visible."""
     begin = FPS * at_s
     return Track(path, "material.opacity", "number", [(0, [0.0]), (begin, [0.0]), (begin + _FADE, [opacity])])
 
 
-def _texts(names: Sequence[str], readable: float) -> list[str]:
-    """Return the texts on the drones: their names; where those would be too small, the 3.1 of `Robot3.1`."""
-    if all(_NAME_WIDTH / label(name).aspect >= readable for name in names):
+def _drone_texts(names: Sequence[str], readable: float) -> list[str]:
+    """Return the texts on the drones: their names; if those would be too small, only numbers, as 3.1 of `Robot3.1`."""
+    if all(_NAME_WIDTH / label_picture(name).aspect >= readable for name in names):
         return list(names)
     word = re.split("[0-9]", names[0])[0]
     numbered = all(name.startswith(word) and name[len(word) :][:1].isdecimal() for name in names)
     return [name[len(word) :] for name in names] if numbered else list(names)
 
 
-def _write(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
-    picture = label(text)
+def _draw_text(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.float64], height: float) -> None:
+    picture = label_picture(text)
     x, y, z = (float(part) for part in at)
     meshcat.sprite(path, picture.svg)
     meshcat.place(path, (x, y, z), (height * picture.aspect, height, 1))
 
 
 def row_colours(drones: Sequence[DrawnDrone]) -> list[Colour]:
-    """Return the colour of each drone: that of its row."""
+    """Return the colour of each drone, which is that of its row."""
     groups = sorted({drone.group for drone in drones})
     shades = dict(zip(groups, colours(len(groups)), strict=True))
     return [shades[drone.group] for drone in drones]
 
 
-def colour_of(look: DroneState, colour: Colour) -> Colour:
-    """Return the colour of a drone in this state, if that of its row is `colour`."""
-    match look:
+def colour_of(state: DroneState, colour: Colour) -> Colour:
+    """Return the colour of a drone in a state; `colour` is that of its row."""
+    match state:
         case DroneState.FLIES:
             return colour
         case DroneState.WITHDRAWN:
@@ -365,3 +375,26 @@ def colour_of(look: DroneState, colour: Colour) -> Colour:
             return RED
         case _ as never:
             assert_never(never)
+
+
+class LabelPicture(NamedTuple):
+    """An SVG picture of a label, and its width divided by its height. The browser draws it in its own fonts."""
+
+    svg: str
+    aspect: float
+
+
+def label_picture(text: str) -> LabelPicture:
+    """Return `text` in white with a dark outline, readable on any background; cut if it is too long."""
+    shown = printable(text)
+    if len(shown) > _LONGEST:
+        shown = shown[: _LONGEST - 1] + "…"
+    ems = sum(1.1 if unicodedata.east_asian_width(sign) in "WF" else 0.62 for sign in shown)
+    width = round(ems * _EM) + 24
+    svg = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{_HEIGHT}">'
+        f'<text x="50%" y="46" text-anchor="middle" font-family="system-ui,sans-serif" font-size="{_EM}"'
+        ' font-weight="600" fill="#fff" stroke="#1d2733" stroke-width="9" stroke-linejoin="round"'
+        f' paint-order="stroke">{escape(shown)}</text></svg>'
+    )
+    return LabelPicture(svg, width / _HEIGHT)

@@ -1,4 +1,4 @@
-"""Key frames: the samples of a motion that a player needs. It interpolates between them."""
+"""Key frames: the samples of a motion between which a player interpolates."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ import numpy.typing as npt
 Samples = npt.NDArray[np.float64]
 """Times: (T,). Positions: (T, 3). Attitudes: (T, 4), unit quaternions x, y, z, w."""
 Keys = npt.NDArray[np.int64]
-"""The numbers of the samples that are kept, in order; always the first and the last."""
+"""The numbers of the chosen samples, in order; always with the first and the last."""
 
 _NEARLY_ONE = 1 - 1e-9
-"""Quaternions with a larger product are as good as equal."""
+"""Quaternions with a larger product count as equal."""
 
 
 def position_keys(times: Samples, positions: Samples, tolerance: float) -> Keys:
-    """Return the samples to keep so that straight moves between them are never further off than `tolerance`."""
+    """Return the samples between which straight moves deviate from the motion by at most `tolerance`."""
 
-    def off(first: int, last: int, between: Samples) -> Samples:
+    def error(first: int, last: int, between: Samples) -> Samples:
         start, end = positions[first], positions[last]
         line = start + between[:, None] * (end - start)
         return _lengths(positions[first + 1 : last] - line)
 
-    return _kept(times, off, tolerance)
+    return _key_samples(times, error, tolerance)
 
 
 def attitude_keys(times: Samples, attitudes: Samples, tolerance: float) -> Keys:
-    """Return the same for attitudes, with even turns between them (slerp). `tolerance` is an angle, in radians."""
+    """Return the samples for attitudes, with uniform turns between them (slerp). `tolerance` is an angle in radians."""
 
-    def off(first: int, last: int, between: Samples) -> Samples:
+    def error(first: int, last: int, between: Samples) -> Samples:
         turned = slerp(attitudes[first], attitudes[last], between)
         return angle(turned, attitudes[first + 1 : last])
 
-    return _kept(times, off, tolerance)
+    return _key_samples(times, error, tolerance)
 
 
 def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
@@ -53,7 +53,7 @@ def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
 
 def angle(one: Samples, other: Samples) -> Samples:
     """Return the angles, in radians, between two rows of attitudes."""
-    # By the sine: the cosine of a small angle is 1, whatever it is.
+    # By the sine: the cosine of any small angle is 1 in floating point.
     apart = np.minimum(_lengths(one - other), _lengths(one + other))
     return np.asarray(4 * np.arcsin(np.clip(apart / 2, 0, 1)))
 
@@ -62,8 +62,8 @@ def _lengths(rows: Samples) -> Samples:
     return np.asarray(np.sqrt(np.einsum("...c,...c->...", rows, rows)))
 
 
-def _kept(times: Samples, off: Callable[[int, int, Samples], Samples], tolerance: float) -> Keys:
-    """Return the samples to keep, after Douglas and Peucker: the furthest sample between two keys becomes a key.
+def _key_samples(times: Samples, error: Callable[[int, int, Samples], Samples], tolerance: float) -> Keys:
+    """Return the key samples, after Douglas and Peucker: the furthest sample between two keys becomes a key.
 
     D. Douglas, T. Peucker: Algorithms for the reduction of the number of points required to represent a digitized
     line. Cartographica 10(2), 1973.
@@ -75,7 +75,7 @@ def _kept(times: Samples, off: Callable[[int, int, Samples], Samples], tolerance
         if last == first + 1:
             continue
         between = (times[first + 1 : last] - times[first]) / (times[last] - times[first])
-        errors = off(first, last, between)
+        errors = error(first, last, between)
         worst = int(errors.argmax())
         if errors[worst] > tolerance:
             middle = first + 1 + worst

@@ -1,14 +1,14 @@
-// Labels that can be read: none is too small, and of those that would cover each other one is shown. Names of axes come
-// first, then the drone that is followed, then the drones nearest to the viewer, then the numbers of axes.
+// Keeps labels readable: none is too small, and of labels that cover each other one is shown. Names of axes have
+// priority, then the followed drone, then the drones nearest to the viewer, then the numbers of axes.
 class Labels {
   static EVERY = 200; // milliseconds
-  static STAYS = 0.9; // the depth of a label that is shown already counts less, so that labels do not flicker
-  static ROOM = 0.85; // in which a label stands alone, in sizes of its picture
+  static STAYS = 0.9; // factor of the depth of visible labels, so that labels do not flicker
+  static ROOM = 0.85; // space of a label, in sizes of its picture
   static HEIGHT_MIN = 16; // pixels of a label's picture: its text is then 11 pixels high
   static LARGER_MAX = 2.5;
 
-  // `names` are the scene's objects in the order of the drones; `axes` is the object that holds the labels of axes;
-  // `size` gives the width and the height of the picture, in pixels.
+  // `names` are the scene's objects in the order of the drones; `axes` is the object with the labels of axes;
+  // `size` returns the width and the height of the picture, in pixels.
   constructor(viewer, names, axes, size = () => [innerWidth, innerHeight]) {
     this.viewer = viewer;
     this.size = size;
@@ -18,7 +18,7 @@ class Labels {
     this.followed = -1;
   }
 
-  // Once a frame. What moves slowly needs no more than a few looks a second.
+  // Once a frame; labels are updated only every `EVERY` ms.
   step(now) {
     if (now < this.due) return;
     this.due = now + Labels.EVERY;
@@ -42,7 +42,7 @@ class Labels {
     }
   }
 
-  // Where a label is in the picture, half as wide and as high as its text; nothing behind the viewer.
+  // The position of a label in the picture, and half its width and height; undefined behind the viewer.
   box(label, rank) {
     const THREE = MeshCat.THREE;
     const lens = this.viewer.camera;
@@ -62,7 +62,7 @@ class Labels {
     };
   }
 
-  // The label's picture grows upwards: it does not cover what it names.
+  // The label's picture grows upwards, so that it does not cover its object.
   enlarge(label, larger) {
     const picture = label.children.find((child) => child.isSprite);
     if (picture && (picture.renderOrder === 0 || Math.abs(picture.scale.y - larger) > 0.02)) {

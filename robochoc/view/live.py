@@ -1,7 +1,7 @@
-"""The scene in meshcat's live viewer: the page from a server of our own, the commands over its WebSocket.
+"""The scene in meshcat's live viewer: our own server sends the page, and the commands over a WebSocket.
 
-meshcat's server listens on every interface, with a zmq socket beside it, and outlives its parent. This one is the
-calling thread itself, on the loopback interface only, below a path that cannot be guessed (`loopback.py`).
+meshcat's server is not used: it listens on every interface, opens a zmq socket, and outlives its parent. This server
+runs in the calling thread, on the loopback interface only, below an unguessable path (`loopback.py`).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from contextlib import suppress
 
 from tornado.web import Application
 
-from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.drawing import commands
+from robochoc.view.local_address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretPage, SecretSocket, application, in_browser, served
 from robochoc.view.page import live_page
 from robochoc.view.scene import Scene
@@ -22,16 +22,16 @@ from robochoc.view.scene import Scene
 def serve_scene(
     scene: Scene, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
 ) -> None:
-    """Show `scene` to every browser of this machine that asks, until interrupted (Ctrl-C); then return.
+    """Show `scene` to browsers of this machine, until interrupted (Ctrl-C); then return.
 
     Args:
-        scene: What to show.
-        port: The port; 0 is any free one.
-        open_browser: Whether the user's browser is asked to show it.
+        scene: The scene.
+        port: The port; 0 stands for any free port.
+        open_browser: Whether to open the scene in the user's browser.
         ready: Called with the URL once it can be opened.
 
     Raises:
-        OSError: The port is taken.
+        OSError: The port is in use.
     """
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(scene, port, ready, open_browser=open_browser))
@@ -44,7 +44,7 @@ async def _serve(scene: Scene, port: int, ready: Callable[[str], None] | None, *
         async with served(_application(scene, here.getsockname()[1], secret), here):
             if ready:
                 ready(url)
-            async with in_browser(url, wanted=open_browser):
+            async with in_browser(url, enabled=open_browser):
                 await asyncio.Event().wait()
 
 
@@ -58,7 +58,7 @@ def _application(scene: Scene, port: int, secret: str) -> Application:
 
 
 class _Commands(SecretSocket):
-    """Sends each browser everything from the start."""
+    """Sends all commands to each browser."""
 
     def initialize(self, secret: str, commands: list[bytes]) -> None:
         self.secret = secret

@@ -1,8 +1,8 @@
 """A web server for pages on this machine alone.
 
 It listens on the loopback interface only, in the calling thread, and ends with it. All paths are below an unguessable
-one, as others may use this machine, too. Other sites in the same browser get nothing from it: a Host that is not this
-machine's (DNS rebinding) is not found, and tornado refuses a WebSocket of another Origin.
+one, since the machine may have other users. Other sites in the same browser have no access: a Host that is not this
+machine's (DNS rebinding) gets 404, and tornado refuses a WebSocket of another Origin.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from tornado.iostream import IOStream
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketHandler
 
-from robochoc.view.redirect import RedirectFile
+from robochoc.view.local_address import RedirectFile
 
 _HOSTS = r"(127\.0\.0\.1|localhost)$"
 _LONGEST_MESSAGE_BYTES = 1024
-"""Browsers have nothing to send."""
+"""Browsers do not send messages."""
 _LONGEST_REQUEST_BYTES = 1 << 16
 REQUEST_S = 30.0
 """The time limit for receiving a request; a connection without one is then closed."""
@@ -73,12 +73,12 @@ async def served(application: Application, listening: socket) -> AsyncIterator[N
 
 
 @asynccontextmanager
-async def in_browser(url: str, *, wanted: bool) -> AsyncIterator[None]:
-    """Ask the user's browser to show `url`, if `wanted`. Its command line does not have the secret path.
+async def in_browser(url: str, *, enabled: bool) -> AsyncIterator[None]:
+    """Open `url` in the user's browser, if `enabled`. Its command line does not contain the secret path.
 
-    It is started in a thread: a browser for the terminal returns when it is closed.
+    It is started in a thread: a browser for the terminal returns only when it is closed.
     """
-    if not wanted:
+    if not enabled:
         yield
         return
     with RedirectFile(url) as redirect:
@@ -93,15 +93,15 @@ def check_secret(given: str, secret: str) -> None:
 
 
 class SecretHandler(RequestHandler):
-    """Answers requests with the secret path, the first part of the URL's; none from a page of another site.
+    """Answers requests whose URL begins with the secret path, except those from pages of other sites.
 
-    Browsers store nothing: the next server at this port is another.
+    Browsers store nothing: the next server at this port is a different one.
     """
 
     secret: str
 
     def prepare(self) -> None:
-        """Refuse other requests."""
+        """Refuse requests without the secret, or from other sites."""
         check_secret(self.path_args[0], self.secret)
         origin = self.request.headers.get("Origin")
         if origin is not None and origin != f"http://{self.request.host}":
@@ -120,19 +120,19 @@ class SecretHandler(RequestHandler):
             self.set_header(name, value)
 
     def compute_etag(self) -> None:
-        """Return None: nothing is stored, so nothing is compared."""
+        """Return None, since browsers store nothing."""
 
     def write_error(self, status_code: int, **_: Any) -> None:  # noqa: ANN401 - tornado's signature
-        """Answer with one line of text that says what is wrong."""
+        """Answer with one line of text: the error."""
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code}: {self._reason}")
 
 
 class SecretPage(SecretHandler):
-    """A page that does not change."""
+    """A static page."""
 
     def initialize(self, secret: str, page: bytes) -> None:
-        """Take the page: HTML, UTF-8."""
+        """Store the page, which is HTML in UTF-8."""
         self.secret = secret
         self.page = page
 
@@ -143,12 +143,12 @@ class SecretPage(SecretHandler):
 
 
 class SecretSocket(WebSocketHandler):
-    """A WebSocket at the secret path. What browsers send is ignored."""
+    """A WebSocket at the secret path. Messages of browsers are ignored."""
 
     secret: str
 
     def prepare(self) -> None:
-        """Refuse other requests."""
+        """Refuse requests without the secret."""
         check_secret(self.path_args[0], self.secret)
 
     def on_message(self, message: str | bytes) -> None:

@@ -1,8 +1,8 @@
-"""meshcat without its server: what would go to it is kept, packed as its viewer reads it.
+"""Uses meshcat without its server: collects the messages to it, packed for its viewer.
 
-Only this module knows meshcat's Python side. meshcat is imported when a scene is drawn, not before: it brings a web
-server, zmq and IPython, a third of a second that other commands do not need. `Visualizer()` alone would start a server
-on all interfaces; given a window of ours, it only talks to that.
+Only this module uses meshcat's Python package. It is imported when a scene is drawn, not before: with its web server,
+zmq and IPython the import takes a third of a second. `Visualizer()` without arguments would start a server on all
+interfaces; with a window object of ours, it only calls that.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.layout import Point
+from robochoc.view.meshes import TriangleMesh
 from robochoc.view.palette import Colour
-from robochoc.view.quadrotor import Shape
 
 
 class Track(NamedTuple):
@@ -36,13 +36,13 @@ class _Command(Protocol):
 
 
 _FRONT, _BOTH = 0, 2
-"""Sides of faces that are drawn, as three.js numbers them."""
+"""The visible sides of faces, as three.js numbers them."""
 
 
 class MeshcatCommands:
-    """Draws by meshcat into `commands`: the packed messages that make its viewer show the same, in order.
+    """Draws by meshcat into `commands`: the packed messages for its viewer, in order.
 
-    Paths are meshcat's: names joined by `/`, below `/meshcat` unless they begin with `/`. The same calls make the
+    Paths are meshcat's: names joined by `/`, below `/meshcat` unless they begin with `/`. The same calls create the
     same bytes.
     """
 
@@ -52,17 +52,19 @@ class MeshcatCommands:
         self._root = self._meshcat.Visualizer(window=self)
 
     def send(self, command: _Command) -> None:
-        """Keep what meshcat would send to its server. meshcat calls this."""
-        self._keep(command.lower())
+        """Store a message from meshcat to its server. Called by meshcat."""
+        self._store(command.lower())
 
-    def mesh(self, path: str, shape: Shape, colour: Colour, opacity: float = 1, *, one_sided: bool = False) -> None:
+    def mesh(
+        self, path: str, shape: TriangleMesh, colour: Colour, opacity: float = 1, *, one_sided: bool = False
+    ) -> None:
         """Draw a solid at `path`. Its faces are flat, its colours are its shades times `colour`.
 
-        If it is `one_sided`, a face is seen from where its corners lie counterclockwise.
+        If it is `one_sided`, a face is visible only from the side from which its corners lie counterclockwise.
         """
         three = self._meshcat.geometry
         geometry = three.TriangularMeshGeometry(shape.vertices, shape.faces)
-        # Bytes where they do: half the size, times every drone.
+        # Bytes, where they suffice, halve the size of every drone.
         geometry.color = np.rint(255 * shape.colours).astype(np.uint8)
         if len(shape.vertices) <= np.iinfo(np.uint8).max:
             geometry.faces = shape.faces.astype(np.uint8)
@@ -76,17 +78,17 @@ class MeshcatCommands:
         )
         drawing = self._drawing(path, three.Mesh(geometry, material))
         drawing["object"]["geometries"][0]["data"]["attributes"]["color"]["normalized"] = True  # 255 means 1
-        self._keep(drawing)
+        self._store(drawing)
 
     def segments(self, path: str, points: npt.NDArray[np.float64], colour: Colour, opacity: float = 1) -> None:
-        """Draw thin lines at `path`. Each two of the N x 3 `points` are the ends of one."""
+        """Draw thin lines at `path`. Each pair of the N x 3 `points` has the ends of one line."""
         three = self._meshcat.geometry
         material = three.LineBasicMaterial(color=_hex(colour), opacity=opacity, depthWrite=False)
-        self._keep(self._drawing(path, three.LineSegments(three.PointsGeometry(points.T), material)))
+        self._store(self._drawing(path, three.LineSegments(three.PointsGeometry(points.T), material)))
 
     def sprite(self, path: str, svg: str) -> None:
-        """Put a picture at `path`, one unit wide and high. It faces the viewer, and nothing covers it."""
-        # meshcat's Python side has no sprites, but its viewer draws them: this is three.js's own format.
+        """Draw a picture at `path`, one unit wide and high. It faces the viewer, and nothing covers it."""
+        # meshcat's Python package has no sprites, but its viewer draws them: this is the format of three.js.
         picture = f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
         material = {"uuid": "material", "type": "SpriteMaterial", "map": "texture", "transparent": True}
         sprite = {
@@ -97,20 +99,20 @@ class MeshcatCommands:
             "materials": [{**material, "depthWrite": False, "depthTest": False}],
             "object": {"uuid": f"{path} object", "type": "Sprite", "material": "material"},
         }
-        self._keep({"type": "set_object", "path": self._at(path).path.lower(), "object": sprite})
+        self._store({"type": "set_object", "path": self._at(path).path.lower(), "object": sprite})
 
     def place(self, path: str, at: Point = (0, 0, 0), size: Point = (1, 1, 1)) -> None:
-        """Move what is at `path` to `at` and stretch it to `size`."""
+        """Move the object at `path` to `at`, and scale it to `size`."""
         matrix = np.diag([*size, 1.0])
         matrix[:3, 3] = at
         self._at(path).set_transform(matrix)
 
     def set(self, path: str, name: str, value: object) -> None:
-        """Set a property of the object at `path`, by three.js's name for it."""
+        """Set a property of the object at `path`, by its name in three.js."""
         self._at(path).set_property(name, value)
 
     def animate(self, tracks: Sequence[Track], fps: int) -> None:
-        """Play `tracks` once, all at the same time, and stay where they end."""
+        """Play `tracks` once, all at the same time, and stop at their end."""
         animation = self._meshcat.animation.Animation(default_framerate=fps)
         for track in tracks:
             animated = self._at(track.path)
@@ -123,23 +125,23 @@ class MeshcatCommands:
         return self._root[path] if path else self._root
 
     def _drawing(self, path: str, drawn: Any) -> dict[str, Any]:  # noqa: ANN401 - meshcat is untyped
-        # meshcat gives its objects ids by the clock and the network card: ours make every run's bytes the same.
+        # meshcat creates ids from the clock and the network card: our ids make the bytes of every run the same.
         for part, element in (("object", drawn), ("geometry", drawn.geometry), ("material", drawn.material)):
             element.uuid = f"{path} {part}"
         lowered: dict[str, Any] = self._meshcat.commands.SetObject(drawn, path=self._at(path).path).lower()
         return lowered
 
-    def _keep(self, message: dict[str, Any]) -> None:
-        import umsgpack  # noqa: PLC0415 - comes with meshcat, and like it only when a scene is drawn
+    def _store(self, message: dict[str, Any]) -> None:
+        import umsgpack  # noqa: PLC0415 - a dependency of meshcat, needed only when a scene is drawn
 
-        # Key frames are many, and single precision is fine enough to see.
+        # There are many key frames, and single precision is sufficient for display.
         precision = "single" if message["type"] == "set_animation" else "double"
         self.commands.append(umsgpack.packb(message, force_float_precision=precision))
 
 
 def _meshcat() -> Any:  # noqa: ANN401 - meshcat is untyped
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of the pyzmq it imports, about itself
+        warnings.simplefilter("ignore", DeprecationWarning)  # raised in pyzmq, about itself
         import meshcat  # noqa: PLC0415 - see above: only when a scene is drawn
     return meshcat
 

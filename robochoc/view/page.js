@@ -1,4 +1,4 @@
-// The page: everything together.
+// The page: connects the player, the time line, the camera, trails and labels.
 try {
   const THREE = MeshCat.THREE;
   const element = (id) => document.getElementById(id);
@@ -7,7 +7,7 @@ try {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   const narrow = matchMedia("(max-width: 40rem)");
-  // ?driven: a page around this one has the line of time. Nothing plays by itself, and there is no second line.
+  // ?driven: a surrounding page has the time line. Then nothing plays by itself, and this page shows no time line.
   const driven = new URLSearchParams(location.search).has("driven");
   const paintSky = () => {
     viewer.set_property(["Background"], "top_color", dark.matches ? [0.05, 0.07, 0.1] : [0.8, 0.88, 0.95]);
@@ -59,14 +59,14 @@ try {
   element("speed").addEventListener("change", () => setSpeed(Number(element("speed").value)));
   element("trail").addEventListener("change", () => setTrail(element("trail").value));
 
-  // The scene's own camera comes with the commands: the window decides how far off it stands.
+  // The scene's camera comes with the commands; its distance depends on the window.
   const handle = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     handle(command);
     if (String(command.path).startsWith("/Cameras")) fit();
   };
 
-  // The playback comes with the commands, at once or over the WebSocket: from then on its time is ours.
+  // The playback comes with the commands, at once or over the WebSocket: from then on the player controls its time.
   const load = viewer.animator.load.bind(viewer.animator);
   viewer.animator.load = (animations, options) => {
     load(animations, options);
@@ -106,7 +106,7 @@ try {
   chosen.addEventListener("change", () => follow(Number(chosen.value)));
   element("follow").disabled = chosen.disabled = !drones.length;
 
-  // The drone under the pointer, or the nearest within a finger's width.
+  // The drone under the pointer, or the nearest drone within a finger's width.
   const under = (event) => {
     let [found, least] = [-1, event.pointerType === "mouse" ? 20 : 30];
     drones.forEach((drone, number) => {
@@ -155,20 +155,20 @@ try {
     });
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select")) return;
-    if (event.key === " " && event.target.matches("button, summary")) return; // which it presses
+    if (event.key === " " && event.target.matches("button, summary")) return; // the key presses the button
     const does = Object.hasOwn(keys, event.key) ? keys[event.key] : keys[event.key.toLowerCase()];
     if (typeof does !== "function" || event.key.length > 1 && !Object.hasOwn(keys, event.key)) return;
     event.preventDefault();
     does(event);
   });
 
-  // Who points does not go by keys: space plays, and does not press the last button again.
+  // After a click the button loses the focus: then space plays, and does not press the button again.
   addEventListener("click", (event) => { if (event.detail) event.target.closest?.("button, summary")?.blur(); });
   addEventListener("click", (event) => { if (!element("keys").contains(event.target)) element("keys").open = false; });
 
   dark.addEventListener("change", paintSky);
   addEventListener("resize", fit);
-  // There, an epoch of many words, or the facts unfolded, take room from the scene.
+  // A long text of an epoch, or the unfolded facts, cover a part of the scene.
   new ResizeObserver(() => { if (narrow.matches) fit(); }).observe(element("caption"));
   paintSky();
 

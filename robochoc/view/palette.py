@@ -1,4 +1,4 @@
-"""Colours of rows: a ramp from dark violet to light yellow, so that rows differ in lightness, not only in hue."""
+"""Colours of the scene. Rows have a ramp from dark violet to light yellow, so that they differ in lightness, too."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ Colour = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""
 
 GREY: Colour = (0.62, 0.64, 0.67)
-"""Of withdrawn drones."""
+"""The colour of withdrawn drones."""
 RED: Colour = (0.86, 0.16, 0.18)
-"""Of obstacles, and of fallen drones."""
+"""The colour of obstacles, and of fallen drones."""
 STONE: Colour = (0.40, 0.44, 0.50)
-"""Of blocked cells, and of walls."""
+"""The colour of blocked cells, and of walls."""
 UNKNOWN: Colour = (0.73, 0.70, 0.62)
-"""Of the part of a map that nobody knows."""
+"""The colour of unknown parts of a map."""
 
 _RAMP = np.array(
     [
@@ -36,6 +36,6 @@ def colours(count: int) -> list[Colour]:
     return [(float(r), float(g), float(b)) for r, g, b in zip(red, green, blue, strict=True)]
 
 
-def web(colour: Colour) -> str:
-    """Return `colour` as a web page writes it."""
+def css_colour(colour: Colour) -> str:
+    """Return `colour` in CSS notation."""
     return "#" + "".join(f"{round(255 * part):02x}" for part in colour)

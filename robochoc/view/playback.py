@@ -1,4 +1,4 @@
-"""A flight log prepared for playback: where each drone was when, the epochs on the time line, and events.
+"""A flight log prepared for playback: positions of drones over time, epochs on the time line, and events.
 
 Lengths are in cells, as in `scene`; times in seconds from the beginning.
 """
@@ -17,14 +17,14 @@ from robochoc.flight.log import FlightEvent, FlightLog
 from robochoc.flight.mission import Leg, Mission, in_cells
 from robochoc.model.outcome import Verdict
 
-_HIT = "hits the ground"
+_HITS_GROUND = "hits the ground"
 """The last event of a drone that falls."""
 
 _Array = npt.NDArray[np.float64]
 
 
 class DroneState(StrEnum):
-    """The state that a drone's colour shows: that of its row, grey, or red."""
+    """The state of a drone, shown by its colour: that of its row, grey, or red."""
 
     FLIES = "flies"
     WITHDRAWN = "withdrawn"
@@ -33,11 +33,11 @@ class DroneState(StrEnum):
 
 @dataclass(frozen=True)
 class Chapter:
-    """An epoch: when its flight begins, what opened it, and its result."""
+    """An epoch: the beginning of its flight, the event that opened it, and its result."""
 
     begins_s: float
     opened_by: str
-    says: str
+    result: str
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,14 @@ class EventMark:
 
     at_s: float
     drone: int
-    says: str
+    text: str
 
 
 @dataclass(frozen=True, eq=False)
 class Playback:
     """A flight to be shown: arrays over T times and N drones.
 
-    `states` are each drone's changes of state, in order: since when it is in which.
+    `states` are each drone's changes of state, in order: the time, and the new state.
     """
 
     times: _Array
@@ -74,7 +74,7 @@ class Playback:
 
 
 def playback_of(mission: Mission, flown: FlightLog) -> Playback:
-    """Return the playback of `flown` in the box of `mission`, whose drones it flew."""
+    """Return the playback of `flown`, the flight of a mission, in the mission's box."""
     marks = [EventMark(event.at_s, event.drone, event.what) for event in flown.events]
     obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
     return Playback(
@@ -91,23 +91,23 @@ def playback_of(mission: Mission, flown: FlightLog) -> Playback:
     )
 
 
-def fell(flown: FlightLog) -> dict[int, FlightEvent]:
-    """Return the drones that have fallen, with the cause: their last event before they hit the ground."""
+def fallen_drones(flown: FlightLog) -> dict[int, FlightEvent]:
+    """Return the fallen drones by number, each with the cause: its last event before it hit the ground."""
     events: dict[int, list[FlightEvent]] = {}
     for event in flown.events:
         if np.isnan(flown.errors_m[event.drone]):
             events.setdefault(event.drone, []).append(event)
     for own in events.values():
-        if len(own) > 1 and own[-1].what == _HIT:
+        if len(own) > 1 and own[-1].what == _HITS_GROUND:
             own.pop()
     return {number: own[-1] for number, own in events.items()}
 
 
 def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
-    fallen = fell(flown).get(number)
+    fallen = fallen_drones(flown).get(number)
     falls_s = fallen.at_s if fallen else np.inf
     now = DroneState.FLIES
-    for leg, begins_s in _begun(mission, flown):
+    for leg, begins_s in _flown_legs(mission, flown):
         goal = leg.goals.get(number)
         then = now if goal is None else DroneState.WITHDRAWN if goal.lands else DroneState.FLIES
         if then is not now and begins_s < falls_s:
@@ -117,14 +117,14 @@ def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[f
         yield falls_s, DroneState.FALLEN
 
 
-def _begun(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
-    """Return the legs that were flown, and when each began."""
+def _flown_legs(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
+    """Return the flown legs, each with its beginning."""
     return [(leg, times.begins_s) for leg, times in zip(mission.legs, flown.legs, strict=False)]
 
 
 def _chapters(mission: Mission, flown: FlightLog) -> Iterator[Chapter]:
     flying: set[int] = set()
-    for leg, begins_s in _begun(mission, flown):
+    for leg, begins_s in _flown_legs(mission, flown):
         for number, goal in leg.goals.items():
             (flying.discard if goal.lands else flying.add)(number)
         yield Chapter(begins_s, leg.opened_by, f"{_words(leg.verdict)}, {_flying(flying, leg)}")

@@ -1,9 +1,9 @@
-// What time it is in the playback. meshcat's animator shows that time; it does not run by itself, so that speed, pauses and
-// steps are ours alone.
+// The time of the playback. meshcat's animator shows this time; it does not run by itself, so that only the player
+// controls speed, pauses and steps.
 class Player {
   static SPEEDS = [0.25, 0.5, 1, 2, 4];
   static LEAD = 0.7; // seconds before the playback begins by itself
-  static LONGEST = 0.5; // seconds from frame to frame: after more, the page was out of sight
+  static LONGEST = 0.5; // seconds from frame to frame: after more, the page was hidden
 
   constructor(duration) {
     this.duration = duration;

@@ -1,4 +1,4 @@
-"""The scene of an outcome, as data: the drones, how they flew, and the box around them.
+"""The scene of an outcome, as data: the drones, their flight, and the box around them.
 
 Lengths are in cells: one cell is one row, one column or one level. `drawing` draws it.
 """
@@ -17,16 +17,15 @@ from robochoc.formats.headline import describe_outcome
 from robochoc.maps.ground_map import ALL_SIDES
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
-from robochoc.view.footprints import DrawnWalls, walls_drawn
-from robochoc.view.playback import Playback, fell, playback_of
-from robochoc.view.voxel_faces import Faces, faces_drawn
+from robochoc.view.playback import Playback, fallen_drones, playback_of
+from robochoc.view.walls import DrawnWalls, Faces, wall_faces, wall_footprints
 
 
 @dataclass(frozen=True)
 class DrawnDrone:
     """A drone that begins at `home`, on the ground.
 
-    It ends at its `place` in the air, or at its `landing`, or stays there.
+    It ends at its `place` in the air, or at its `landing`, or stays at home.
     """
 
     name: str
@@ -38,15 +37,15 @@ class DrawnDrone:
 
     @property
     def end(self) -> Point:
-        """Return the last position."""
+        """The last position."""
         return self.place or self.landing or self.home
 
 
 @dataclass(frozen=True)
 class DrawnBlock:
-    """A blocked cell, from second `since_s` on: a block on the ground whose top has its middle at `top`.
+    """A blocked cell, from second `since_s` on: a block on the ground with the middle of its top at `top`.
 
-    Of a three-dimensional map it is a cube around `top`, seen from some `sides`, as `Volume` has them.
+    On a three-dimensional map it is a cube around `top`, visible from `sides`, as in `Volume.sides`.
     """
 
     top: Point
@@ -59,7 +58,7 @@ class DrawnBlock:
 class Scene:
     """One run, to be drawn. `facts` is the caption: pairs of a label and a text.
 
-    Without a `playback`, drones are where they are to be in the end.
+    Without a `playback`, drones are at their final places.
     """
 
     title: str
@@ -87,15 +86,15 @@ def scene_of(
     why_not: str = "",
     weighted: bool | None = None,
 ) -> Scene:
-    """Return the scene of `outcome`. Without a flight, the drones are where they are to be in the end.
+    """Return the scene of `outcome`. Without a flight, the drones are at their final places.
 
     Args:
-        outcome: What was decided.
-        mission: What `outcome` asks of the drones.
-        flown: How they flew it.
-        flown_mission: The mission that was flown, if it is not `mission` itself but the same in cells of another size.
-            Distances are then not to scale, and the scene names none.
-        why_not: Why nothing was flown, for the caption.
+        outcome: The outcome of a run.
+        mission: The mission of the outcome.
+        flown: The log of its flight.
+        flown_mission: The flown mission, if it is `mission` with cells of another size. Distances are then not to
+            scale, and the scene omits them.
+        why_not: The reason why nothing was flown, for the caption.
         weighted: Whether robots differ in weight, if that is known.
     """
     flown_mission = flown_mission or mission
@@ -104,14 +103,14 @@ def scene_of(
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
     playback = playback_of(flown_mission, flown) if flown else None
     blocks = tuple(_blocks(flown_mission, flown))
-    walls, faces = walls_drawn(flown_mission), faces_drawn(flown_mission)
+    walls, faces = wall_footprints(flown_mission), wall_faces(flown_mission)
     if faces is not None:
         blocks = tuple(block for block in blocks if not block.is_cube)
     return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback, blocks, walls, faces)
 
 
 def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:
-    """Return what happened, counted in robots; in drones where robots have several, or are not known."""
+    """Return the headline, with numbers of robots; or of drones, if robots have several, or are not known."""
     robots = {drone.robot for drone in mission.drones if drone.robot}
     if len(robots) == len(drones):
         return describe_outcome(outcome, len(robots), weighted=weighted)
@@ -120,7 +119,7 @@ def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], 
 
 
 def _drones(mission: Mission) -> Iterator[DrawnDrone]:
-    """Yield each drone, with its goal in the last leg that has one for it."""
+    """Yield each drone, with its last goal."""
     last: dict[int, Goal] = {}
     for leg in mission.legs:
         last.update(leg.goals)
@@ -135,7 +134,7 @@ def _drones(mission: Mission) -> Iterator[DrawnDrone]:
 
 
 def _blocks(mission: Mission, flown: FlightLog | None) -> Iterator[DrawnBlock]:
-    """Yield each block. Those of a later leg appear when it begins; of a leg that is not flown, never."""
+    """Yield each block. A block of a later leg appears when that leg begins, or never, if the leg is not flown."""
     for block in mission.blocks:
         if flown is None or not block.leg:
             yield DrawnBlock(_cell(mission, block.at), is_cube=block.is_cube, sides=block.sides)
@@ -149,7 +148,7 @@ def _cell(mission: Mission, metres: Point) -> Point:
 
 
 def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -> Iterator[tuple[str, str]]:
-    """Yield how the flight went, distances only where they are to scale; or why there was none."""
+    """Yield facts about the flight, distances only if they are to scale; or the reason why there was none."""
     if flown is None:
         if why_not:
             yield "flight", f"none: {why_not}"
@@ -159,7 +158,7 @@ def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -
         yield "from walls", f"{flown.nearest_wall.distance_m:.2f} m (set: {flown.nearest_wall.set_m:.2g} m)"
     if flown.nearest and is_to_scale:
         yield "separation", f"{flown.nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
-    for number, event in fell(flown).items():
+    for number, event in fallen_drones(flown).items():
         yield "fallen", f"{flown.names[number]} ({event.what})"
     if flown.nearest_fallen and is_to_scale:
         yield "from fallen", f"{flown.nearest_fallen.distance_m:.2f} m"

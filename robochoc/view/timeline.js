@@ -1,7 +1,7 @@
-// The line of time: where it is, where epochs begin, where something happened.
+// The time line: the present time, the beginnings of epochs, and events.
 class Timeline {
   static APART = 20; // pixels
-  static BRIEF = 0.5; // seconds: an epoch in which nobody had to fly is told together with the next
+  static BRIEF = 0.5; // seconds: a shorter epoch, without a flight, is shown together with the next
 
   constructor(playback, player) {
     this.playback = playback;
@@ -33,7 +33,7 @@ class Timeline {
     return button;
   }
 
-  // Every mark below its time; those that would hide each other side by side. A tick shows where they belong.
+  // Every mark is below its time; marks that would cover each other are side by side, with a tick at their time.
   spread() {
     const room = this.slider.parentElement.clientWidth;
     const marks = [...document.querySelectorAll("#marks button")].sort((a, b) => a.dataset.at - b.dataset.at);
@@ -55,12 +55,12 @@ class Timeline {
     this.hint.style.left = `${Math.max(Math.min(button.offsetLeft - this.hint.offsetWidth / 2, room), 0)}px`;
   }
 
-  // The epoch that flies at a time.
+  // The epoch at a time.
   at(time) {
     return this.playback.chapters.reduce((found, chapter, number) => (chapter.at <= time + 1e-6 ? number : found), 0);
   }
 
-  // Where the epoch before, or after, begins.
+  // The beginning of the previous, or the next, epoch.
   beside(time, forth) {
     const begins = [...this.playback.chapters.map((chapter) => chapter.at), this.playback.duration];
     return forth ? begins.find((at) => at > time + 1e-3) ?? this.playback.duration

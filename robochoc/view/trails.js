@@ -1,7 +1,7 @@
 "use strict";
 
-// What the drones have flown until now: one mesh, of a ribbon for each straight piece of a way. The pieces know their
-// times, so that a trail grows by telling the shader what time it is.
+// The flown paths of the drones until now: one mesh with a ribbon for each straight piece. The pieces have their times
+// as attributes, so that a trail grows by setting the shader's time.
 class Trails {
   static CORNERS = [0, -1, 0, 0, 1, 0, 1, 1, 0, 1, -1, 0];
   static WIDTH = 2.5; // pixels
@@ -63,7 +63,7 @@ class Trails {
     parent.add(this.mesh);
   }
 
-  // The pieces of one way, cut where its drone changes its states.
+  // The pieces of one path, cut where its drone changes its state.
   static add(parts, times, positions, states, colour) {
     const at = (time, key) => {
       const between = (time - times[key]) / (times[key + 1] - times[key]);
@@ -89,7 +89,7 @@ class Trails {
     }
   }
 
-  // "all", "none", or the last so many seconds.
+  // "all", "none", or a number of seconds.
   show(wanted) {
     if (this.mesh) this.mesh.visible = wanted !== "none";
     this.uniforms.lasting.value = wanted === "all" ? 1e9 : Number(wanted) || 1;

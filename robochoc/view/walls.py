@@ -1,28 +1,144 @@
-"""The blocked cells of a three-dimensional map, as seen from within, where its voxels are not known.
+"""Walls of a map for the scene: footprints of pixels, faces of voxels, or faces of blocked cells.
 
-A blocked cell has a face towards each free cell of the map. Each is drawn from that side alone: whoever looks from
-outside sees through the nearer walls, and the ceiling, onto the further ones and the floor.
+Pixels of a map of the ground are merged into few rectangles. On a three-dimensional map, occupied voxels have faces
+towards free ones; if the voxels are not known, blocked cells have faces towards free cells. Each face is drawn from one
+side only: from outside, the nearer walls and the ceiling are transparent, and the further walls and the floor are seen.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
+
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.view.quadrotor import Shape
+from robochoc.flight.mission import Mission, in_cells
+from robochoc.maps.walls import PixelFrame, VoxelFrame
+from robochoc.view.meshes import TriangleMesh
 
+_MOST_FACES = 20_000
+"""The largest number of faces of a map. If there are more, the size of voxels is doubled until they fit."""
+
+Faces = npt.NDArray[np.float64]
+"""The corners of faces (F, 4, 3), counterclockwise as seen from the free side."""
+Flags = npt.NDArray[np.bool_]
+
+_MOST_RECTANGLES = 4_000
+"""The largest number of rectangles of a map. If there are more, the size of pixels is doubled until they fit."""
+
+Corners = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 _Cells = npt.NDArray[np.int64]
 
 
-def walls_of(blocked: _Cells, sides: _Cells, low: _Cells, high: _Cells, width: float) -> Shape | None:
+@dataclass(frozen=True, eq=False)
+class DrawnWalls:
+    """The footprints of walls and of unknown parts: for each rectangle its corners (4, 2), counterclockwise."""
+
+    occupied: Corners
+    unknown: Corners
+
+
+def wall_footprints(mission: Mission) -> DrawnWalls | None:
+    """Return the footprints of a mission's walls in the cells of its box; None without walls in the plane."""
+    walls = mission.walls
+    frame = walls.frame if walls else None
+    if walls is None or not isinstance(frame, PixelFrame):
+        return None
+
+    def footprints(flags: Flags) -> Corners:
+        sides, factor = few_rectangles(flags)
+        left, low, right, high = factor * sides.T
+        corners = np.stack([left, low, right, low, right, high, left, high], axis=1).reshape(-1, 2)
+        rows, columns = flags.shape
+        places = frame.in_metres(np.minimum(corners, (columns, rows)).astype(np.float64))
+        flat = np.column_stack((places, np.zeros(len(places))))
+        return in_cells(mission, flat)[:, :2].reshape(-1, 4, 2)
+
+    return DrawnWalls(footprints(walls.occupied), footprints(walls.unknown))
+
+
+def few_rectangles(flags: Flags, most: int = _MOST_RECTANGLES) -> tuple[Numbers, int]:
+    """Return at most `most` rectangles that cover the flags, and the width of their unit in pixels."""
+    factor = 1
+    while len(found := rectangles(flags)) > most:
+        factor *= 2
+        rows, columns = flags.shape
+        even = np.pad(flags, ((0, rows % 2), (0, columns % 2)))
+        flags = even[::2, ::2] | even[1::2, ::2] | even[::2, 1::2] | even[1::2, 1::2]
+    return found, factor
+
+
+def rectangles(flags: Flags) -> Numbers:
+    """Return rectangles (K, 4) that cover exactly the set flags: the least x and y, and the first x and y beyond.
+
+    Consecutive pixels of a row are merged, and then equal runs of consecutive rows.
+    """
+    steps = np.diff(np.pad(flags, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    row, begin = np.nonzero(steps == 1)
+    end = np.nonzero(steps == -1)[1]
+    order = np.lexsort((row, end, begin))
+    row, begin, end = row[order], begin[order], end[order]
+    new = np.ones(len(row), dtype=bool)
+    new[1:] = (np.diff(begin) != 0) | (np.diff(end) != 0) | (np.diff(row) != 1)
+    first = np.flatnonzero(new)
+    last = np.append(first[1:], len(row)) - 1 if len(first) else first
+    return np.column_stack((begin[first], row[first], end[first], row[last] + 1)).astype(np.int64)
+
+
+def wall_faces(mission: Mission, most: int = _MOST_FACES) -> Faces | None:
+    """Return the faces of a mission's voxels in the cells of its box; None if it has no voxels.
+
+    Args:
+        mission: The mission.
+        most: The maximum number of faces. A larger voxel is occupied if any part of it is, and free if any part is and
+            no part is occupied.
+    """
+    walls = mission.walls
+    frame = walls.frame if walls else None
+    if walls is None or not isinstance(frame, VoxelFrame):
+        return None
+    occupied, free, factor = walls.occupied, ~walls.solid, 1
+    while len(found := faces(occupied, free)) > most:
+        factor *= 2
+        occupied, free = _halved(occupied), _halved(free)
+        free &= ~occupied
+    return in_cells(mission, frame.in_metres(factor * found.reshape(-1, 3))).reshape(-1, 4, 3)
+
+
+def faces(occupied: Flags, free: Flags) -> Faces:
+    """Return the faces of all occupied voxels towards free ones, in voxels. Flags are by z, y and x."""
+    found = []
+    for axis, side in product(range(3), (-1, 1)):
+        along = 2 - axis
+        beside = np.roll(np.pad(free, 1), -side, axis=along)[1:-1, 1:-1, 1:-1]
+        voxels = np.argwhere(occupied & beside)[:, ::-1].astype(np.float64)
+        face = np.zeros((4, 3))
+        face[:, axis] = (side + 1) / 2
+        face[:, [(axis + 1) % 3, (axis + 2) % 3]] = [(0, 0), (1, 0), (1, 1), (0, 1)][::side]
+        found.append(voxels[:, None] + face)
+    return np.concatenate(found)
+
+
+def _halved(flags: Flags) -> Flags:
+    """Return flags of voxels of twice the size, which are set if one of the eight parts is."""
+    even = np.pad(flags, [(0, size % 2) for size in flags.shape])
+    for axis in range(3):
+        lines = np.moveaxis(even, axis, 0)
+        even = np.moveaxis(lines[::2] | lines[1::2], 0, axis)
+    return np.asarray(even)
+
+
+def blocked_cell_faces(blocked: _Cells, sides: _Cells, low: _Cells, high: _Cells, width: float) -> TriangleMesh | None:
     """Return the faces of blocked cells, in cells; None: there are none.
 
     Args:
         blocked: The cells: x, y and z of each in a row.
-        sides: From which sides each is seen, as `Volume` has them. From another blocked cell, none is.
+        sides: The visible sides of each cell, as in `Volume.sides`. Sides towards blocked cells are not visible.
         low: The x, y and z of the first cell of the map.
-        high: Those of the last one.
-        width: The width of a face: with less than 1, one is told from the next.
+        high: The x, y and z of the last cell.
+        width: The width of a face: with less than 1, neighbouring faces are distinguishable.
     """
     taken = {*map(tuple, blocked.tolist())}
     corners = []
@@ -39,15 +155,15 @@ def walls_of(blocked: _Cells, sides: _Cells, low: _Cells, high: _Cells, width: f
             turn = [(-1, -1), (1, -1), (1, 1), (-1, 1)][::side]  # counterclockwise, seen from the other cell
             face[:, across] = np.array(turn) * width / 2
             corners.append((blocked[shown][:, None, :] + face).reshape(-1, 3))
-    return shape_of(np.concatenate(corners))
+    return mesh_of_faces(np.concatenate(corners))
 
 
-def shape_of(vertices: npt.NDArray[np.float64]) -> Shape | None:
-    """Return faces, of which each has four of the vertices (4 F, 3), as a shape; None: there are none."""
+def mesh_of_faces(vertices: npt.NDArray[np.float64]) -> TriangleMesh | None:
+    """Return the mesh of quadrilateral faces, given by four vertices each (4 F, 3); None without faces."""
     if not vertices.size:
         return None
     first = np.arange(0, len(vertices), 4)
     faces = np.concatenate(
         [np.column_stack([first, first + 1, first + 2]), np.column_stack([first, first + 2, first + 3])]
     )
-    return Shape(vertices, faces, np.ones_like(vertices))
+    return TriangleMesh(vertices, faces, np.ones_like(vertices))

@@ -20,7 +20,7 @@ from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.sniffer.server import Server
 from robochoc.sniffer.session import SnifferSession
-from robochoc.view.address import loopback_socket, url_of
+from robochoc.view.local_address import loopback_socket, url_of
 from tests.support.limits import HANG_S
 
 TOKEN = "a-path-that-nobody-guesses"  # noqa: S105 - it is for tests

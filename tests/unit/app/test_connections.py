@@ -14,7 +14,7 @@ from tornado.web import RequestHandler
 from robochoc.app import guard
 from robochoc.app.guard import BoundedConnection
 from robochoc.view import loopback
-from robochoc.view.address import loopback_socket
+from robochoc.view.local_address import loopback_socket
 from tests.support.limits import HANG_S
 
 HEAD = b"GET /x HTTP/1.1\r\nHost: localhost\r\n"

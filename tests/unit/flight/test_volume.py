@@ -16,9 +16,9 @@ from robochoc.model.expression import Constant, Name
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.drawing import commands
-from robochoc.view.legend import legend
+from robochoc.view.page import legend
 from robochoc.view.scene import scene_of
-from robochoc.view.walls import walls_of
+from robochoc.view.walls import blocked_cell_faces
 
 TEAM = Team(
     "flying",
@@ -82,7 +82,7 @@ def test_a_wall_has_a_face_towards_each_free_cell_of_the_map() -> None:
     for _ in range(20):
         taken = sorted(cell for cell in cells if chance.random() < 0.4)
         sides = chance.integers(0, 64, len(taken))
-        shape = walls_of(np.array(taken), sides, low, high, 0.9)
+        shape = blocked_cell_faces(np.array(taken), sides, low, high, 0.9)
         assert shape is not None
         wanted = set()
         for (x, y, z), seen in zip(taken, sides.tolist(), strict=True):
@@ -99,8 +99,8 @@ def test_a_wall_has_a_face_towards_each_free_cell_of_the_map() -> None:
             found.add((tuple(wall.tolist()), tuple(move.tolist())))
         assert found == wanted
         assert len(shape.faces) == 2 * len(wanted)
-    assert walls_of(np.array(cells), np.full(len(cells), 63), low, high, 0.9) is None
-    assert walls_of(np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64), low, high, 0.9) is None
+    assert blocked_cell_faces(np.array(cells), np.full(len(cells), 63), low, high, 0.9) is None
+    assert blocked_cell_faces(np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64), low, high, 0.9) is None
 
 
 def test_a_volume_is_read_and_a_wrong_one_told() -> None:

@@ -15,7 +15,7 @@ from robochoc.model.expression import Constant, Name
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.drawing import commands
-from robochoc.view.legend import legend
+from robochoc.view.page import legend
 from robochoc.view.scene import DrawnBlock, scene_of
 
 ROBOTS = tuple(

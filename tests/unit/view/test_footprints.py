@@ -11,9 +11,8 @@ import pytest
 from robochoc.flight.layout import Axis
 from robochoc.flight.mission import Mission
 from robochoc.maps.walls import VoxelFrame, Walls
-from robochoc.view.footprints import Flags, few_rectangles, rectangles
-from robochoc.view.quadrotor import prisms
-from robochoc.view.voxel_faces import faces, faces_drawn
+from robochoc.view.meshes import prisms
+from robochoc.view.walls import Flags, faces, few_rectangles, rectangles, wall_faces
 from tests.support.examples import count
 
 
@@ -100,11 +99,11 @@ def test_faces_are_where_the_voxels_are() -> None:
     occupied = free.copy()
     free[0, 0, 0], occupied[0, 0, 1] = True, True
     mission = mission_with(occupied, free)
-    drawn = faces_drawn(mission)
+    drawn = wall_faces(mission)
     assert drawn is not None
     corners = {tuple(corner) for corner in drawn.reshape(-1, 3).tolist()}
     assert corners == {(1.5, y, z) for y, z in product((2, 2.5), (3, 3.5))}
-    assert faces_drawn(replace(mission, walls=None)) is None
+    assert wall_faces(replace(mission, walls=None)) is None
 
 
 def test_many_voxels_are_drawn_as_fewer_larger_ones() -> None:
@@ -112,13 +111,13 @@ def test_many_voxels_are_drawn_as_fewer_larger_ones() -> None:
     free[::2, ::2, ::2] = False
     mission = mission_with(~free, free)
     most = 100
-    drawn = faces_drawn(mission, most)
+    drawn = wall_faces(mission, most)
     assert drawn is not None
     assert len(drawn) <= most
     # A floor stays one, and what is behind it is seen from above.
     free = np.ones((16, 16, 15), dtype=bool)
     free[:4] = False
-    drawn = faces_drawn(mission_with(~free, free), most)
+    drawn = wall_faces(mission_with(~free, free), most)
     assert drawn is not None
     assert 0 < len(drawn) <= most
     assert drawn[:, :, 2] == pytest.approx(5)

@@ -25,7 +25,7 @@ from robochoc.formats.result import result_json
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp
 from robochoc.view.page import scene_page
-from robochoc.view.palette import GREY, RED, web
+from robochoc.view.palette import GREY, RED, css_colour
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
 from tests.support.cases import looped
@@ -195,7 +195,7 @@ def test_who_leaves_turns_grey_when_it_leaves() -> None:
     colours = tracks_of(html)["5 R5.1/body/<object>.material.color"]
     assert [frame for frame, _ in colours] == [0, FPS * LEG_S, FPS * LEG_S + 25]
     assert colours[-1][1] == pytest.approx(GREY)
-    assert playback_in(html)["drones"][4]["states"] == [[LEG_S, "withdrawn", web(GREY)]]
+    assert playback_in(html)["drones"][4]["states"] == [[LEG_S, "withdrawn", css_colour(GREY)]]
 
 
 def test_who_comes_back_has_its_colour_again() -> None:
@@ -240,9 +240,9 @@ def test_what_the_flight_tells_of_one_that_falls_is_understood() -> None:
     failure = MotorFailure(mission.drones[1].name, 3.0, 1)
     scene = scene_of(outcome, mission, fly(mission, FlightConditions(failures=(failure,))))
     assert scene.playback
-    ((at_s, look),) = scene.playback.states[1]
+    ((at_s, state),) = scene.playback.states[1]
     assert at_s == pytest.approx(3.0, abs=0.05)
-    assert look is DroneState.FALLEN
+    assert state is DroneState.FALLEN
     assert "motor" in dict(scene.facts)["fallen"]
 
 

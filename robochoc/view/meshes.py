@@ -1,4 +1,4 @@
-"""The shape of a drone: a body on skids, four arms, four guarded rotors. About 0.8 cells wide."""
+"""Triangle meshes of the scene: drones, pads, obstacles, and blocks on footprints."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _Faces = npt.NDArray[np.int64]
 _SHELL, _ROTOR, _DARK = 0.95, 1.0, 0.42
 """Shades that multiply the drone's colour."""
 _REACH = 0.23
-"""From the centre to a rotor's, along x and along y."""
+"""The distance from the centre of the drone to that of a rotor, along x and along y."""
 _DECK = 0.17
 """Height of the arms."""
 HUB = (0.0, 0.0, _DECK)
-"""The point about which it turns, from where it stands."""
+"""The centre of rotation, from the point on which the drone stands."""
 
 
-class Shape(NamedTuple):
+class TriangleMesh(NamedTuple):
     """A triangle mesh: N x 3 vertices in cells, M x 3 faces, and N x 3 colours from 0 to 1."""
 
     vertices: _Vertices
@@ -31,8 +31,11 @@ class Shape(NamedTuple):
 
 
 @cache
-def quadrotor() -> Shape:
-    """Return the shape that all drones share, around its `HUB`. It is so small that every drone can have a copy."""
+def quadrotor() -> TriangleMesh:
+    """Return the mesh of all drones, around its `HUB`: a body on skids, four arms, four guarded rotors.
+
+    It is about 0.8 cells wide. It is so small that every drone can have a copy.
+    """
     corners = [(x, y) for x in (-_REACH, _REACH) for y in (-_REACH, _REACH)]
     parts = [_body(), _bar((-_REACH, -_REACH), (_REACH, _REACH)), _bar((-_REACH, _REACH), (_REACH, -_REACH))]
     parts += [_rotor(x, y) for x, y in corners]
@@ -41,25 +44,25 @@ def quadrotor() -> Shape:
     return whole._replace(vertices=whole.vertices - np.array(HUB))
 
 
-def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float, float, float]) -> Shape:
+def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float, float, float]) -> TriangleMesh:
     """Return a flat disc, for a pad on the ground."""
     sides = 16
     vertices = np.concatenate([[centre], _circle(radius, 0, sides) + np.array(centre)])
     here = np.arange(sides)
     faces = np.column_stack([np.zeros_like(here), here + 1, (here + 1) % sides + 1])
-    return Shape(vertices, faces, np.tile(colour, (sides + 1, 1)))
+    return TriangleMesh(vertices, faces, np.tile(colour, (sides + 1, 1)))
 
 
-def box(centre: tuple[float, float, float], size: float | tuple[float, float, float]) -> Shape:
-    """Return a box, for an obstacle: a cube, or as wide, deep and high as `size` says."""
+def box(centre: tuple[float, float, float], size: float | tuple[float, float, float]) -> TriangleMesh:
+    """Return a box, for an obstacle: a cube, or a box with the width, depth and height in `size`."""
     corners = np.array([*product((-0.5, 0.5), repeat=3)]) * np.array(size) + np.array(centre)
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
     return _painted(corners, faces, 1)
 
 
-def prisms(footprints: _Vertices, low: float, high: float) -> Shape:
-    """Return upright blocks on footprints (K, 4, 2), whose corners are given counterclockwise."""
+def prisms(footprints: _Vertices, low: float, high: float) -> TriangleMesh:
+    """Return upright blocks on footprints (K, 4, 2), with their corners counterclockwise."""
     count = len(footprints)
     heights = np.repeat([low, high], 4)
     vertices = np.empty((count, 8, 3))
@@ -71,18 +74,18 @@ def prisms(footprints: _Vertices, low: float, high: float) -> Shape:
     return _painted(vertices.reshape(-1, 3), every, 1)
 
 
-def joined_shapes(parts: list[Shape]) -> Shape:
-    """Return several shapes as one."""
+def joined_shapes(parts: list[TriangleMesh]) -> TriangleMesh:
+    """Return several meshes as one."""
     before = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    return Shape(
+    return TriangleMesh(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + offset for part, offset in zip(parts, before, strict=False)]),
         np.concatenate([part.colours for part in parts]),
     )
 
 
-def _painted(vertices: _Vertices, faces: _Faces, shade: float) -> Shape:
-    return Shape(vertices, faces, np.full_like(vertices, shade))
+def _painted(vertices: _Vertices, faces: _Faces, shade: float) -> TriangleMesh:
+    return TriangleMesh(vertices, faces, np.full_like(vertices, shade))
 
 
 def _circle(radius: float, height: float, sides: int) -> _Vertices:
@@ -91,7 +94,7 @@ def _circle(radius: float, height: float, sides: int) -> _Vertices:
 
 
 def _band(sides: int) -> _Faces:
-    """Return faces between two circles of `sides` vertices each, the first one's vertices first."""
+    """Return the faces between two circles of `sides` vertices each, numbered circle by circle."""
     here = np.arange(sides)
     there = (here + 1) % sides
     return np.concatenate(
@@ -99,7 +102,7 @@ def _band(sides: int) -> _Faces:
     )
 
 
-def _body() -> Shape:
+def _body() -> TriangleMesh:
     """Return a faceted dome."""
     sides = 8
     rings = [_circle(0.09, _DECK - 0.05, sides), _circle(0.14, _DECK, sides), _circle(0.08, _DECK + 0.08, sides)]
@@ -109,7 +112,7 @@ def _body() -> Shape:
     return _painted(vertices, np.concatenate([_band(sides), _band(sides) + sides, lid]), _SHELL)
 
 
-def _bar(start: tuple[float, float], stop: tuple[float, float]) -> Shape:
+def _bar(start: tuple[float, float], stop: tuple[float, float]) -> TriangleMesh:
     """Return an arm from one rotor through the body to the opposite one: a flat box."""
     ends = np.array([start, stop])
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
@@ -122,7 +125,7 @@ def _bar(start: tuple[float, float], stop: tuple[float, float]) -> Shape:
     return _painted(vertices, np.concatenate([_band(4), lid]), _DARK)
 
 
-def _rotor(x: float, y: float) -> Shape:
+def _rotor(x: float, y: float) -> TriangleMesh:
     """Return a ring, the guard, around two blades."""
     sides, height = 12, _DECK + 0.03
     ring = np.concatenate([_circle(0.13, height, sides), _circle(0.17, height, sides)])
@@ -133,7 +136,7 @@ def _rotor(x: float, y: float) -> Shape:
     return whole._replace(vertices=whole.vertices + np.array([x, y, 0]))
 
 
-def _skid(side: float) -> Shape:
+def _skid(side: float) -> TriangleMesh:
     """Return a runner on two legs."""
     runner = np.array([[x, side + dy, z] for x in (-0.17, 0.17) for dy, z in ((-0.015, 0), (0.015, 0), (0, 0.025))])
     legs = [
