@@ -8,11 +8,12 @@ Names:
     all_different, allowed, forbidden, costs, function, element, cumulative, minimum, maximum, if_then_else, all_of,
         any_of: Constraints and costs of a model that no operator makes.
     from_cpmpy: Splits a CPMpy model over robots (the extra `cpmpy`).
-    ModelError: What a model says that cannot be.
     Outcome: The result of a run; `solve()` returns its subclass `Solution`.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
     AgentsContainer: The master or robots on one of several machines.
     journal: Journals of runs; `journal.rows(path)` are for pandas or polars.
+    RobochocError: The base class of all exceptions: InvalidInputError, ModelError, OptionError, UnsupportedError,
+        UnknownProtocolError, CompileError, RobotsLostError, RefutedError and others.
 
 Example:
     >>> import robochoc
@@ -28,6 +29,8 @@ TYPE_CHECKING = False  # to import `typing` would delay the handling of signals 
 if TYPE_CHECKING:
     from robochoc import journal
     from robochoc.api import AgentsContainer, Problem, load
+    from robochoc.communication.search_result import RobotsLostError
+    from robochoc.formats.diagnostics import InvalidInputError
     from robochoc.model.outcome import Outcome, Verdict
     from robochoc.modelling.array_problem import ArrayProblem
     from robochoc.modelling.cpmpy_models import from_cpmpy
@@ -47,15 +50,28 @@ if TYPE_CHECKING:
     from robochoc.modelling.model import Model
     from robochoc.modelling.solution import Solution
     from robochoc.modelling.terms import all_of, any_of
+    from robochoc.run.registry import UnknownProtocolError
+    from robochoc.solver.compile import CompileError
+    from robochoc.solver.errors import UnsupportedError
+    from robochoc.system.errors import OptionError, RobochocError
+    from robochoc.verification.checker import RefutedError
 
 __all__ = [
     "AgentsContainer",
     "ArrayProblem",
+    "CompileError",
+    "InvalidInputError",
     "Model",
     "ModelError",
+    "OptionError",
     "Outcome",
     "Problem",
+    "RefutedError",
+    "RobochocError",
+    "RobotsLostError",
     "Solution",
+    "UnknownProtocolError",
+    "UnsupportedError",
     "Verdict",
     "__version__",
     "all_different",
@@ -93,6 +109,14 @@ _PLACES = {
     "Model": "robochoc.modelling.model",
     "ModelError": "robochoc.modelling.errors",
     "Solution": "robochoc.modelling.solution",
+    "CompileError": "robochoc.solver.compile",
+    "InvalidInputError": "robochoc.formats.diagnostics",
+    "OptionError": "robochoc.system.errors",
+    "RefutedError": "robochoc.verification.checker",
+    "RobochocError": "robochoc.system.errors",
+    "RobotsLostError": "robochoc.communication.search_result",
+    "UnknownProtocolError": "robochoc.run.registry",
+    "UnsupportedError": "robochoc.solver.errors",
 }
 
 

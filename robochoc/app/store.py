@@ -28,6 +28,7 @@ from robochoc.app.sketch.history import History
 from robochoc.app.sketch.open_from_disk import ImportedTeam
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.formats import InvalidInputError, read_team
+from robochoc.system.errors import RobochocError
 
 _HISTORY = "history.json"
 FILES = "team"
@@ -41,7 +42,7 @@ MAX_BYTES = 64 << 20
 """Larger files are rejected. A history that would be larger is saved with fewer undo steps."""
 
 
-class InUseError(OSError):
+class InUseError(RobochocError, OSError):
     """Another application has opened the folder."""
 
 

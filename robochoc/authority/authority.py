@@ -48,6 +48,7 @@ from robochoc.authority.registry import (
 )
 from robochoc.authority.token import EnrolmentToken, digest
 from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 TOKEN_LIFETIME = timedelta(hours=24)
@@ -58,7 +59,7 @@ _KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
 _OTHERS = 0o077
 
 
-class NotGrantedError(Exception):
+class NotGrantedError(RobochocError):
     """The Authority refuses. The message says why, and may be sent to the one that asked."""
 
 

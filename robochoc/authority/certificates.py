@@ -20,6 +20,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
 
 from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.system.errors import RobochocError
 
 MASTER = "MASTER"
 """The master's name. No robot may have it, in whatever capitals: host names know no capitals."""
@@ -52,11 +53,11 @@ _SIGNING_CERTIFICATES = x509.KeyUsage(
 )
 
 
-class CertificateError(ValueError):
+class CertificateError(RobochocError, ValueError):
     """A certificate, a request for one, or a key that is malformed, or not what it would have to be."""
 
 
-class HostNameError(ValueError):
+class HostNameError(RobochocError, ValueError):
     """No certificate can name this host."""
 
 

@@ -43,13 +43,14 @@ from robochoc.authority.frames import (
 from robochoc.authority.identity import CERTIFICATE, Identity, private_folder, save
 from robochoc.authority.token import EnrolmentToken
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 PATIENCE_S = 30.0
 """The longest time for a question, with its wait at the service, in seconds."""
 
 
-class EnrolmentError(Exception):
+class EnrolmentError(RobochocError):
     """There is no certificate; the message says why, and what to do."""
 
 

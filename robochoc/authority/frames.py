@@ -11,12 +11,14 @@ import time
 
 import msgspec
 
+from robochoc.system.errors import RobochocError
+
 LARGEST_BYTES = 16384
 """A request for a certificate has about 350 bytes, a certificate 800."""
 _LENGTH_BYTES = 4
 
 
-class FrameError(ValueError):
+class FrameError(RobochocError, ValueError):
     """The frame is not a valid question or answer of this protocol."""
 
 

@@ -28,6 +28,7 @@ from robochoc.authority.certificates import (
     read_key,
 )
 from robochoc.authority.registry import PRIVATE
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 KEY, CERTIFICATE, CA = "key.pem", "cert.pem", "ca.pem"
@@ -35,7 +36,7 @@ _OTHERS = 0o077
 _LARGEST_BYTES = 65536
 
 
-class IdentityError(Exception):
+class IdentityError(RobochocError):
     """A folder that holds no identity, or one that cannot be used; the message says what to do."""
 
 

@@ -23,17 +23,18 @@ from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 from robochoc.authority.certificates import CertificateError, check_issued, holder_of, moment, pem, read_certificate
 from robochoc.authority.identity import Identity
 from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.system.errors import RobochocError
 
 _PUBLIC_BYTES = 32
 _LARGEST_CARD_BYTES = 8192
 _SECRET_BYTES = 32
 
 
-class KeyCardError(ValueError):
+class KeyCardError(RobochocError, ValueError):
     """A key card that does not prove what it says."""
 
 
-class UnknownPeerError(LookupError):
+class UnknownPeerError(RobochocError, LookupError):
     """No card of this robot was admitted."""
 
 

@@ -8,15 +8,16 @@ from robochoc.authority.certificates import LONGEST_NAME, MASTER
 from robochoc.authority.registry import Role
 from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
 from robochoc.formats.names import is_name
+from robochoc.system.errors import RobochocError
 
 _MOST_NAMED = 10
 
 
-class InvalidNameError(ValueError):
+class InvalidNameError(RobochocError, ValueError):
     """A name that no robot can have, or that is reserved."""
 
 
-class UnknownNameError(LookupError):
+class UnknownNameError(RobochocError, LookupError):
     """A name that is not enrolled."""
 
 

@@ -17,13 +17,14 @@ from typing import Literal
 
 import msgspec
 
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 PRIVATE = 0o600
 _FILE, _LOCK = "registry.json", "lock"
 
 
-class AuthorityError(Exception):
+class AuthorityError(RobochocError):
     """The Authority's folder is not there, or what is in it cannot be used."""
 
 

@@ -13,11 +13,13 @@ import hashlib
 import secrets
 from dataclasses import dataclass
 
+from robochoc.system.errors import RobochocError
+
 SECRET_BYTES = 20
 FINGERPRINT_BYTES = 32
 
 
-class TokenError(ValueError):
+class TokenError(RobochocError, ValueError):
     """The text is not a complete token."""
 
 

@@ -13,16 +13,17 @@ from typing import cast
 
 from robochoc.authority.keyring import KeyRing
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.system.errors import RobochocError
 from robochoc.system.installed import entry_points_named, load_entry_point, not_installed_message
 
 GROUP = "robochoc.filters"
 
 
-class NotGenuineError(Exception):
+class NotGenuineError(RobochocError):
     """The data was not sealed by the sender for this robot in this context. No part of it may be used."""
 
 
-class UnknownFilterError(LookupError):
+class UnknownFilterError(RobochocError, LookupError):
     """No installed package has a filter of that name, or the filter cannot be used."""
 
 

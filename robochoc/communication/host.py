@@ -29,6 +29,7 @@ from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunP
 from robochoc.solver.explanation import Invalidated
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
+from robochoc.system.errors import RobochocError
 
 _MOST_SHARED = 1 << 22
 """Largest size of a message cache, in bytes."""
@@ -40,7 +41,7 @@ _UNUSABLE = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeE
 """Errors of a protocol that cannot use a message: its own refusals, and failed computations."""
 
 
-class BadMessageError(ValueError):
+class BadMessageError(RobochocError, ValueError):
     """The content of an envelope is not a message of the protocol, or the robot cannot use it."""
 
 

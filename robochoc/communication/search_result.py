@@ -11,12 +11,12 @@ from typing import NamedTuple, Self
 
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import Findings
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 _MOST_NAMED = 5
 
 
-class RobotsLostError(TransferableError):
+class RobotsLostError(RobochocError):
     """Robots were lost whose loss ends the run. `robots` says why, by name."""
 
     def __init__(self, robots: Mapping[str, str]) -> None:

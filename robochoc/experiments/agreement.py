@@ -10,13 +10,14 @@ from typing import Any
 from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.model.outcome import Verdict
+from robochoc.system.errors import RobochocError
 
 _OWN = "PROBLEM"
 """The folder for generated problems."""
 _Question = tuple[str, str | None]
 
 
-class DisagreementError(Exception):
+class DisagreementError(RobochocError):
     """Two runs contradict each other, or the checker refutes one. The text contains the commands to repeat them."""
 
 

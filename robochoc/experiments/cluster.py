@@ -20,12 +20,13 @@ from distributed.scheduler import KilledWorker
 
 from robochoc.experiments.remote_task import files_of, run_one
 from robochoc.experiments.task import Row, Status, Task
+from robochoc.system.errors import RobochocError
 
 AT_ONCE = 1000
 """The most tasks that the scheduler has at a time."""
 
 
-class SchedulerLostError(Exception):
+class SchedulerLostError(RobochocError):
     """The scheduler cannot be reached, or its connection was lost."""
 
 

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 from robochoc.experiments.study import Study
 from robochoc.experiments.task import Task
+from robochoc.system.errors import RobochocError
 
 MAX_RUNS = 1_000_000
 
 
-class TooManyRunsError(ValueError):
+class TooManyRunsError(RobochocError, ValueError):
     """The study has too many runs for a file of results."""
 
 

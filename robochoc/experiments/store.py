@@ -22,10 +22,11 @@ from robochoc.experiments.database import COLUMNS, JSON, STRANGE, TRIED_AGAIN, i
 from robochoc.experiments.results import Results, results_of
 from robochoc.experiments.study import Study
 from robochoc.experiments.task import GIVEN, Row, Status, Task
+from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import on_one_line
 
 
-class StudyInUseError(Exception):
+class StudyInUseError(RobochocError):
     """Another process runs this study."""
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
 from robochoc.model.priorities import natural_key
+from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import listed
 
 Rows = Sequence[Mapping[str, Any]]
@@ -51,7 +52,7 @@ Setting = tuple[tuple[str, Any], ...]
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
 
-class NoSuchColumnError(ValueError):
+class NoSuchColumnError(RobochocError, ValueError):
     """The results have no such parameter or metric."""
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robochoc.model.priorities import natural_key
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100
@@ -31,7 +31,7 @@ class Diagnostic:
         return on_one_line(f"{place}: {self.message} ({self.hint})")
 
 
-class InvalidInputError(TransferableError):
+class InvalidInputError(RobochocError):
     """An input that cannot be used. `diagnostics` holds every mistake found, ordered by file and line."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
@@ -44,7 +44,7 @@ def invalid_input(path: Path | str, message: str, hint: str, line: int = 0) -> I
     return InvalidInputError([Diagnostic(encodable(str(path)), line, message, hint)])
 
 
-class MistakeError(TransferableError):
+class MistakeError(RobochocError):
     """A mistake in one element, on its way to the `DiagnosticCollector` that knows the file and the line."""
 
     def __init__(self, message: str, hint: str, line: int = 0) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from robochoc.formats.diagnostics import shortened
 from robochoc.model.expression import Apply, Constant, Name
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 _LEAVES = (Apply, Constant, Name)
 """Expressions: they may be too deep to be walked, and have a check of their own."""
@@ -27,7 +27,7 @@ AS_BUILT = "build it as its class says"
 _Check = Callable[[object], None]
 
 
-class FieldTypeError(TransferableError, TypeError):
+class FieldTypeError(RobochocError, TypeError):
     """An object is not made as it should be: `path` leads to the part that is wrong."""
 
     def __init__(self, value: object, expected: str) -> None:

@@ -23,13 +23,14 @@ import msgspec
 
 from robochoc.model.outcome import Answer, CheckCounts, Improvement, Metrics, Optima, Outcome
 from robochoc.system.decode_errors import describe_decode_error
+from robochoc.system.errors import RobochocError
 
 Value = int | float | Decimal | str
 """A value in a JSON result: a number, or a text for any other value."""
 Json = dict[str, Any]
 
 
-class ResultError(ValueError):
+class ResultError(RobochocError, ValueError):
     """The text is not a valid JSON result."""
 
 

@@ -10,6 +10,7 @@ import zlib
 from hashlib import blake2b
 
 from robochoc.journal.entries import JournalError
+from robochoc.system.errors import RobochocError
 
 MAGIC = b"\x89RJL\r\n\x1a\n"
 """The first bytes of a journal; transfers that take it for text destroy them, as PNG's (RFC 2083)."""
@@ -28,7 +29,7 @@ _LARGEST_PACKED = MAX_BLOCK_BYTES + MAX_BLOCK_BYTES // 1000 + 64
 PREAMBLE = _PREAMBLE.pack(MAGIC, FORMAT, 0)
 
 
-class JournalDamagedError(Exception):
+class JournalDamagedError(RobochocError):
     """The journal is unreadable from this place on. The message has the place and the reason."""
 
 

@@ -19,6 +19,7 @@ from msgspec import Meta
 
 from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Decided, Received, Sent, Settled
+from robochoc.system.errors import RobochocError
 
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
 """The kinds of entries in `_Block.kinds`."""
@@ -28,7 +29,7 @@ _LARGEST = 2**63
 _Index = Annotated[int, Meta(ge=0)]
 
 
-class BlockError(ValueError):
+class BlockError(RobochocError, ValueError):
     """The content of a block cannot be decoded as entries."""
 
 

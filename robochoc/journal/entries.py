@@ -9,6 +9,7 @@ import msgspec
 
 from robochoc.journal.events import AnyEvent, Event
 from robochoc.model.outcome import Outcome
+from robochoc.system.errors import RobochocError
 
 VERSION = 2
 """The version of the entries' meaning. It grows when one is added or changed; readers refuse unknown versions."""
@@ -22,7 +23,7 @@ READ = (STAMPED_LATE, VERSION, BOUNDED)
 """Versions that are read."""
 
 
-class JournalError(ValueError):
+class JournalError(RobochocError, ValueError):
     """The file is not a journal, has another version, or is unreadable from the start."""
 
 

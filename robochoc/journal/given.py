@@ -22,13 +22,14 @@ from robochoc.model.costs import flat_units
 from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Team, Variable
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
+from robochoc.system.errors import RobochocError
 
 NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
 _STAND_IN = (range(1),)
 """The domain that is written for an empty one, which a file cannot have."""
 
 
-class GivenProblemError(ValueError):
+class GivenProblemError(RobochocError, ValueError):
     """The event with the robots' problems does not contain a valid team."""
 
 

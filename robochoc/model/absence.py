@@ -25,6 +25,7 @@ from robochoc.model.constraint import (
     WhenAbsent,
 )
 from robochoc.model.expression import Apply, Constant, Expression, Name, names, text
+from robochoc.system.errors import RobochocError
 
 AGGREGATES = frozenset({"add", "min", "max", "and", "or"})
 """The operators whose arguments are terms of an aggregate."""
@@ -54,7 +55,7 @@ class DroppedConstraint:
     robots: tuple[str, ...]
 
 
-class NotAnAggregateError(Exception):
+class NotAnAggregateError(RobochocError):
     """The expression is not an aggregate of alike terms that is compared with numbers."""
 
 

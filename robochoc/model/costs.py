@@ -29,6 +29,7 @@ from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Robot, ScenarioEvent, Team
 from robochoc.model.ranges import united_ranges
+from robochoc.system.errors import RobochocError
 
 MAX_TRIED = 4096
 """The maximum number of combinations of values of which the least cost of a function is computed exactly."""
@@ -36,7 +37,7 @@ MAX_TRIED = 4096
 Domains = Mapping[str, Domain]
 
 
-class UnboundedCostError(ValueError):
+class UnboundedCostError(RobochocError, ValueError):
     """Nothing bounds the cost of a function: the domain of a variable is not known here."""
 
 

@@ -27,7 +27,7 @@ from robochoc.model.expression import (
 from robochoc.model.expression.bounds import Excess, Interval, bounds, excess
 from robochoc.model.expression.tree import BOUND
 from robochoc.model.team_edits import shortened
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 MAX_COST = 10**18 - 1
 """The largest cost, in the team's unit."""
@@ -36,7 +36,7 @@ MAX_TRIED = 4096
 _MAX_DIGITS = 25
 
 
-class MagnitudeError(TransferableError, ValueError):
+class MagnitudeError(RobochocError, ValueError):
     """A constraint computes numbers that are too large.
 
     Attributes:

@@ -20,6 +20,7 @@ from typing import assert_never
 
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Robot, Team
+from robochoc.system.errors import RobochocError
 
 Graph = Mapping[str, frozenset[str]]
 """The neighbours of each robot."""
@@ -37,7 +38,7 @@ class Order(StrEnum):
     RANDOM = "random"
 
 
-class OrderError(Exception):
+class OrderError(RobochocError):
     """A team cannot follow an order. The message says why in one sentence."""
 
 

@@ -6,10 +6,10 @@ import heapq
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 
-class CycleError(TransferableError, ValueError):
+class CycleError(RobochocError, ValueError):
     """The relation *parent of* has a cycle; `cycle` lists its robots, each the parent of the next."""
 
     def __init__(self, cycle: Sequence[str]) -> None:

@@ -10,13 +10,13 @@ from dataclasses import replace
 
 from robochoc.model.absence import DroppedConstraint, broken, restated
 from robochoc.model.problem import Child, Constraint, Parent, Robot, Team, WhenAbsent
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 MAX_SHOWN = 60
 """The maximum number of characters of a name, or of a list, in a message."""
 
 
-class ChangeError(TransferableError, ValueError):
+class ChangeError(RobochocError, ValueError):
     """A change that the team as it stands cannot take: what is wrong, and what was expected.
 
     Attributes:

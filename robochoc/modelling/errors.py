@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 _HERE = str(Path(__file__).resolve().parent.parent)
 
@@ -21,7 +21,7 @@ class SourceLine(NamedTuple):
         return f"{self.file}:{self.line}"
 
 
-class ModelError(TransferableError, ValueError):
+class ModelError(RobochocError, ValueError):
     """A model is invalid. The message names the line of the user's program."""
 
     def __init__(self, message: str, hint: str = "", place: SourceLine | None = None) -> None:

@@ -9,12 +9,13 @@ from typing import NamedTuple
 from robochoc.modelling.codes import BOOLEAN, NUMBER, ValueKind
 from robochoc.modelling.errors import ModelError
 from robochoc.modelling.numbers import exact, is_number, shown
+from robochoc.system.errors import RobochocError
 
 MAX_BITS = 4096
 """The maximum number of bits of a power."""
 
 
-class UndefinedTermError(ArithmeticError):
+class UndefinedTermError(RobochocError, ArithmeticError):
     """A term has no value for this assignment, such as a division by zero."""
 
 

@@ -17,6 +17,7 @@ from robochoc.run.options import CentralSolverName, Options, Runtime, ScheduleNa
 from robochoc.run.orchestrator import solve
 from robochoc.run.scenario import Environment
 from robochoc.solver.compile import CompileLimits
+from robochoc.system.errors import OptionError, OptionTypeError
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class Solvable(ABC):
                 `max-degree` if the team has none. `given`: the team's order.
             withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: no robot.
             settings: Settings of the protocol, by name.
-            observer: FunctionCall with every event of the run.
+            observer: Called with every event of the run.
             environment: Receives each answer, and returns the next changes.
             seed: The seed of the simulator, of the order `random`, and of randomised protocols.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
@@ -114,8 +115,7 @@ class Solvable(ABC):
             UnsupportedError: if problem, protocol, runtime and options cannot be combined.
             RobotsLostError: if robots were lost, and the options do not allow continuing without them.
             RefutedError: if the checker refutes the answer.
-            ValueError: if an option has a value that is not allowed.
-            TypeError: if there is no such option.
+            OptionError: if an option has a value that is not allowed, or there is no such option.
 
         Example:
             >>> import robochoc
@@ -154,15 +154,15 @@ class Solvable(ABC):
 
 
 def _refuse(unknown: Iterable[str]) -> None:
-    """Raise `TypeError` for unknown options."""
+    """Raise `OptionTypeError` for unknown options."""
     for name in unknown:
         known = [one for one in inspect.signature(Solvable.solve).parameters if one not in {"self", "unknown"}]
         hint = did_you_mean(name, known, f"its options: {', '.join(known)}")
-        raise TypeError(f"solve() has no option {name!r}; {hint}")
+        raise OptionTypeError(f"solve() has no option {name!r}; {hint}")
 
 
 def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
-    """Return `options` with the team's names of robots. Raises `ValueError` for an unknown robot.
+    """Return `options` with the team's names of robots. Raises `OptionError` for an unknown robot.
 
     Args:
         options: The options, with the user's names of robots.
@@ -172,7 +172,7 @@ def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
     if isinstance(order, tuple):
         for name in order:
             if name not in called:
-                raise ValueError(f"order: there is no robot {name!r}; {did_you_mean(name, called, 'name all robots')}")
+                raise OptionError(f"order: there is no robot {name!r}; {did_you_mean(name, called, 'name all robots')}")
         order = tuple(called[name] for name in order)
     kill = tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in options.kill)
     return replace(options, order=order, kill=kill)

@@ -17,6 +17,7 @@ from robochoc.modelling.codes import BOOLEAN, NUMBER
 from robochoc.modelling.numbers import exact
 from robochoc.modelling.tables import MAX_COMBINATIONS
 from robochoc.modelling.terms import ConstantTerm, Linear, ModelVariable, Operation, Term
+from robochoc.system.errors import RobochocError
 
 MAX_SIZE = 5_000
 """The maximum number of operators and terms of an expression; each nested quotient doubles the number."""
@@ -24,7 +25,7 @@ MAX_LEVELS = 60
 """The maximum depth of an expression."""
 
 
-class UntranslatableError(Exception):
+class UntranslatableError(RobochocError):
     """The term has no equivalent expression: it must become a table."""
 
 

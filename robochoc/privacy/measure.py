@@ -22,12 +22,12 @@ from robochoc.replay.steps import RecordedRun, runs_of
 from robochoc.run.registry import protocol_by_class
 from robochoc.sniffer.recorded_messages import message_of, types_by_name
 from robochoc.solver.agent_problem import RunParameters
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 Edge = tuple[str, str]
 
 
-class PrivacyError(TransferableError):
+class PrivacyError(RobochocError):
     """The privacy loss cannot be measured. `broken`: the journal is damaged, or a message's rule is wrong."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:

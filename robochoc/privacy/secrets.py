@@ -22,12 +22,13 @@ from robochoc.protocols.wording import is_withdrawn
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import constraints_above, parts_below
+from robochoc.system.errors import RobochocError
 
 MOST_SECRETS = 200_000
 """Robots' values and entries of constraints, in all."""
 
 
-class TooManySecretsError(ValueError):
+class TooManySecretsError(RobochocError, ValueError):
     """The team has too many values, or too large constraints."""
 
 

@@ -9,6 +9,7 @@ from typing import ClassVar, cast
 import msgspec
 
 from robochoc.system.decode_errors import describe_decode_error
+from robochoc.system.errors import RobochocError
 
 MOST = 10**12
 """The largest number that a setting accepts, except `inf` for fields in `Settings.may_be_infinite`."""
@@ -27,7 +28,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 NO_SETTINGS = Settings()
 
 
-class SettingsError(ValueError):
+class SettingsError(RobochocError, ValueError):
     """An unknown setting, or an invalid value of a setting."""
 
 

@@ -29,7 +29,7 @@ from robochoc.solver.compile import CompileError, CompileLimits, Compiler, Compi
 from robochoc.solver.compiled_domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError, UnsupportedError
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 from robochoc.verification.objective import withdrawal_cost
 
 _UNCOMPILED = (
@@ -45,7 +45,7 @@ _UNCOMPILED = (
 """Raised for robots that cannot be compiled, or whose settings do not fit."""
 
 
-class CannotReplayError(TransferableError):
+class CannotReplayError(RobochocError):
     """A run that cannot be replayed: why, and what would help. `broken`: the journal is damaged."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:

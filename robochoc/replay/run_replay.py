@@ -15,7 +15,7 @@ from robochoc.replay.channels import MessageDecoder, RecordedChannels
 from robochoc.replay.comparison import Difference, StepComparison
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun, RecordedStep, steps_of
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 SIMULATED = "simulator"
 """The runtime whose schedules may delay messages: a message may then move the receiver's clock on."""
@@ -26,11 +26,11 @@ Listener = Callable[[str, Message], None]
 """Called with the receiver and the message when the protocol sends it, within the step."""
 
 
-class NoEndError(Exception):
+class NoEndError(RobochocError):
     """A step in which the protocol has sent so many messages that it may never end."""
 
 
-class ReplayStopsError(TransferableError):
+class ReplayStopsError(RobochocError):
     """A robot that cannot be followed any further.
 
     `unsaid`: a message to it cannot be rebuilt from the journal, but by replaying its sender.

@@ -18,6 +18,7 @@ from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.closed_loop import TOGETHER_S, Feedback
 from robochoc.robots.mission_publisher import FlightBroadcast, nanoseconds
+from robochoc.system.errors import RobochocError
 
 NAMES_MAX = 12
 """The largest number of drones named in an error."""
@@ -25,11 +26,11 @@ FAILS_S = 2.0
 """The default time of a failure: the drone is then in the air."""
 
 
-class CannotFlyError(Exception):
+class CannotFlyError(RobochocError):
     """The decision cannot be flown. The message has the reason."""
 
 
-class UnknownDroneError(Exception):
+class UnknownDroneError(RobochocError):
     """A drone that is to fail does not exist. The message names the existing drones."""
 
 

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
+from robochoc.system.errors import RobochocError
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ is zero, or empty.
 """
 
 
-class SinkError(Exception):
+class SinkError(RobochocError):
     """The sink cannot be opened or written to. The message has the reason, and a hint."""
 
 

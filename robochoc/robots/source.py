@@ -8,6 +8,7 @@ from types import MappingProxyType, TracebackType
 from typing import NamedTuple, Self
 
 from robochoc.robots.sink import Fields
+from robochoc.system.errors import RobochocError
 
 REPORTS: Mapping[str, str] = MappingProxyType(
     {
@@ -21,7 +22,7 @@ REPORTS: Mapping[str, str] = MappingProxyType(
 """The topics in a drone's namespace, besides its waypoints: the last token, and the ROS type."""
 
 
-class SourceError(Exception):
+class SourceError(RobochocError):
     """The source cannot be opened or read. The message has the reason, and a hint."""
 
 

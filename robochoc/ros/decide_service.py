@@ -23,6 +23,7 @@ from robochoc.model.team_edits import ChangeError
 from robochoc.robots.sink import Fields
 from robochoc.run.options import Options
 from robochoc.system.decode_errors import describe_decode_error
+from robochoc.system.errors import RobochocError
 
 DECIDE, TRIGGER = "robochoc_msgs/Decide", "std_srvs/Trigger"
 """The types of services that are offered."""
@@ -36,7 +37,7 @@ RESULT_CHARACTERS_MAX = 128 * 1024
 Solve = Callable[[Team, Options], Outcome]
 
 
-class RequestError(ValueError):
+class RequestError(RobochocError, ValueError):
     """The request cannot be carried out. The message says why."""
 
 

@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 
 from robochoc.robots.sink import Fields
 from robochoc.ros.waypoint_types import definition_of, short_kind
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 DECIDE_REQUEST = """\
 string team
@@ -79,11 +79,11 @@ Version = Literal[1, 2]
 Make = Callable[[Any], Any]
 
 
-class UnknownTypeError(LookupError):
+class UnknownTypeError(RobochocError, LookupError):
     """There is no definition of that ROS type, or the one that a package brings cannot be used."""
 
 
-class FieldsError(ValueError):
+class FieldsError(RobochocError, ValueError):
     """Fields that are not those of the type, or bytes that are no message of it. The message says why."""
 
 
@@ -113,7 +113,7 @@ class _Kind(NamedTuple):
     empty: Any
 
 
-class _FieldError(TransferableError):
+class _FieldError(RobochocError):
     """The value of a field is wrong. `path` leads to the field, the last name first."""
 
     def __init__(self, why: str, *path: str) -> None:

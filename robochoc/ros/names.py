@@ -16,6 +16,7 @@ from types import MappingProxyType
 from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.source import REPORTS
+from robochoc.system.errors import RobochocError
 
 TEAM_TOPICS: Mapping[str, str] = MappingProxyType(
     {
@@ -34,7 +35,7 @@ _RESERVED = {*TEAM_TOPICS, "/clock", "/rosout", "/rosout_agg", "/parameter_event
 """Topics with a meaning of their own in every ROS."""
 
 
-class NameClashError(Exception):
+class NameClashError(RobochocError):
     """Two topics would have one name in ROS, or a name is too long for it. The message says what to do."""
 
 

@@ -21,6 +21,7 @@ from robochoc.robots.source import REPORTS
 from robochoc.ros.names import TEAM_TOPICS, TopicNames
 from robochoc.ros.team_topics import BODY, GOAL, WAYPOINTS_ALONE, PublishOptions, status, transform, transforms
 from robochoc.ros.waypoint_types import NoMappingError, WaypointMapping, mapping_of, point
+from robochoc.system.errors import RobochocError
 
 _NOT_MEASURED = {
     name: float("nan")
@@ -29,7 +30,7 @@ _NOT_MEASURED = {
 """As `sensor_msgs/BatteryState` says: "if unmeasured NaN"."""
 
 
-class NothingToPublishError(Exception):
+class NothingToPublishError(RobochocError):
     """No drone of the team has a topic. The message says what to do."""
 
 

@@ -18,6 +18,7 @@ from typing import cast
 from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.sink import Fields, Waypoint
+from robochoc.system.errors import RobochocError
 from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
 
 GROUP = "robochoc.waypoints"
@@ -27,7 +28,7 @@ UPRIGHT: Fields = {"w": 1.0}
 """The orientation of what stands upright and looks along x."""
 
 
-class NoMappingError(Exception):
+class NoMappingError(RobochocError):
     """A topic has a type that no waypoint can become. The message names the types that exist."""
 
 

@@ -10,12 +10,13 @@ from numbers import Real
 
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
+from robochoc.system.errors import OptionError, OptionTypeError
 from robochoc.system.suggestions import member
 
 Converter = Callable[[str, object], object]
 """A function of the name of an option and a value; it returns the value in the type of the option.
 
-It raises `TypeError` for a value of a wrong type, and `ValueError` for one that is not allowed.
+It raises `OptionTypeError` for a value of a wrong type, and `OptionError` for one that is not allowed.
 """
 
 
@@ -33,7 +34,7 @@ def instance_of(kind: type) -> Converter:
 
     def convert(name: str, value: object) -> object:
         if not isinstance(value, kind):
-            raise TypeError(_refusal(name, value, f"an object of the class {kind.__name__}"))
+            raise OptionTypeError(_refusal(name, value, f"an object of the class {kind.__name__}"))
         return value
 
     return convert
@@ -47,14 +48,14 @@ def optional(convert: Converter) -> Converter:
 def text(name: str, value: object) -> str:
     """Accept a text."""
     if not isinstance(value, str):
-        raise TypeError(_refusal(name, value, "a text"))
+        raise OptionTypeError(_refusal(name, value, "a text"))
     return value
 
 
 def protocol_name(name: str, value: object) -> str:
     """Convert the name of a protocol, in any case, to the spelling of its package."""
     if not isinstance(value, str):
-        raise TypeError(_refusal(name, value, "the name of an installed protocol, such as 'abt'"))
+        raise OptionTypeError(_refusal(name, value, "the name of an installed protocol, such as 'abt'"))
     if value == AUTO:
         return value
     from robochoc.run.registry import installed_spelling  # noqa: PLC0415 - start-up; and the registry imports options
@@ -67,36 +68,36 @@ def integer(name: str, value: object) -> int:
     try:
         return operator.index(value)  # type: ignore[arg-type]
     except TypeError:
-        raise TypeError(_refusal(name, value, "an integer")) from None
+        raise OptionTypeError(_refusal(name, value, "an integer")) from None
 
 
 def count(name: str, value: object) -> int:
     """Convert an integer that is not negative."""
     number = integer(name, value)
     if number < 0:
-        raise ValueError(_refusal(name, number, "0 or more"))
+        raise OptionError(_refusal(name, number, "0 or more"))
     return number
 
 
 def real(name: str, value: object, expected: str = "a number") -> float:
     """Convert a real number of any type."""
     if not isinstance(value, Real):
-        raise TypeError(_refusal(name, value, expected))
+        raise OptionTypeError(_refusal(name, value, expected))
     return float(value)
 
 
 def seconds(name: str, value: object) -> float:
-    """Convert a number of seconds. Raises `ValueError` unless it is finite and not negative."""
+    """Convert a number of seconds. Raises `OptionError` unless it is finite and not negative."""
     number = real(name, value, "seconds")
     if not 0 <= number < math.inf:
-        raise ValueError(_refusal(name, number, "0 or more seconds"))
+        raise OptionError(_refusal(name, number, "0 or more seconds"))
     return number
 
 
 def flag(name: str, value: object) -> bool:
     """Convert a Boolean of any type."""
     if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's is no Python integer
-        raise TypeError(_refusal(name, value, "True or False"))
+        raise OptionTypeError(_refusal(name, value, "True or False"))
     return bool(value)
 
 
@@ -105,7 +106,7 @@ def items_of(convert: Converter, expected: str) -> Converter:
 
     def convert_all(name: str, value: object) -> tuple[object, ...]:
         if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-            raise TypeError(_refusal(name, value, expected))
+            raise OptionTypeError(_refusal(name, value, expected))
         items = value if isinstance(value, tuple) else tuple(value)
         return tuple(convert(f"{name}[{place}]", item) for place, item in enumerate(items))
 
@@ -115,7 +116,7 @@ def items_of(convert: Converter, expected: str) -> Converter:
 def texts_by_name(name: str, value: object) -> Mapping[str, str]:
     """Convert a mapping of names to values; values become texts."""
     if not isinstance(value, Mapping):
-        raise TypeError(_refusal(name, value, "a mapping of names to values"))
+        raise OptionTypeError(_refusal(name, value, "a mapping of names to values"))
     return {text(f"a name in {name}", key): str(one) for key, one in value.items()}
 
 
@@ -138,5 +139,5 @@ def kill(name: str, value: object) -> object:
     from robochoc.communication.kill_schedule import Kill  # noqa: PLC0415 - start-up: seldom asked for
 
     if not isinstance(value, Kill):
-        raise TypeError(_refusal(name, value, "a Kill(robot, after_s)"))
+        raise OptionTypeError(_refusal(name, value, "a Kill(robot, after_s)"))
     return Kill(text(f"{name}.robot", value.robot), seconds(f"{name}.after_s", value.after_s))

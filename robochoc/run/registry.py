@@ -15,6 +15,7 @@ from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
 from robochoc.system.entry_points import EntryPoint
+from robochoc.system.errors import RobochocError
 from robochoc.system.installed import (
     all_entry_points,
     entry_point_names,
@@ -28,7 +29,7 @@ _STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
 """Protocols of single stages of a run, which cannot be asked for."""
 
 
-class UnknownProtocolError(LookupError):
+class UnknownProtocolError(RobochocError, LookupError):
     """No installed package offers a protocol of that name, or what it offers cannot be used."""
 
 

@@ -10,7 +10,7 @@ from typing import assert_never
 
 import msgspec
 
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 MAX_SERVICES = 64
 MAX_NAMES = 256
@@ -43,7 +43,7 @@ FAILURES = frozenset({Reason.ALREADY_REGISTERED, Reason.NOT_REGISTERED, Reason.I
 """Reasons that are found only during a request. Any other reason refuses it beforehand."""
 
 
-class RequestRefusedError(TransferableError):
+class RequestRefusedError(RobochocError):
     """The Directory does not do what it was asked: for `reason`, and what that is about."""
 
     def __init__(self, reason: Reason, *about: str) -> None:

@@ -13,10 +13,10 @@ import re
 from dataclasses import dataclass, field
 from typing import NamedTuple, assert_never
 
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 
-class SymbolicExpressionError(TransferableError, ValueError):
+class SymbolicExpressionError(RobochocError, ValueError):
     """A text that is not an expression, or not the expected one; `at` is the index of the character, from 0."""
 
     def __init__(self, message: str, at: int) -> None:

@@ -29,7 +29,7 @@ from robochoc.services.symbolic import (
     text_of,
     written,
 )
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 CAPS = Caps(characters=1 << 25, expressions=10_000, depth=16)
 """Limits of a message. The largest message of a protocol, a part of a `dpop` table, has 16 MiB (22 MiB as text)."""
@@ -38,7 +38,7 @@ _DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
 _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
 
 
-class ACLError(TransferableError, ValueError):
+class ACLError(RobochocError, ValueError):
     """An invalid text or message. `at`: the position of the error in the text; None: not known."""
 
     def __init__(self, message: str, at: int | None = None) -> None:

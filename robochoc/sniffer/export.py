@@ -19,6 +19,7 @@ from robochoc.sniffer.acl import text
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.page_data import DETAILS, STATES, PageData, message_columns, step_columns
 from robochoc.sniffer.trace import Trace
+from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import printable
 
 _encode = msgspec.json.encode
@@ -74,7 +75,7 @@ MOST_CHARACTERS = 50_000
 _LONGEST_LABEL = 60
 
 
-class TooMuchToDrawError(ValueError):
+class TooMuchToDrawError(RobochocError, ValueError):
     """A selection with more messages than a diagram can have."""
 
 

@@ -8,10 +8,12 @@ import stat
 from pathlib import Path
 from typing import Any
 
+from robochoc.system.errors import RobochocError
+
 _HEAD_BYTES = 256
 
 
-class NoFileError(OSError):
+class NoFileError(RobochocError, OSError):
     """A pipe, device or folder, which cannot be read repeatedly."""
 
 

@@ -28,6 +28,7 @@ from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.team_names import TeamNames
 from robochoc.sniffer.trace import RunRecord, Trace, TraceNote
+from robochoc.system.errors import RobochocError
 
 FORMAT = 1
 MOST_ROWS = 1 << 16
@@ -46,7 +47,7 @@ _OFTEN = {"heard", "improved"}
 _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 
-class BadRequestError(ValueError):
+class BadRequestError(RobochocError, ValueError):
     """A request for data that do not exist, or for too much data."""
 
 

@@ -10,6 +10,7 @@ from robochoc.journal.events import AnyEvent, Began, Received, Sent
 from robochoc.journal.journal import Journal
 from robochoc.sniffer.patterns import matching, unmatched
 from robochoc.sniffer.trace import Trace
+from robochoc.system.errors import RobochocError
 
 
 def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
@@ -58,7 +59,7 @@ def _selected_events(events: Sequence[AnyEvent], trace: Trace, messages: set[int
                 yield event
 
 
-class NothingSelectedError(ValueError):
+class NothingSelectedError(RobochocError, ValueError):
     """A part of a selection matches nothing in the journal; the message lists the existing names or numbers."""
 
 

@@ -38,6 +38,7 @@ from robochoc.journal.journal import Header, Journal
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.columns import NOT_YET, Contents, floats, longs, shorts
+from robochoc.system.errors import RobochocError
 
 
 class RunRecord(msgspec.Struct, frozen=True):
@@ -124,7 +125,7 @@ MOST_NAMES = 0xFFFF
 MOST_COUNTED = 1 << 53
 
 
-class TraceTooLargeError(ValueError):
+class TraceTooLargeError(RobochocError, ValueError):
     """A journal with more robots, types of messages, or runs than a trace can number."""
 
 

@@ -16,7 +16,7 @@ from robochoc.solver.compiled_domain import MAX_SOLUTIONS, CompiledDomain, TooMa
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.errors import SolverLostError, SolverTimeoutError, UnsupportedError
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class CompiledFrom(StrEnum):
     ACE = "ace"
 
 
-class CompileTimeoutError(TransferableError):
+class CompileTimeoutError(RobochocError):
     """The time limit for a robot's local problem was exceeded."""
 
     def __init__(self, robot: str, limit_s: float) -> None:
@@ -59,7 +59,7 @@ class CompileTimeoutError(TransferableError):
         self.robot = robot
 
 
-class CompileError(TransferableError):
+class CompileError(RobochocError):
     """The solver's process died while solving a robot's local problem."""
 
     def __init__(self, robot: str, why: str) -> None:
@@ -68,7 +68,7 @@ class CompileError(TransferableError):
         self.why = why
 
 
-class NoLocalSolutionError(TransferableError):
+class NoLocalSolutionError(RobochocError):
     """The private constraints of `robot` have no solution."""
 
     def __init__(self, robot: str) -> None:
@@ -76,7 +76,7 @@ class NoLocalSolutionError(TransferableError):
         self.robot = robot
 
 
-class TeamCompileTimeoutError(Exception):
+class TeamCompileTimeoutError(RobochocError):
     """The time limit of a run was exceeded before the robots could start."""
 
 

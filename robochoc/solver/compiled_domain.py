@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from robochoc.model.problem import Constraint, Robot, Value
 from robochoc.solver.encoding import Codes, Component, Cost, Network, components, cost_function, is_soft
 from robochoc.solver.errors import UnsupportedError
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 MAX_SOLUTIONS = 100_000
 """The default maximum number of local solutions of a robot."""
@@ -24,7 +24,7 @@ SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
 """Returns all solutions of a network of several variables, in codes, such as `AceProcess` in `solver/ace.py`."""
 
 
-class TooManySolutionsError(TransferableError):
+class TooManySolutionsError(RobochocError):
     """The robot has more local solutions, or values, than the limit."""
 
     def __init__(self, robot: str, limit: int) -> None:

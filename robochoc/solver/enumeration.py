@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from robochoc.solver.encoding import Codes, CodeTable, Costs, Network
+from robochoc.system.errors import RobochocError
 
 STEPS_EACH = 100_000
 """The maximum steps of every task: about as long as a query to a running ACE."""
@@ -28,7 +29,7 @@ PLACES_A_STEP = 4
 """The number of domains and tables that one step copies at every node. This also bounds the memory."""
 
 
-class OutOfStepsError(Exception):
+class OutOfStepsError(RobochocError):
     """The steps are used up before the search is complete."""
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 
-class UnsupportedError(Exception):
+class UnsupportedError(RobochocError):
     """The problem is valid, but not supported by this version or protocol. The message says what to do instead."""
 
 
@@ -13,15 +13,15 @@ class TooLargeError(UnsupportedError):
     """The problem is too large for this protocol, which was only detectable during the search."""
 
 
-class SolverMissingError(Exception):
+class SolverMissingError(RobochocError):
     """Java, or OR-Tools, is missing. The message contains the command that installs it."""
 
 
-class SolverLostError(Exception):
+class SolverLostError(RobochocError):
     """The solver's process died, or failed. The message contains the cause, if known."""
 
 
-class SolverTimeoutError(TransferableError):
+class SolverTimeoutError(RobochocError):
     """The deadline passed before the solver's answer. `best`: the cheapest solution so far, if costs are minimised."""
 
     def __init__(self, best: tuple[int, ...] | None = None) -> None:

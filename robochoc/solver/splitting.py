@@ -27,6 +27,7 @@ from robochoc.model.expression import (
 )
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.tree import BOUND
+from robochoc.system.errors import RobochocError
 
 SMALL = 256
 """The maximum number of combinations of values for which parts are joined in one table."""
@@ -214,7 +215,7 @@ class Split:
         return bounds(expression, limits)
 
 
-class NotSplitError(Exception):
+class NotSplitError(RobochocError):
     """The tables would still be too large."""
 
 

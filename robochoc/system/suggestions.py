@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import TypeVar
 
+from robochoc.system.errors import OptionError
+
 _Member = TypeVar("_Member", bound=StrEnum)
 
 
@@ -22,10 +24,10 @@ def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> s
 
 
 def member(choices: type[_Member], name: str, value: object) -> _Member:
-    """Return the member of `choices` that is called `value`. Raises `ValueError`, which names the nearest member."""
+    """Return the member of `choices` that is called `value`. Raises `OptionError`, which names the nearest member."""
     try:
         return choices(value)  # type: ignore[arg-type]
     except ValueError:
         known = [str(one) for one in choices]
         hint = did_you_mean(value, known, f"expected {', '.join(known)}")
-        raise ValueError(f"{name}={value!r} is not allowed; {hint}") from None
+        raise OptionError(f"{name}={value!r} is not allowed; {hint}") from None

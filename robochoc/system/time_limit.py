@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
+from robochoc.system.errors import RobochocError
 from robochoc.system.signals import are_held
 
 AGAIN_S = 0.05
@@ -25,7 +26,7 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
-class TimeLimitError(Exception):
+class TimeLimitError(RobochocError):
     """The time of a computation was over before its result."""
 
 

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from robochoc.flight.layout import Point
+from robochoc.system.errors import RobochocError
 from robochoc.vehicles.limits import SILENCE_S
 
 OFFBOARD = "OFFBOARD"
@@ -16,7 +17,7 @@ AWAY = frozenset({"RETURN_TO_LAUNCH", "MISSION", "FOLLOW_ME"})
 """Modes in which an autopilot flies by itself, requested by a person or its failsafe, never by us."""
 
 
-class RefusedError(Exception):
+class RefusedError(RobochocError):
     """The autopilot has denied a command, or has not answered. The message has the command and the reason."""
 
 

@@ -16,6 +16,7 @@ import msgspec
 from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
 from robochoc.formats.yaml_tree import Node, read_yaml, shown
+from robochoc.system.errors import RobochocError
 from robochoc.vehicles.frames import FAR_M, LATITUDE_MAX, GpsPlace
 from robochoc.vehicles.kinds import VehicleKind, address_of, shared_port
 
@@ -27,7 +28,7 @@ _CORNERS, _AXES = 2, 3
 _LARGE = 10**9
 
 
-class FleetError(Exception):
+class FleetError(RobochocError):
     """The fleet file is invalid. The message has the file, the line, and the expected content."""
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import msgspec
 
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import resolved
 from robochoc.system.signals import signals_held
 from robochoc.vehicles.fleet import AtEnd, Fleet
@@ -50,7 +51,7 @@ _SLICE_S = 0.2
 _DONE = (FlightPhase.ARRIVED, FlightPhase.LANDED, FlightPhase.OUT)
 
 
-class GuardError(Exception):
+class GuardError(RobochocError):
     """The guard process has ended or failed. The message states the behaviour of the vehicles."""
 
 

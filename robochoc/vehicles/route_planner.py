@@ -22,6 +22,7 @@ from robochoc.flight.coordination.paths import Space
 from robochoc.flight.coordination.spacing import TooCloseError, check_spacing
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import SLACK_M, Array, norms, squashed
+from robochoc.system.errors import RobochocError
 from robochoc.vehicles.fleet import Fleet, point_text
 
 _ORDERS = 6
@@ -31,7 +32,7 @@ _SPOTS = 2_000
 _RING = 8
 
 
-class RouteError(Exception):
+class RouteError(RobochocError):
     """There are no routes that keep vehicles apart. The message names the vehicles, or the obstacle."""
 
 

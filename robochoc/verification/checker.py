@@ -27,12 +27,13 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.model.team_edits import constraints_in_force
+from robochoc.system.errors import RobochocError
 
 MAX_TRIES = 20_000
 """The maximum number of values that are tried for the variables of a withdrawn robot."""
 
 
-class RefutedError(Exception):
+class RefutedError(RobochocError):
     """An answer that the checker or the central solver refutes: a fault of the protocol, or of this program."""
 
 

@@ -18,6 +18,7 @@ from robochoc.model.expression import Apply, Expression
 from robochoc.model.expression import Constant as Integer
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.problem import INFINITE, Team
+from robochoc.system.errors import RobochocError
 
 
 def limits_of(team: Team) -> dict[str, Interval]:
@@ -61,7 +62,7 @@ FEW = 8
 rules, all are assumptions of one model, and the solver reports which of them it has used."""
 
 
-class UntranslatedError(ValueError):
+class UntranslatedError(RobochocError, ValueError):
     """A rule cannot be translated to CPMpy here."""
 
 

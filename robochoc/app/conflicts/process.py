@@ -38,10 +38,11 @@ from robochoc.model.problem import Robot, Team
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
+from robochoc.system.errors import RobochocError
 from robochoc.system.orphans import signal_when_orphaned
 
 
-class OutOfTimeError(Exception):
+class OutOfTimeError(RobochocError):
     """The time limit was reached."""
 
 

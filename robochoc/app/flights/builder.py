@@ -36,6 +36,7 @@ from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import DecisionKind
 from robochoc.formats import InvalidInputError, read_team
 from robochoc.modelling.errors import ModelError
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 FLIGHT = "flight.html"
@@ -61,7 +62,7 @@ class BuildStage(StrEnum):
     DONE = "done"
 
 
-class CannotMakeError(Exception):
+class CannotMakeError(RobochocError):
     """A command has failed, with its error text."""
 
 

@@ -14,6 +14,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from robochoc.app.jobs.process import Command, Finished, GroupProcess
 from robochoc.app.log import log_error
+from robochoc.system.errors import RobochocError
 
 LOOK_S = 0.2
 """The interval of the callback that observes a process."""
@@ -33,11 +34,11 @@ Over = Callable[[str], object]
 """Called once, in the job's thread, if the job did not complete: with the error, or empty if the job was ended."""
 
 
-class EndedError(Exception):
+class EndedError(RobochocError):
     """The job was ended."""
 
 
-class LateError(Exception):
+class LateError(RobochocError):
     """A process has reached its time limit, and was ended."""
 
 

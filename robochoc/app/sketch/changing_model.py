@@ -23,13 +23,13 @@ from robochoc.formats import InvalidInputError
 from robochoc.modelling.errors import ModelError
 from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.model import Model
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 Domains = dict[tuple[str, str], list[Value]]
 """The values that are left, by robot and decision."""
 
 
-class FromScratchError(TransferableError, ValueError):
+class FromScratchError(RobochocError, ValueError):
     """Events cannot say this difference: the team decides anew. `key` is its text in the catalogue."""
 
     def __init__(self, key: str, **named: object) -> None:

@@ -14,7 +14,7 @@ from robochoc.app.sketch.palette import Form
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Decision, DecisionKind, Setting, Sketch, SketchRobot, SketchRule
 from robochoc.formats.names import MAX_WEIGHT, RESERVED, is_name
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 
 def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
@@ -75,7 +75,7 @@ class _ResizedMap:
         return [self._after.number(cell) for cell in cells if cell is not None and self._after.has(cell)]
 
 
-class EditError(TransferableError, ValueError):
+class EditError(RobochocError, ValueError):
     """An invalid edit: the `key` of its text in the catalogue, the arguments of the text, and the element."""
 
     def __init__(self, key: str, element: str = "", **named: object) -> None:

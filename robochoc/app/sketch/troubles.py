@@ -7,7 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from robochoc.app.texts import say
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 
 class About(StrEnum):
@@ -67,7 +67,7 @@ class Trouble(msgspec.Struct, frozen=True):
         return self.severity == Severity.ERROR
 
 
-class NotReadyError(TransferableError, ValueError):
+class NotReadyError(RobochocError, ValueError):
     """A sketch cannot be converted to a team. The message has the error and its remedy."""
 
     def __init__(self, trouble: Trouble) -> None:

@@ -15,7 +15,7 @@ from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.saved import saved_journal
 from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 if TYPE_CHECKING:
     from robochoc.journal.journal import Journal
@@ -140,7 +140,7 @@ def _pieces(
             return [_page(read, trace, selection)]
 
 
-class _TooManyError(TransferableError):
+class _TooManyError(RobochocError):
     """Too many messages for the format; `last` is the number of the last message that fits, or None."""
 
     def __init__(self, why: str, fitting: Sequence[int]) -> None:

@@ -9,7 +9,7 @@ from typing import IO, Any, ParamSpec, TypeVar
 
 import click
 
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 INVALID, USAGE, LIMIT, LOST = 1, 2, 3, 4
 
@@ -19,7 +19,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class Failure(TransferableError, click.ClickException):  # noqa: N818 - it ends a command, as click's do
+class Failure(RobochocError, click.ClickException):  # noqa: N818 - it ends a command, as click's do
     """An error that ends the command with `status`; its message is printed on standard error without a prefix."""
 
     def __init__(self, status: int, message: str) -> None:

@@ -27,12 +27,13 @@ from robochoc.model.problem import (
 )
 from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint
+from robochoc.system.errors import RobochocError
 
 MOST_TERMS = 1000
 """The most terms of a scope or a list of parameters."""
 
 
-class SharedConstraintError(ValueError):
+class SharedConstraintError(RobochocError, ValueError):
     """A constraint from another robot is invalid."""
 
 

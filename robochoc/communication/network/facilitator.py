@@ -19,12 +19,13 @@ from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, Reque
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, notification, subscribe
 from robochoc.services.sl import df_on
+from robochoc.system.errors import RobochocError
 
 MAX_REQUESTS_PER_S = 20
 """The most requests of a participant in a second."""
 
 
-class TooManyRequestsError(ValueError):
+class TooManyRequestsError(RobochocError, ValueError):
     """A participant sends too many requests."""
 
 

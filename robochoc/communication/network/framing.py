@@ -26,6 +26,7 @@ from robochoc.communication.network.control_messages import (
     Welcome,
 )
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import RobochocError
 
 MASTER = "MASTER"
 """The master's name, as in Figure 3. No robot can have it."""
@@ -48,7 +49,7 @@ class MessageTooLargeError(UnsupportedError):
     """A message needs more bytes than a frame may have."""
 
 
-class FrameRefusedError(ValueError):
+class FrameRefusedError(RobochocError, ValueError):
     """A frame is not accepted, for the reason in the message."""
 
 

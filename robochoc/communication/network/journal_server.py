@@ -18,6 +18,7 @@ import msgspec
 from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
+from robochoc.system.errors import RobochocError
 
 SNIFF = "sniff"
 """The name of the right."""
@@ -50,7 +51,7 @@ class Piece(msgspec.Struct, frozen=True, array_like=True):
     over: bool
 
 
-class NotAnsweredError(Exception):
+class NotAnsweredError(RobochocError):
     """A question has no answer. The message is the reason, for the master's observer. Empty: not reported."""
 
 

@@ -24,6 +24,7 @@ from robochoc.communication.network.profile import (
 from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import RunParameters
+from robochoc.system.errors import RobochocError
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
@@ -34,7 +35,7 @@ def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) ->
     return {name: tuple(sorted(profiles.keys() & others)) for name, others in met.items()}
 
 
-class RegistrationRefusedError(ValueError):
+class RegistrationRefusedError(RobochocError, ValueError):
     """A robot cannot be registered, for the reason in the message."""
 
 

@@ -21,6 +21,7 @@ from robochoc.model.costs import flat_units
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable, WhenAbsent
 from robochoc.solver.encoding import Cost, max_cost
+from robochoc.system.errors import RobochocError
 
 Ranges = tuple[tuple[int, int], ...]
 """A domain: first and last value of each range, ascending."""
@@ -38,7 +39,7 @@ LARGEST_CONSTANT = 2**62
 """The largest constant that may be added to the costs of all constraints."""
 
 
-class ProfileError(ValueError):
+class ProfileError(RobochocError, ValueError):
     """The profile of a robot is invalid."""
 
 

@@ -8,13 +8,13 @@ from collections.abc import Callable
 
 from robochoc.communication.network.control_messages import Welcome
 from robochoc.communication.network.transport import Transport
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 REGISTER_AGAIN_S = 1.0
 _INCARNATION_BYTES = 8
 
 
-class RunOverError(TransferableError):
+class RunOverError(RobochocError):
     """The run is over for this robot; `failed`: it could not be completed."""
 
     def __init__(self, why: str, *, failed: bool) -> None:

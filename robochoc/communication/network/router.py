@@ -22,6 +22,7 @@ from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import access_control, journal_qos
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
+from robochoc.system.errors import RobochocError
 from robochoc.system.signals import signals_held
 
 START_S = 60.0
@@ -63,7 +64,7 @@ _KEPT_THREADS = 100
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
 
-class RouterError(Exception):
+class RouterError(RobochocError):
     """The router cannot listen."""
 
 

@@ -25,6 +25,7 @@ from robochoc.communication.network.inbox import FrameArrived, FramesLost, Inbox
 from robochoc.communication.network.settings import LEASE_MS
 from robochoc.communication.network.zenoh_config import config
 from robochoc.communication.resources import require_descriptors
+from robochoc.system.errors import RobochocError
 
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 HEARTBEAT_S = 5.0
@@ -44,7 +45,7 @@ DESCRIPTORS = 24
 """Open files that a session may need, including those of zenoh's threads."""
 
 
-class CannotConnectError(Exception):
+class CannotConnectError(RobochocError):
     """There is no master at that address, or it does not admit us."""
 
 

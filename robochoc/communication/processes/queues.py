@@ -14,6 +14,8 @@ import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from robochoc.system.errors import RobochocError
+
 _LENGTH = struct.Struct("!i")
 _STAMPED = struct.Struct("!iIQ")
 _STAMP_BYTES = _STAMPED.size - _LENGTH.size
@@ -22,7 +24,7 @@ LARGEST_BODY = 1 << 26
 """64 MiB: larger than any message of ours, and a bound on the memory that an invalid length can allocate."""
 
 
-class CorruptQueueError(Exception):
+class CorruptQueueError(RobochocError):
     """The data is not a sequence of bodies, or one body is larger than `LARGEST_BODY`."""
 
 

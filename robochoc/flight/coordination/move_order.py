@@ -10,12 +10,12 @@ import numpy as np
 
 from robochoc.flight.coordination.spacing import Spacing
 from robochoc.maps.routes.distances import Array, norms
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 _Space = TypeVar("_Space", bound=Spacing)
 
 
-class NoRouteError(TransferableError, ValueError):
+class NoRouteError(RobochocError, ValueError):
     """No order of moves was found in which `drones` reach their goals.
 
     Standing points enclose them; or drones are in each other's way between walls, if these are `indoors`.

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from robochoc.maps.routes.distances import SLACK_M, Array, Flags, norms, segment_distances
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 
-class TooCloseError(TransferableError, ValueError):
+class TooCloseError(RobochocError, ValueError):
     """Two drones, or a drone and a standing point, would rest nearer to each other than the distance.
 
     `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from robochoc.model.expression.operators import ALIASES, OPERATORS, Operator
 from robochoc.model.expression.tree import SYMBOLIC, Apply, Constant, Expression, Name, Type, text
-from robochoc.system.errors import TransferableError
+from robochoc.system.errors import RobochocError
 
 MAX_TEXT = 64 * 1024
 MAX_DEPTH = 64
@@ -18,7 +18,7 @@ MAX_NODES = 10_000
 MAX_DIGITS = 18
 
 
-class ExpressionError(TransferableError, ValueError):
+class ExpressionError(RobochocError, ValueError):
     """The text is not an expression: what is wrong, where (an offset into the text), and what to do about it."""
 
     def __init__(self, message: str, position: int, hint: str = "") -> None:

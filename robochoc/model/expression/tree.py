@@ -6,6 +6,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from robochoc.system.errors import RobochocError
+
 BOUND = 2**63
 """No result may lie beyond +-BOUND: it is undefined instead."""
 
@@ -44,7 +46,7 @@ class Apply:
 Expression = Constant | Name | Apply
 
 
-class UndefinedValueError(ArithmeticError):
+class UndefinedValueError(RobochocError, ArithmeticError):
     """The expression has no value here: a division by zero, a negative exponent, or a result out of bounds."""
 
 

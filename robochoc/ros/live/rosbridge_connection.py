@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.robots.sink import Fields
+from robochoc.system.errors import RobochocError
 
 _DEPTH_MAX = 10
 """Fields are nested no deeper."""
@@ -261,7 +262,7 @@ def _connect(roslibpy: Any, url: str) -> Any:  # noqa: ANN401 - roslibpy is unty
     return connection
 
 
-class MalformedMessageError(ValueError):
+class MalformedMessageError(RobochocError, ValueError):
     """A message from the server does not have the form of one."""
 
 

@@ -24,6 +24,7 @@ from robochoc.robots.sink import Fields, Sink, SinkError
 from robochoc.robots.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.message_types import FieldsError, UnknownTypeError, Version, types_of
 from robochoc.ros.waypoint_types import short_kind
+from robochoc.system.errors import RobochocError
 from robochoc.system.files import PendingFile
 
 _END_OF_TIME = (1 << 32) * 10**9
@@ -46,7 +47,7 @@ Unpack = Callable[[bytes, int], bytes]
 """Decompresses its input, up to a number of bytes. May raise anything."""
 
 
-class RecordingDamagedError(Exception):
+class RecordingDamagedError(RobochocError):
     """The recording is damaged. The message says what is wrong."""
 
 

@@ -17,7 +17,6 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exclusions import allocation_fault
-from robochoc.system.errors import TransferableError
 from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
@@ -26,7 +25,7 @@ CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 """The problems that the central solver supports."""
 
 
-class UnfitProtocolError(TransferableError, UnsupportedError):
+class UnfitProtocolError(UnsupportedError):
     """The protocol does not fit; another one may. `complete`: it must be one that proves its answers."""
 
     def __init__(self, why: str, *, complete: bool = False) -> None:

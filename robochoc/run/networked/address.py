@@ -6,6 +6,8 @@ import ipaddress
 import re
 from typing import NamedTuple
 
+from robochoc.system.errors import RobochocError
+
 DEFAULT_PORT = 7447
 """Zenoh's own."""
 LOOPBACK = "127.0.0.1"
@@ -14,7 +16,7 @@ _BRACKETED = re.compile(r"\[([^]]*)](?::(.+))?")
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
-class AddressError(ValueError):
+class AddressError(RobochocError, ValueError):
     """A text that is not the address of a master."""
 
 

@@ -16,6 +16,7 @@ from robochoc.protocols.acts import Performative
 from robochoc.run.networked.address import Address
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in
+from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 ANSWER_S = 5.0
@@ -24,11 +25,11 @@ _NUMBER_BITS = 32
 SLOTS = ("name", "protocol", "variable", "topic", "ontology", "language")
 
 
-class NoAnswerError(Exception):
+class NoAnswerError(RobochocError):
     """The directory refuses a query, or does not answer."""
 
 
-class TemplateError(ValueError):
+class TemplateError(RobochocError, ValueError):
     """A template that nothing can be searched by."""
 
 

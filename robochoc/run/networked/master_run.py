@@ -37,6 +37,7 @@ from robochoc.run.networked.machines import Machines, claimed, first_names, regi
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import RobochocError
 from robochoc.verification.checker import RefutedError
 
 LOOPBACK_ADDRESS = Address(LOOPBACK)
@@ -105,7 +106,7 @@ class MasterPlan:
         )
 
 
-class TeamIncompleteError(Exception):
+class TeamIncompleteError(RobochocError):
     """The team was not complete in time."""
 
 

@@ -16,6 +16,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 
+from robochoc.system.errors import RobochocError
+
 Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict["Value", "Value"]
 """The value of an expression. Lists and dictionaries are always `BoundedTuple` and `BoundedDict`."""
 
@@ -32,7 +34,7 @@ _DECIMAL = re.compile(r"\s*[+-]?[0-9]{1,18}(\.[0-9]{1,18})?\s*")
 _PLACES = 18
 
 
-class NoValueError(Exception):
+class NoValueError(RobochocError):
     """The function has no value for these arguments; the message is the reason."""
 
 
