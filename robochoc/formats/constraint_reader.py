@@ -1,4 +1,4 @@
-"""One `constraint` element: a definition applied to a scope (docs/reference/format.md, "One robot")."""
+"""Read `constraint` elements: definitions applied to scopes (docs/reference/format.md, "One robot")."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from lxml import etree
 
 from robochoc.formats.costs import read_cost
-from robochoc.formats.definition_reader import integer
+from robochoc.formats.definition_reader import read_integer
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.global_constraints import is_global, read_global, variables_of
@@ -19,7 +19,7 @@ from robochoc.formats.robot_rules import (
     check_shared,
     refuse_private_part,
 )
-from robochoc.formats.symbols import check_kinds
+from robochoc.formats.symbols import check_argument_types
 from robochoc.formats.xml import attribute, line
 from robochoc.model.problem import (
     INFINITE,
@@ -35,10 +35,10 @@ from robochoc.model.problem import (
 
 @dataclass(frozen=True)
 class ConstraintContext:
-    """The names that a file's constraints can refer to.
+    """The names that the constraints of a file can refer to.
 
-    `definitions` holds None, and `own` the name nevertheless, for what is defined but has a mistake of its own:
-    references to it are no mistakes.
+    Invalid elements are listed too (`definitions` has None for them), so that references to them are not reported as
+    unknown.
     """
 
     kind: ProblemKind
@@ -49,11 +49,11 @@ class ConstraintContext:
     """The robot's own variables."""
     definitions: Mapping[str, Definition | None]
     symbolic: Mapping[str, bool]
-    """For each own variable, whether its values are symbols."""
+    """For each variable of the robot, whether its values are symbols."""
 
 
 def read_private(element: etree._Element, context: ConstraintContext) -> Constraint | None:
-    """Return an intra-agent constraint: over own variables only. See `_read` for the rest."""
+    """Return a private constraint, over this robot's variables only. None and errors: as for `_read`."""
     model = attribute(element, "model")
     refuse_private_part(ConstraintModel(model) if model else None)
     constraint = _read(element, context, ConstraintModel(model) if model else None)
@@ -63,7 +63,7 @@ def read_private(element: etree._Element, context: ConstraintContext) -> Constra
 
 
 def read_shared(element: etree._Element, context: ConstraintContext) -> Constraint | None:
-    """Return a constraint with a neighbour: over own variables and others'. See `_read` for the rest."""
+    """Return a constraint over variables of this robot and of neighbours. None and errors: as for `_read`."""
     model = attribute(element, "model")
     constraint = _read(element, context, ConstraintModel(model) if model else context.model)
     if constraint:
@@ -72,7 +72,7 @@ def read_shared(element: etree._Element, context: ConstraintContext) -> Constrai
 
 
 def _read(element: etree._Element, context: ConstraintContext, model: ConstraintModel | None) -> Constraint | None:
-    """Return the constraint, or None where its definition has a mistake of its own. Raises `MistakeError`."""
+    """Return the constraint, or None if its definition is invalid. Raises `MistakeError`."""
     scope = _terms(element.get("scope") or "")
     given = element.find("parameters")
     reference = attribute(element, "reference")
@@ -88,7 +88,7 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
     if not definition:
         return None
     cost = attribute(element, "cost")
-    price = read_cost(cost, context.units) if cost else INFINITE
+    violation_cost = read_cost(cost, context.units) if cost else INFINITE
     when_absent = attribute(element, "when_absent")
     constraint = Constraint(
         attribute(element, "name"),
@@ -96,19 +96,19 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
         scope,
         parameters,
         model,
-        price,
+        violation_cost,
         line(element),
         when_absent=WhenAbsent(when_absent) if when_absent else None,
     )
     check_constraint(constraint, context.kind, context.units)
-    check_kinds(constraint, context.symbolic)
+    check_argument_types(constraint, context.symbolic)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint
 
 
 def _refuse_elements(parameters: etree._Element | None) -> None:
     for child in () if parameters is None else parameters:
-        message = f"<{child.tag}/> in the parameters of a constraint that is not global"
+        message = f"<{child.tag}/> in the parameters: only global constraints have elements there"
         raise MistakeError(message, "write variables and integers")
 
 
@@ -118,7 +118,7 @@ def _terms(text: str) -> tuple[Term, ...]:
 
 def _constant(word: str) -> int:
     try:
-        return integer(word)
+        return read_integer(word)
     except MistakeError:
         hint = "separate names and integers by blanks"
         raise MistakeError(f"'{shortened(word)}' is neither a variable's name nor an integer", hint) from None

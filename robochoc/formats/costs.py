@@ -1,4 +1,4 @@
-"""Costs as users write them, `5`, `0.25`, `-3`, `infinity`: exact integers of a `CostUnits`; no float is involved.
+"""Costs as users write them, `5`, `0.25`, `-3`, `infinity`, are converted to integers of a `CostUnits` without floats.
 
 docs/reference/format.md, "Costs".
 """
@@ -31,7 +31,7 @@ _DECIMAL = f"write an integer or a decimal of at most {MAX_PLACES} places"
 
 
 def read_cost(word: str, units: CostUnits) -> float:
-    """Return the cost that `word` is, as an integer of `units`, or `INFINITE`. Raises `MistakeError`."""
+    """Return the cost in `word` as an integer of `units`, or `INFINITE`. Raises `MistakeError`."""
     if word in {"infinity", "+infinity", "-infinity"}:
         _check_forbids(word, units)
         return INFINITE
@@ -39,25 +39,25 @@ def read_cost(word: str, units: CostUnits) -> float:
 
 
 def cost_text(cost: float, units: CostUnits) -> str:
-    """Return `cost`, an integer of `units` or `INFINITE`, as `read_cost` reads it.
+    """Return the text of `cost`, an integer of `units` or `INFINITE`, for `read_cost`.
 
     Raises:
-        ValueError: for a cost that is no integer.
+        ValueError: if the cost is not an integer.
     """
     if cost == INFINITE:
         return "-infinity" if units.maximize else "infinity"
     if cost != int(cost):
-        raise ValueError(f"the cost {cost} is no integer")
+        raise ValueError(f"the cost {cost} is not an integer")
     return _decimal(int(cost), units.places)
 
 
 def scale_text(places: int) -> str:
-    """Return the `scale` of costs with so many decimal places: 0.001 for three."""
+    """Return the `scale` of costs with `places` decimal places: 0.001 for three."""
     return _decimal(1, places)
 
 
 def places_used(root: etree._Element) -> int:
-    """Return how many decimal places the costs in a file have. What is no cost is not looked at here."""
+    """Return the largest number of decimal places of a cost in a file. Invalid costs are ignored."""
     words = [attribute(element, "constant") for element in root.iterchildren("presentation")]
     words += [attribute(element, "defaultCost") for element in root.iterfind("relations/relation")]
     words += [attribute(element, "cost") for element in root.iter("constraint")]
@@ -69,7 +69,7 @@ def places_used(root: etree._Element) -> int:
 
 
 def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> CostUnits:
-    """Return the unit of a file's costs, in which there are so many `places`. Raises `MistakeError`."""
+    """Return the unit of the costs in a file, which have `places` decimal places. Raises `MistakeError`."""
     units = CostUnits(attribute(presentation, "objective") == "maximize", _scale(presentation, places))
     constant = attribute(presentation, "constant")
     if constant:
@@ -79,28 +79,28 @@ def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> 
 
 
 def check_units(units: CostUnits, kind: ProblemKind) -> None:
-    """Raise `MistakeError` unless a robot of that `kind` can count its costs so."""
+    """Raise `MistakeError` unless `units` are valid for a robot of that `kind`."""
     if not 0 <= units.places <= MAX_PLACES:
-        raise MistakeError(f"costs of {units.places} decimal places", f"expected 0 to {MAX_PLACES}")
+        raise MistakeError(f"costs with {units.places} decimal places", f"use 0 to {MAX_PLACES}")
     if not -BEYOND < units.constant < BEYOND:
         message = f"the constant of the costs has {digits(units.constant)} digits"
-        raise MistakeError(message, "at most 18, decimal places included: leave out constants, or use smaller ones")
+        raise MistakeError(message, "at most 18 are allowed, decimal places included: use smaller constants")
     if kind != ProblemKind.DISWCSP and units != CostUnits():
         what = "maximize" if units.maximize else "a constant cost" if units.constant else "a scale of costs"
         raise MistakeError(f"{what} in a DisCSP", 'write type="DisWCSP" in the presentation, or delete it')
 
 
-class Rescaled:
-    """Multiplies costs by `finer`: their robot counts in a coarser unit than the team. Definitions are made once."""
+class CostConversion:
+    """Converts the costs of robots to the finer unit of their team: multiplies them by `factor`."""
 
-    def __init__(self, finer: int) -> None:
-        self._finer = finer
+    def __init__(self, factor: int) -> None:
+        self._factor = factor
         self._known: dict[int, tuple[Definition, Definition]] = {}
 
     def robot(self, robot: Robot) -> Robot:
-        """Return `robot` with its costs in the finer unit. Raises `MistakeError`: they have too many digits then."""
+        """Return `robot` with its costs in the finer unit. Raises `MistakeError` if one then has too many digits."""
         constant = int(self.cost(robot.costs.constant))
-        places = robot.costs.places + len(str(self._finer)) - 1
+        places = robot.costs.places + len(str(self._factor)) - 1
         return replace(
             robot,
             private=self.constraints(robot.private),
@@ -116,9 +116,9 @@ class Rescaled:
         """Return `cost` in the finer unit. Raises `MistakeError`."""
         if cost == INFINITE:
             return cost
-        finer = int(cost) * self._finer
-        check_integer(finer)
-        return finer
+        converted = int(cost) * self._factor
+        check_integer(converted)
+        return converted
 
     def constraints(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         """Return `constraints` in the finer unit. Raises `MistakeError`."""
@@ -131,29 +131,29 @@ class Rescaled:
         return {name: one and self.definition(one) for name, one in definitions.items()}
 
     def definition(self, definition: Definition) -> Definition:
-        """Return `definition` in the finer unit. Raises `MistakeError`."""
+        """Return `definition` in the finer unit; the same object for the same definition. Raises `MistakeError`."""
         if not isinstance(definition, Relation) or definition.semantics != Semantics.SOFT:
             return definition
         if id(definition) not in self._known:
-            finer = replace(
+            converted = replace(
                 definition,
                 costs=tuple(map(self.cost, definition.costs)),
                 default_cost=self.cost(definition.default_cost),
             )
-            self._known[id(definition)] = definition, finer
+            self._known[id(definition)] = definition, converted
         return self._known[id(definition)][1]
 
 
 def _check_forbids(word: str, units: CostUnits) -> None:
     if (word == "-infinity") != units.maximize:
         aim, right = ("maximised", "-infinity") if units.maximize else ("minimised", "infinity")
-        raise MistakeError(f"the cost {word}, where costs are {aim}", f"write {right}: it forbids")
+        raise MistakeError(f"the cost {word}, where costs are {aim}", f"write {right} to forbid")
 
 
 def _integer(word: str, places: int) -> int:
     match = _NUMBER.fullmatch(word)
     if not match:
-        raise MistakeError(f"'{shortened(word)}' is no cost", f"{_DECIMAL}, or what forbids: infinity")
+        raise MistakeError(f"'{shortened(word)}' is not a cost", f"{_DECIMAL}, or infinity to forbid")
     sign, whole, decimals = match[1], match[2], (match[3] or "").rstrip("0")
     if len(decimals) > places:
         hint = f'write scale="{scale_text(len(decimals))}" in the presentation, or leave the scale out'
@@ -174,7 +174,7 @@ def _scale(presentation: etree._Element, places: int) -> int:
         return places
     if not _SCALE.fullmatch(given):
         hint = f"expected a power of ten of at most {MAX_PLACES} places: 1, 0.1, 0.01, ..."
-        raise MistakeError(f"the scale '{shortened(given)}'", hint)
+        raise MistakeError(f"invalid scale '{shortened(given)}'", hint)
     return len(given.partition(".")[2])
 
 

@@ -1,4 +1,7 @@
-"""Domains, and constraints in extension (docs/reference/format.md, "One robot")."""
+"""Read the elements that define domains, relations, predicates, functions and topics.
+
+docs/reference/format.md, "One robot".
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,12 @@ from lxml import etree
 
 from robochoc.formats.costs import read_cost
 from robochoc.formats.definitions import (
-    MAX_VALUES,
-    PREDEFINED,
     check_domain,
-    check_formal,
+    check_parameter_names,
     check_relation,
     check_tuple_count,
     expression_mistake,
-    parsed,
+    parse_once,
 )
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.symbols import SymbolTable, codes_of
@@ -24,108 +25,29 @@ from robochoc.formats.xml import attribute, line
 from robochoc.model.expression import Expression, ExpressionError, SymbolNames, Type, parse
 from robochoc.model.problem import INFINITE, CostUnits, Domain, Function, Predicate, Relation, Semantics, Topic
 
-__all__ = ["PREDEFINED", "read_function", "read_predicate", "read_topic"]
-
-
-def read_predicate(element: etree._Element, code: Callable[[str], int]) -> Predicate:
-    """Return a predicate from `int X symbol Y` and a Boolean functional expression. Raises `MistakeError`.
-
-    `code` returns the code of a symbol.
-    """
-    return Predicate(attribute(element, "name"), *_stated(element, Type.BOOLEAN, code))
-
-
-def read_function(element: etree._Element, code: Callable[[str], int]) -> Function:
-    """Return a function from `int X symbol Y` and an integer functional expression. Raises `MistakeError`.
-
-    `code` returns the code of a symbol.
-    """
-    return Function(attribute(element, "name"), *_stated(element, Type.INTEGER, code))
-
-
-def read_topic(element: etree._Element, variables: Collection[str], symbolic: Collection[str] = ()) -> Topic:
-    """Return a topic, whose `x`, `y` and `z` are expressions over the robot's own `variables`, the `symbolic` excepted.
-
-    Raises `MistakeError`.
-    """
-    given: dict[str, Expression] = {}
-    for axis in ("x", "y", "z"):
-        body = element.get(axis)
-        if body is not None:
-            try:
-                symbols = SymbolNames(symbolic, _no_symbol) if symbolic else None
-                given[axis] = parse(body, variables, Type.INTEGER, symbols)
-            except ExpressionError as error:
-                raise expression_mistake(f"{axis} of the topic", error) from None
-    kind = attribute(element, "type") or Topic.type
-    return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"))
-
-
-def _no_symbol(word: str) -> int:
-    raise ValueError(f"unknown name '{shortened(word)}'")
-
-
-def _stated(
-    element: etree._Element, wanted: Type, code: Callable[[str], int]
-) -> tuple[tuple[str, ...], Expression, tuple[str, ...]]:
-    """Return the formal parameters of a predicate or function, its body, and the parameters that are symbols."""
-    parameters, symbolic = _formal(element.findtext("parameters") or "")
-
-    def known(word: str) -> int:
-        try:
-            return code(word)
-        except MistakeError as mistake:
-            raise ValueError(mistake.message) from None
-
-    functional = element.find("expression/functional")
-    body = (functional.text if functional is not None else None) or ""
-    try:
-        if symbolic:
-            return parameters, parse(body, parameters, wanted, SymbolNames(symbolic, known)), symbolic
-        return parameters, parsed(body, parameters, wanted), ()
-    except ExpressionError as error:
-        below = body[: error.position].count("\n")
-        start = line(element if functional is None else functional)
-        what = f"{element.tag} {shortened(attribute(element, 'name'))}"
-        raise expression_mistake(what, error, start + below) from None
-
-
-def _formal(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names in `int X symbol Y`, and those that are symbols. Raises `MistakeError`."""
-    words = text.split()
-    names = tuple(words[1::2])
-    if len(words) % 2 or not {*words[::2]} <= {"int", "symbol"}:
-        hint = "write int X int Y, and symbol X for what takes symbols"
-        raise MistakeError(f"the parameters '{shortened(' '.join(words))}' cannot be read", hint)
-    check_formal(names)
-    return names, tuple(name for kind, name in zip(words[::2], names, strict=True) if kind == "symbol")
-
-
-__all__ = ["MAX_VALUES", "check_count", "integer", "read_domain", "read_relation"]
-
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _NUMERIC = re.compile(r"[-+.0-9]+$")
 _RANGE = re.compile(r"([+-]?[0-9]{1,18})(?:\.\.([+-]?[0-9]{1,18}))?")
 
 
-def integer(word: str) -> int:
-    """Return the integer that `word` is. Raises `MistakeError`; digits are counted before Python reads them."""
+def read_integer(word: str) -> int:
+    """Return the integer in `word`. Raises `MistakeError`; digits are counted before Python converts them."""
     if not _INTEGER.fullmatch(word):
-        raise MistakeError(f"'{shortened(word)}' is no integer", "at most 18 digits, and a sign")
+        raise MistakeError(f"'{shortened(word)}' is not an integer", "write at most 18 digits, with or without a sign")
     return int(word)
 
 
 def check_count(element: etree._Element, name: str, found: int) -> None:
-    """Raise `MistakeError` when the count in attribute `name` is there and wrong."""
+    """Raise `MistakeError` if the attribute `name` states another number than `found`."""
     given = attribute(element, name)
     if given and int(given) != found:
         raise MistakeError(f"{name} is {given}, but there are {found}", f'write {name}="{found}" or leave it out')
 
 
 def read_domain(element: etree._Element, table: SymbolTable) -> Domain:
-    """Return a domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges that do not touch; or from symbols.
+    """Return a domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges, or from symbols.
 
-    The symbols of a symbolic domain are those of the `table` so far. Raises `MistakeError`.
+    A symbolic domain gets the symbols that the `table` has so far. Raises `MistakeError`.
     """
     name, words = attribute(element, "name"), (element.text or "").split()
     if attribute(element, "type") == "symbolic":
@@ -142,7 +64,7 @@ def _range(word: str) -> range:
     match = _RANGE.fullmatch(word)
     if not match:
         hint = "write ranges of integers of at most 18 digits: 1..4 7 9..12"
-        raise MistakeError(f"'{shortened(word)}' is no range of integers", hint)
+        raise MistakeError(f"'{shortened(word)}' is not a range of integers", hint)
     first, last = int(match[1]), int(match[2] or match[1])
     if first > last:
         raise MistakeError(f"the range {word} is empty", f"write {last}..{first}")
@@ -150,9 +72,9 @@ def _range(word: str) -> range:
 
 
 def read_relation(element: etree._Element, units: CostUnits, code: Callable[[str], int]) -> Relation:
-    """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`; costs count in `units`.
+    """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`, with costs in `units`.
 
-    A cost holds for the tuples that follow, until the next one. `code` returns the code of a symbol. Raises
+    A cost applies to all tuples up to the next cost. `code` returns the code of a symbol. Raises
     `MistakeError`.
     """
     semantics = Semantics(attribute(element, "semantics"))
@@ -175,12 +97,12 @@ def read_relation(element: etree._Element, units: CostUnits, code: Callable[[str
 def _values(row: list[str], symbolic: tuple[int, ...], code: Callable[[str], int]) -> tuple[int, ...]:
     """Return a tuple's values; in `symbolic` columns the codes of symbols."""
     if not symbolic:
-        return tuple([integer(word) for word in row])
+        return tuple([read_integer(word) for word in row])
     for place in symbolic:
         if place < len(row) and _NUMERIC.match(row[place]):
             message = f"'{shortened(row[place])}' in a column of symbols"
             raise MistakeError(message, "a column holds symbols or integers, as the first tuple does")
-    return tuple([code(word) if place in symbolic else integer(word) for place, word in enumerate(row)])
+    return tuple([code(word) if place in symbolic else read_integer(word) for place, word in enumerate(row)])
 
 
 def _priced(words: list[str], units: CostUnits) -> tuple[list[str], list[float]]:
@@ -213,3 +135,77 @@ def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
     if not given and not tuples:
         raise MistakeError("a relation without tuples lacks its arity", 'write arity="2"')
     return int(given) if given else len(tuples[0])
+
+
+def read_predicate(element: etree._Element, code: Callable[[str], int]) -> Predicate:
+    """Return a predicate from `int X symbol Y` and a Boolean functional expression. Raises `MistakeError`.
+
+    `code` returns the code of a symbol.
+    """
+    return Predicate(attribute(element, "name"), *_read_intension(element, Type.BOOLEAN, code))
+
+
+def read_function(element: etree._Element, code: Callable[[str], int]) -> Function:
+    """Return a function from `int X symbol Y` and an integer functional expression. Raises `MistakeError`.
+
+    `code` returns the code of a symbol.
+    """
+    return Function(attribute(element, "name"), *_read_intension(element, Type.INTEGER, code))
+
+
+def read_topic(element: etree._Element, variables: Collection[str], symbolic: Collection[str] = ()) -> Topic:
+    """Return a topic, whose `x`, `y` and `z` are expressions over the robot's own `variables`, the `symbolic` excepted.
+
+    Raises `MistakeError`.
+    """
+    given: dict[str, Expression] = {}
+    for axis in ("x", "y", "z"):
+        body = element.get(axis)
+        if body is not None:
+            try:
+                symbols = SymbolNames(symbolic, _no_symbol) if symbolic else None
+                given[axis] = parse(body, variables, Type.INTEGER, symbols)
+            except ExpressionError as error:
+                raise expression_mistake(f"{axis} of the topic", error) from None
+    kind = attribute(element, "type") or Topic.type
+    return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"))
+
+
+def _no_symbol(word: str) -> int:
+    raise ValueError(f"unknown name '{shortened(word)}'")
+
+
+def _read_intension(
+    element: etree._Element, wanted: Type, code: Callable[[str], int]
+) -> tuple[tuple[str, ...], Expression, tuple[str, ...]]:
+    """Return the formal parameters of a predicate or function, its body, and the parameters that are symbols."""
+    parameters, symbolic = _read_parameters(element.findtext("parameters") or "")
+
+    def known_code(word: str) -> int:
+        try:
+            return code(word)
+        except MistakeError as mistake:
+            raise ValueError(mistake.message) from None
+
+    functional = element.find("expression/functional")
+    body = (functional.text if functional is not None else None) or ""
+    try:
+        if symbolic:
+            return parameters, parse(body, parameters, wanted, SymbolNames(symbolic, known_code)), symbolic
+        return parameters, parse_once(body, parameters, wanted), ()
+    except ExpressionError as error:
+        below = body[: error.position].count("\n")
+        start = line(element if functional is None else functional)
+        what = f"{element.tag} {shortened(attribute(element, 'name'))}"
+        raise expression_mistake(what, error, start + below) from None
+
+
+def _read_parameters(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names in `int X symbol Y`, and those that are symbols. Raises `MistakeError`."""
+    words = text.split()
+    names = tuple(words[1::2])
+    if len(words) % 2 or not {*words[::2]} <= {"int", "symbol"}:
+        hint = "write int X int Y, and symbol Z for a parameter that is a symbol"
+        raise MistakeError(f"invalid parameters '{shortened(' '.join(words))}'", hint)
+    check_parameter_names(names)
+    return names, tuple(name for kind, name in zip(words[::2], names, strict=True) if kind == "symbol")

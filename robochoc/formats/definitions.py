@@ -1,6 +1,6 @@
 """Rules for domains, relations, predicates and topics of files and objects (docs/reference/format.md, "One robot").
 
-Expressions have no rules here: a tree is written down and handed to the parser, whose rules are the only ones.
+Expressions have no rules of their own here: a tree is written as text and parsed, so that the parser's rules apply.
 """
 
 from __future__ import annotations
@@ -40,57 +40,57 @@ PREDEFINED: dict[str, Predicate] = {
 
 
 def check_domain(domain: Domain) -> None:
-    """Raise `MistakeError` unless the ranges are ascending and apart, and hold some values but not too many."""
+    """Raise `MistakeError` unless the ranges are ascending and disjoint, with 1 to `MAX_VALUES` values."""
     name = shortened(domain.name)
     for part in domain.ranges:
         check_integer(part.start)
         check_integer(part.stop - 1)
         if part.step != 1 or not part:
             wrong = f"the range {part.start}..{part.stop - 1} is empty" if part.step == 1 else f"{part} has a step"
-            raise MistakeError(wrong, "let each range hold every integer between its ends")
+            raise MistakeError(wrong, "use ranges of one or more integers with the step 1")
     if sum(part.stop - part.start for part in domain.ranges) > MAX_VALUES:
         raise MistakeError(f"domain {name} has more than {MAX_VALUES} values", "make it smaller")
     if not domain.ranges:
-        raise MistakeError(f"domain {name} has no value", "write ranges: 1..4 7 9..12")
+        raise MistakeError(f"domain {name} has no values", "write ranges: 1..4 7 9..12")
     for before, part in zip(domain.ranges, domain.ranges[1:], strict=False):
         if part.start < before.stop:
             if part.stop <= before.start:
-                raise MistakeError(f"the ranges of domain {name} are not in order", "let them ascend")
-            raise MistakeError(f"the value {part.start} stands twice in the domain", "let its ranges not overlap")
+                raise MistakeError(f"the ranges of domain {name} are not in order", "sort them in ascending order")
+            raise MistakeError(f"the value {part.start} occurs twice in the domain", "use ranges that do not overlap")
 
 
 def refuse_predefined(name: str) -> None:
-    """Raise `MistakeError` when a definition of one's own would be called `name`, and that means something else."""
+    """Raise `MistakeError` if `name` is that of a predefined predicate or of a global constraint."""
     if name in PREDEFINED:
-        raise MistakeError(f"'{shortened(name)}' is a predefined predicate", "give your own another name")
+        raise MistakeError(f"'{shortened(name)}' is a predefined predicate", "rename your definition")
     if name.startswith("global:"):
-        raise MistakeError(f"'{shortened(name)}' is the name of a global constraint", "give your own another name")
+        raise MistakeError(f"'{shortened(name)}' is the name of a global constraint", "rename your definition")
 
 
 def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:
-    """Raise `MistakeError` where a robot of that `kind` cannot have such a relation."""
+    """Raise `MistakeError` if a robot of that `kind` cannot have relations with these semantics."""
     if semantics == Semantics.SOFT and kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
         raise MistakeError("a soft relation in a DisCSP", hint)
 
 
 def refuse_function(kind: ProblemKind) -> None:
-    """Raise `MistakeError` where a robot of that `kind` cannot have a function: its value is a cost."""
+    """Raise `MistakeError` if a robot of that `kind` cannot have functions, whose values are costs."""
     if kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or a predicate'
         raise MistakeError("a function, whose value is a cost, in a DisCSP", hint)
 
 
 def check_relation(relation: Relation) -> None:
-    """Raise `MistakeError` unless its tuples have its arity, stand once, and cost something if it is soft."""
+    """Raise `MistakeError` unless the tuples have the relation's arity and are distinct, with costs if it is soft."""
     check_tuple_count(len(relation.tuples))
     if relation.semantics != Semantics.SOFT and (relation.default_cost != 0 or relation.costs):
         wrong = "defaultCost" if relation.default_cost != 0 else "costs"
-        hint = "supports and conflicts forbid, and cost nothing: make it soft"
+        hint = "only soft relations have costs: make it soft, or delete them"
         raise MistakeError(f"{wrong} in a {relation.semantics} relation", hint)
     if relation.arity < 1:
         message = f"a relation of arity {in_short(relation.arity)}"
-        raise MistakeError(message, "its tuples need a value for each variable of the scope")
+        raise MistakeError(message, "each tuple has a value for each variable of the scope: use 1 or more")
     _check_tuples(relation)
     if relation.semantics == Semantics.SOFT:
         if len(relation.costs) != len(relation.tuples):
@@ -103,7 +103,7 @@ def check_relation(relation: Relation) -> None:
 def check_tuple_count(number: int) -> None:
     """Raise `MistakeError` when a relation has too many tuples."""
     if number > MAX_TUPLES:
-        raise MistakeError(f"{number} tuples are more than {MAX_TUPLES}", "write a predicate instead")
+        raise MistakeError(f"{number} tuples, more than {MAX_TUPLES}", "write a predicate instead")
 
 
 def _check_tuples(relation: Relation) -> None:
@@ -111,42 +111,42 @@ def _check_tuples(relation: Relation) -> None:
         for value in values:
             check_integer(value)
         if len(values) != relation.arity:
-            message = f"the tuple '{shown(values)}' has {len(values)} values instead of {in_short(relation.arity)}"
+            message = f"the tuple '{terms_text(values)}' has {len(values)} values instead of {in_short(relation.arity)}"
             raise MistakeError(message, "separate values by a blank, and tuples by '|'")
     if len(set(relation.tuples)) < len(relation.tuples):
         seen: set[tuple[int, ...]] = set()
         for values in relation.tuples:
             if values in seen:
-                raise MistakeError(f"the tuple '{shown(values)}' stands twice", "delete one of them")
+                raise MistakeError(f"the tuple '{terms_text(values)}' occurs twice", "delete one of them")
             seen.add(values)
 
 
-def check_stated(definition: Predicate | Function, table: Sequence[str] = ()) -> None:
-    """Raise `MistakeError` unless it is an expression over its parameters, and nothing else.
+def check_body(definition: Predicate | Function, table: Sequence[str] = ()) -> None:
+    """Raise `MistakeError` unless the body is a valid expression over the parameters.
 
-    That of a predicate is Boolean, that of a function an integer. Symbols are in the `table`.
+    It is Boolean in a predicate, and an integer in a function. The `table` contains the symbols.
     """
     wanted = Type.BOOLEAN if isinstance(definition, Predicate) else Type.INTEGER
-    check_formal(definition.parameters)
+    check_parameter_names(definition.parameters)
     what = f"{type(definition).__name__.lower()} {shortened(definition.name)}"
     check_expression(what, definition.body, definition.parameters, wanted, (definition.symbolic, table))
 
 
-def check_formal(names: Sequence[str]) -> None:
-    """Raise `MistakeError` unless `names` can be a predicate's parameters."""
+def check_parameter_names(names: Sequence[str]) -> None:
+    """Raise `MistakeError` unless `names` are distinct and valid names of formal parameters."""
     seen: set[str] = set()
     for name in names:
         if not _PARAMETER.fullmatch(name):
-            raise MistakeError(f"'{shortened(name)}' is no name for a parameter", "write int X int Y")
+            raise MistakeError(f"'{shortened(name)}' is not a valid name of a parameter", "write int X int Y")
         if name in seen:
             raise MistakeError(f"two parameters are called '{shortened(name)}'", "rename one of them")
         seen.add(name)
 
 
 def check_topic(topic: Topic, own: Collection[str], symbolic: Sequence[str] = ()) -> None:
-    """Raise `MistakeError` unless `topic` says where to by integer expressions over the `own` variables.
+    """Raise `MistakeError` unless the coordinates of `topic` are integer expressions over the `own` variables.
 
-    Those that are `symbolic` are no integers.
+    Variables in `symbolic` are not integers.
     """
     check_word(topic.name)
     check_word(topic.type)
@@ -162,41 +162,43 @@ def check_expression(
     wanted: Type,
     symbols: tuple[Sequence[str], Sequence[str]] = ((), ()),
 ) -> None:
-    """Raise `MistakeError` unless `expression` is what its own text says: the parser's rules are the only ones.
+    """Raise `MistakeError` unless the text of `expression` can be parsed, to an equal expression.
 
-    `what` is of this expression, over `names`, which should yield a `wanted` value. `symbols` are those names that
-    stand for symbols, and the table of symbols.
+    Args:
+        what: The expression in messages.
+        expression: The expression.
+        names: The names that it may contain.
+        wanted: The type of its value.
+        symbols: The names that are symbols, and the table of symbols.
     """
     try:
         _check_size(expression)
         written = text(expression, *symbols)
         if symbols[0]:
-            again = parse(written, names, wanted, SymbolNames(symbols[0], symbols[1].index))
+            parsed = parse(written, names, wanted, SymbolNames(symbols[0], symbols[1].index))
         else:
-            again = parsed(written, tuple(names), wanted)
+            parsed = parse_once(written, tuple(names), wanted)
     except ExpressionError as error:
         raise expression_mistake(what, error) from None
-    if again != expression:
-        raise MistakeError(f"{what}: '{shortened(written)}' says something else", "use the operators of XCSP 2.1")
+    if parsed != expression:
+        message = f"{what}: its text '{shortened(written)}' is parsed as another expression"
+        raise MistakeError(message, "use the operators of XCSP 2.1")
 
 
 @lru_cache(maxsize=256)
-def parsed(written: str, names: tuple[str, ...], wanted: Type) -> Expression:
-    """Return what `parse` returns.
-
-    Robots of a team mostly have equal texts: these are parsed once and share one tree.
-    """
+def parse_once(written: str, names: tuple[str, ...], wanted: Type) -> Expression:
+    """Return the expression in a text. Equal texts, which robots of a team often have, are parsed once."""
     return parse(written, names, wanted)
 
 
 def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
-    """Return what is wrong with the expression of `what`, which stands in that `line`."""
+    """Return `error`, which is in the expression of `what` in that `line`, as a mistake of the file."""
     message = f"{what}: {error.message}, at character {error.position + 1}"
     return MistakeError(message, error.hint or "see docs/reference/format.md, 'Functional expressions'", line)
 
 
 def _check_size(expression: object) -> None:
-    """Raise `ExpressionError` for a tree that cannot be written down, before it is tried."""
+    """Raise `ExpressionError` for a tree that is too large to be written, or has nodes of other types."""
     waiting: list[tuple[object, int]] = [(expression, 1)]
     nodes = 0
     while waiting:
@@ -215,9 +217,9 @@ def _check_size(expression: object) -> None:
                 if not -BEYOND < value < BEYOND:
                     raise ExpressionError(f"an integer of {digits(value)} digits", 0, "18 digits are allowed")
             case _:
-                raise ExpressionError(f"a {type(node).__name__} where a term should stand", 0, "use Constant or Name")
+                raise ExpressionError(f"a {type(node).__name__} instead of a term", 0, "use Constant, Name or Apply")
 
 
-def shown(terms: Sequence[Term]) -> str:
-    """Return a scope or a tuple, as it stands in a message."""
+def terms_text(terms: Sequence[Term]) -> str:
+    """Return a scope or a tuple as text for a message."""
     return shortened(" ".join(map(in_short, terms)))

@@ -40,7 +40,7 @@ class InvalidInputError(RobochocError):
 
 
 def invalid_input(path: Path | str, message: str, hint: str, line: int = 0) -> InvalidInputError:
-    """Return the error for one mistake in a file, or in what goes by this name."""
+    """Return the error for one mistake in the file `path`, or in an input of this name."""
     return InvalidInputError([Diagnostic(encodable(str(path)), line, message, hint)])
 
 
@@ -62,15 +62,15 @@ class DiagnosticCollector:
         self._found: list[Diagnostic] = []
 
     def add(self, line: int, message: str, hint: str) -> None:
-        """Note a mistake. Raises `InvalidInputError` when the limit on mistakes is reached."""
+        """Add a mistake. Raises `InvalidInputError` when the limit on mistakes is reached."""
         if len(self._found) == MAX_PER_FILE:
-            self._found.append(Diagnostic(self.file, line, "and more mistakes from here on", "mend those above first"))
+            self._found.append(Diagnostic(self.file, line, "more mistakes from here on", "fix those above first"))
             raise InvalidInputError(self._found)
         self._found.append(Diagnostic(self.file, line, message, hint))
 
     @contextmanager
     def at(self, line: int) -> Iterator[None]:
-        """Note a `MistakeError` raised inside, and go on behind it: the next element may have others."""
+        """Add a `MistakeError` raised inside, and continue after the block: the next element may have others."""
         try:
             yield
         except MistakeError as mistake:
@@ -83,7 +83,7 @@ class DiagnosticCollector:
 
 
 def suggestion(word: str, known: Collection[str], what: str) -> str:
-    """Return a hint for an unknown name: the known one that looks like it, or all of them; `what` is their plural."""
+    """Return a hint for an unknown name: the most similar known name, or all known names; `what` is their plural."""
     if not known:
         return f"there are no {what}"
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
@@ -94,7 +94,7 @@ def suggestion(word: str, known: Collection[str], what: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return `text` short enough to stand in a message."""
+    """Return `text`, cut off if it is too long for a message."""
     return text if len(text) <= 60 else f"{text[:57]}..."  # noqa: PLR2004 - characters
 
 
@@ -104,5 +104,5 @@ def _place(diagnostic: Diagnostic) -> tuple[object, int]:
 
 
 def encodable(path: str) -> str:
-    """Return `path` as text that has a UTF-8 form: a file system's names need not have one."""
+    """Return `path` as text that can be encoded in UTF-8: names of files need not be valid UTF-8."""
     return os.fsencode(path).decode("utf-8", "replace")

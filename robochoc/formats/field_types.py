@@ -1,8 +1,7 @@
 """Checks that Python objects have the field types of their dataclasses: an `int` for an `int`, no list for a tuple.
 
-Python does not look at annotations. What a reader of files makes is right by construction; what a program builds need
-not be, and all other code relies on it: that a value is hashable, that it cannot be changed afterwards, that it is
-written down as it was meant.
+Python does not check annotations. Objects from readers of files are right by construction; objects that a program
+builds need not be, and all other code relies on hashable, immutable values.
 """
 
 from __future__ import annotations
@@ -19,36 +18,36 @@ from robochoc.model.expression import Apply, Constant, Name
 from robochoc.system.errors import RobochocError
 
 _LEAVES = (Apply, Constant, Name)
-"""Expressions: they may be too deep to be walked, and have a check of their own."""
+"""Classes of expressions: they may be too deep for recursion, and have a check of their own."""
 
-AS_BUILT = "build it as its class says"
+FIELD_TYPES_HINT = "give each field the type that its class declares"
 """The hint for a `FieldTypeError`."""
 
 _Check = Callable[[object], None]
 
 
 class FieldTypeError(RobochocError, TypeError):
-    """An object is not made as it should be: `path` leads to the part that is wrong."""
+    """A part of an object has the wrong type; `path` leads to it."""
 
     def __init__(self, value: object, expected: str) -> None:
         self.path = ""
         shown = f"'{shortened(value)}'" if isinstance(value, str) else f"a {type(value).__name__}"
-        super().__init__(f"{shown} where {expected} should stand")
+        super().__init__(f"{shown} instead of {expected}")
 
     @property
     def explanation(self) -> str:
-        """Return what is wrong, and where in the object."""
+        """Return the path of the part, and the error."""
         where = self.path.lstrip(".")
         return f"{where}: {self}" if where else str(self)
 
     def inside(self, step: str) -> FieldTypeError:
-        """Return the same mistake, one `step` deeper."""
+        """Return this error with `step` before its path."""
         self.path = f"{step}{self.path}"
         return self
 
 
 def check_field_types(value: object, kind: type) -> None:
-    """Raise `FieldTypeError` unless `value` is an object of the dataclass `kind`, and all its parts are as it says."""
+    """Raise `FieldTypeError` unless `value` and its parts have the types that the dataclass `kind` declares."""
     _check(kind)(value)
 
 
@@ -62,11 +61,11 @@ def _check(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
         return _exactly("a number", int, float)
     if hint is int:
         return _exactly("an integer", int)
-    return _Parts(hint) if is_dataclass(hint) and hint not in _LEAVES else _instance_of(hint)
+    return _FieldsCheck(hint) if is_dataclass(hint) and hint not in _LEAVES else _instance_of(hint)
 
 
 def _exactly(expected: str, *kinds: type) -> _Check:
-    """Return a check for numbers. It refuses True: that is an `int`, but is not written as a number."""
+    """Return a check for numbers. It rejects True, which is an `int` but is not written as a number."""
 
     def check(value: object) -> None:
         if type(value) not in kinds:
@@ -116,15 +115,15 @@ def _tuple_of(item: Any) -> _Check:  # noqa: ANN401 - an annotation
     return check
 
 
-class _Parts:
-    """A dataclass, field by field."""
+class _FieldsCheck:
+    """A check for a dataclass and all its fields."""
 
     def __init__(self, kind: Any) -> None:  # noqa: ANN401 - a dataclass
         self._kind = kind
-        self._whole = _instance_of(kind)
+        self._check_class = _instance_of(kind)
 
     def __call__(self, value: object) -> None:
-        self._whole(value)
+        self._check_class(value)
         for name, check in _fields_of(self._kind):
             try:
                 check(getattr(value, name))

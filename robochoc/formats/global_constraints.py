@@ -1,7 +1,7 @@
-"""Global constraints as XCSP 2.1 writes them: `allDifferent`, `weightedSum`, `element`, `cumulative`.
+"""Read and write the global constraints of XCSP 2.1: `allDifferent`, `weightedSum`, `element`, `cumulative`.
 
-What they say is an expression, their body; how they were written is kept beside it. Roussel and Lecoutre, "XML
-Representation of Constraint Networks: Format XCSP 2.1", 2009; docs/reference/format.md, "Global constraints".
+Each gets an equivalent expression as its body, and keeps its written form. Roussel and Lecoutre, "XML Representation of
+Constraint Networks: Format XCSP 2.1", 2009; docs/reference/format.md, "Global constraints".
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.expression.parser import MAX_NODES
 
 PREFIX = "global:"
-"""What references to global constraints begin with."""
+"""The prefix of references to global constraints."""
 
 _WORD = re.compile(r"[][{}]|<[a-z]+/>|[^][{}<>\s]+")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
@@ -29,11 +29,11 @@ _SPLIT = "split it into several"
 
 
 def read_global(reference: str, parameters: etree._Element | None, scope: Sequence[Term]) -> GlobalPredicate:
-    """Return the global constraint that stands in a file, about formal parameters. Raises `MistakeError`.
+    """Return the global constraint in a file, over formal parameters. Raises `MistakeError`.
 
     Args:
         reference: Its name, with `global:`.
-        parameters: The element of its parameters; None: all of the `scope`, which allDifferent takes.
+        parameters: The element of its parameters. None: the terms of the `scope`, which only allDifferent allows.
         scope: The terms of the constraint's scope.
     """
     text = "" if parameters is None else parameters.text or ""
@@ -56,7 +56,7 @@ def variables_of(parameters: etree._Element | None, scope: Sequence[Term]) -> tu
 
 
 def write_global(element: etree._Element, predicate: GlobalPredicate, terms: Sequence[Term]) -> None:
-    """Write how a global constraint is about `terms`, which its formal parameters receive, into `element`."""
+    """Write the form of a global constraint into `element`, with `terms` in place of its formal parameters."""
     actual = dict(zip(predicate.parameters, map(str, terms), strict=True))
     text, last = "", None
     for word in predicate.form.split():
@@ -69,30 +69,32 @@ def write_global(element: etree._Element, predicate: GlobalPredicate, terms: Seq
 
 
 def check_global(predicate: GlobalPredicate) -> None:
-    """Raise `MistakeError` unless the body of a global constraint is what its form says."""
+    """Raise `MistakeError` unless the body of a global constraint follows from its form."""
     form: object = predicate.form
-    made = _expanded(predicate.name, form.split() if isinstance(form, str) else [])
-    if (made.parameters, made.body) != (predicate.parameters, predicate.body):
-        raise MistakeError(f"{shortened(predicate.name)} says something else than its form", "make it by `read_form`")
+    expected = _expanded(predicate.name, form.split() if isinstance(form, str) else [])
+    if (expected.parameters, expected.body) != (predicate.parameters, predicate.body):
+        message = f"the body of {shortened(predicate.name)} does not follow from its form"
+        raise MistakeError(message, "create it with `read_form`")
     if predicate.symbolic and predicate.name != f"{PREFIX}allDifferent":
-        raise MistakeError(f"{shortened(predicate.name)} over symbols", "only allDifferent takes them")
+        raise MistakeError(f"{shortened(predicate.name)} over symbols", "only allDifferent accepts symbols")
 
 
 def read_form(reference: str, form: str) -> GlobalPredicate:
-    """Return a global constraint about formal parameters `X0`, `X1`, ... from its `form`: `[ X0 X1 X2 ]`.
+    """Return a global constraint over formal parameters `X0`, `X1`, ... from its `form`: `[ X0 X1 X2 ]`.
 
     Args:
         reference: Its name, with `global:`.
-        form: Its parameters as XCSP 2.1 writes them, formal ones for variables, in the order of their numbers.
+        form: Its parameters as XCSP 2.1 writes them, with formal parameters for variables, in the order of their
+            numbers.
 
     Raises:
-        MistakeError: if it is of another kind, or its parameters are not as they should be.
+        MistakeError: if the global constraint is unknown, or its parameters are invalid.
     """
     return _expanded(reference, _WORD.findall(form))
 
 
 def is_global(reference: str) -> bool:
-    """Return whether a constraint's `reference` is to a global constraint."""
+    """Return whether `reference` names a global constraint."""
     return reference.startswith(PREFIX)
 
 
@@ -107,113 +109,112 @@ def _expanded(reference: str, form: Sequence[str]) -> GlobalPredicate:
     kind = reference.removeprefix(PREFIX)
     if kind not in _KINDS or not is_global(reference):
         known = " ".join(PREFIX + one for one in _KINDS)
-        raise MistakeError(f"the global constraint '{shortened(reference)}' is not known", f"known are {known}")
+        raise MistakeError(f"unknown global constraint '{shortened(reference)}'", f"supported: {known}")
     if len(form) > MAX_NODES:
         raise MistakeError(f"{reference} has {len(form)} words", f"{MAX_NODES} are allowed: {_SPLIT}")
-    words = _Words(reference, form)
+    words = _WordReader(reference, form)
     body = _KINDS[kind](words)
     words.end()
     names = tuple(dict.fromkeys(word for word in form if is_name(word)))
     return GlobalPredicate(reference, names, body, form=" ".join(form))
 
 
-class _Words:
-    """The words of a form, one after the other."""
+class _WordReader:
+    """Reads the words of a form, one after the other."""
 
     def __init__(self, reference: str, words: Sequence[str]) -> None:
         self._reference = reference
         self._words = words
         self._next = 0
 
-    def at(self, word: str) -> bool:
-        """Return whether `word` comes next."""
+    def is_next(self, word: str) -> bool:
         return self._next < len(self._words) and self._words[self._next] == word
 
     def skip(self, word: str) -> bool:
-        """Go behind `word`, if it comes next."""
-        found = self.at(word)
+        """Skip `word` if it is next. Return whether it was."""
+        found = self.is_next(word)
         self._next += found
         return found
 
-    def want(self, word: str) -> None:
+    def expect(self, word: str) -> None:
         if not self.skip(word):
-            raise self.wrong(f"'{word}'")
+            raise self.error(f"'{word}'")
 
     def term(self) -> Expression:
-        """Return a variable or an integer."""
+        """Read a variable or an integer."""
         word = self._words[self._next] if self._next < len(self._words) else ""
         if is_name(word):
             self._next += 1
             return Name(word)
         if not _INTEGER.fullmatch(word):
-            raise self.wrong("a variable or an integer")
+            raise self.error("a variable or an integer")
         self._next += 1
         return Constant(int(word))
 
-    def listed(self, opening: str, one: Callable[[], Expression], closing: str) -> Iterator[Expression]:
-        """Yield each `one` between brackets."""
-        self.want(opening)
+    def read_list(self, opening: str, read_item: Callable[[], Expression], closing: str) -> Iterator[Expression]:
+        """Yield the items between brackets."""
+        self.expect(opening)
         while not self.skip(closing):
-            yield one()
+            yield read_item()
 
     def comparison(self, allowed: Collection[str]) -> str:
         for word in allowed:
             if self.skip(f"<{word}/>"):
                 return word
-        raise self.wrong(" or ".join(f"<{word}/>" for word in allowed))
+        raise self.error(" or ".join(f"<{word}/>" for word in allowed))
 
-    def few(self, number: int, most: int) -> None:
-        """Raise `MistakeError` where there are so many that the expression would be too long."""
+    def check_number(self, number: int, most: int, items: str) -> None:
+        """Raise `MistakeError` if there are so many items that the expression would be too long."""
         if number > most:
-            raise MistakeError(f"{self._reference} over {number} of them", f"{most} are allowed: {_SPLIT}")
+            raise MistakeError(f"{self._reference} with {number} {items}", f"{most} are allowed: {_SPLIT}")
 
     def end(self) -> None:
         if self._next < len(self._words):
-            raise self.wrong("the end")
+            raise self.error("the end")
 
-    def wrong(self, wanted: str) -> MistakeError:
-        """Return the mistake that the next word is not what is `wanted`."""
-        there = f"'{shortened(self._words[self._next])}'" if self._next < len(self._words) else "the end"
+    def error(self, wanted: str) -> MistakeError:
+        """Return the error for another next word than expected."""
+        found = f"'{shortened(self._words[self._next])}'" if self._next < len(self._words) else "the end"
         hint = f"write {_EXAMPLES[self._reference.removeprefix(PREFIX)]}"
-        return MistakeError(f"the parameters of {self._reference}: {there} where {wanted} should stand", hint)
+        return MistakeError(f"the parameters of {self._reference}: {found} instead of {wanted}", hint)
 
 
-def _all_different(words: _Words) -> Expression:
-    terms = list(words.listed("[", words.term, "]"))
+def _all_different(words: _WordReader) -> Expression:
+    terms = list(words.read_list("[", words.term, "]"))
     if len(terms) <= 1:
-        raise words.wrong("a list of two terms or more")
-    words.few(len(terms), 80)
+        raise words.error("a list of two terms or more")
+    words.check_number(len(terms), 80, "terms")
     return _joined("and", [Apply("ne", pair) for pair in itertools.combinations(terms, 2)])
 
 
-def _weighted_sum(words: _Words) -> Expression:
+def _weighted_sum(words: _WordReader) -> Expression:
     def product() -> Expression:
-        words.want("{")
+        words.expect("{")
         weight, term = words.term(), words.term()
-        words.want("}")
+        words.expect("}")
         if not isinstance(weight, Constant):
-            raise words.wrong("an integer before each variable")
+            raise words.error("an integer before each variable")
         return term if weight.value == 1 else Apply("mul", (weight, term))
 
-    products = list(words.listed("[", product, "]"))
-    words.few(len(products), 2000)
+    products = list(words.read_list("[", product, "]"))
+    words.check_number(len(products), 2000, "terms")
     if not products:
-        raise words.wrong("a list of {weight variable}")
+        raise words.error("a list of {weight variable}")
     operator = words.comparison(_COMPARISONS)
     return Apply(operator, (_joined("add", products), words.term()))
 
 
-def _element(words: _Words) -> Expression:
-    """The index counts from 1."""
+def _element(words: _WordReader) -> Expression:
+    """Return `items[index] = value`; the index counts from 1."""
     outer = words.skip("[")
     index = words.term()
-    items = list(words.listed("[", words.term, "]"))
-    words.few(len(items), 1000)
+    items = list(words.read_list("[", words.term, "]"))
+    words.check_number(len(items), 1000, "items")
     if not items:
-        raise words.wrong("a list of one term or more")
+        raise words.error("a list of one term or more")
     value = words.term()
     if outer:
-        words.want("]")
+        words.expect("]")
     cases = [
         Apply("and", (Apply("eq", (index, Constant(place))), Apply("eq", (item, value))))
         for place, item in enumerate(items, start=1)
@@ -222,30 +223,30 @@ def _element(words: _Words) -> Expression:
 
 
 class _Task:
-    """A task of cumulative: two of origin, duration and end, or all; and its height."""
+    """A task of cumulative: at least two of origin, duration and end; and its height."""
 
-    def __init__(self, words: _Words) -> None:
-        words.want("{")
+    def __init__(self, words: _WordReader) -> None:
+        words.expect("{")
         given = [None if words.skip(_NIL) else words.term()]
         while not words.skip("}"):
             given.append(None if words.skip(_NIL) else words.term())
         origin, duration, end, height = self._parts(given, words)
         self.conditions = [Apply("ge", (part, Constant(0))) for part in (duration, height) if isinstance(part, Name)]
-        """What must hold of the task by itself."""
+        """The conditions on this task alone."""
         for part in (duration, height):
             if isinstance(part, Constant) and part.value < 0:
-                raise words.wrong("tasks with durations and heights of 0 or more")
+                raise words.error("tasks with durations and heights of 0 or more")
         if origin and duration and end:
             self.conditions.append(Apply("eq", (Apply("add", (origin, duration)), end)))
-        self.begin = origin or Apply("sub", (_there(end), _there(duration)))
-        self.end = end or Apply("add", (_there(origin), _there(duration)))
+        self.start = origin or Apply("sub", (_given(end), _given(duration)))
+        self.end = end or Apply("add", (_given(origin), _given(duration)))
         if origin and end and not duration:
             self.conditions.append(Apply("le", (origin, end)))
         self.height = height
 
     @staticmethod
     def _parts(
-        given: list[Expression | None], words: _Words
+        given: list[Expression | None], words: _WordReader
     ) -> tuple[Expression | None, Expression | None, Expression | None, Expression]:
         match given:
             case [origin, duration, height] if origin and duration and height:
@@ -253,33 +254,33 @@ class _Task:
             case [origin, duration, end, height] if height and [origin, duration, end].count(None) <= 1:
                 return origin, duration, end, height
             case _:
-                raise words.wrong(
+                raise words.error(
                     "{origin duration height} or {origin duration end height}, in which one may be <nil/>,"
                 )
 
     def load(self, now: Expression) -> Expression:
-        """Return what the task takes at the time `now`."""
-        runs = Apply("and", (Apply("le", (self.begin, now)), Apply("lt", (now, self.end))))
+        """Return the load of the task at the time `now`."""
+        runs = Apply("and", (Apply("le", (self.start, now)), Apply("lt", (now, self.end))))
         return Apply("if", (runs, self.height, Constant(0)))
 
 
-def _cumulative(words: _Words) -> Expression:
-    """The load grows only where a task begins, so it is compared with the limit there."""
-    words.want("[")
+def _cumulative(words: _WordReader) -> Expression:
+    """Compare the load with the limit where a task starts: the load grows nowhere else."""
+    words.expect("[")
     tasks = []
     while not words.skip("]"):
         tasks.append(_Task(words))
-        words.few(len(tasks), 25)
+        words.check_number(len(tasks), 25, "tasks")
     if not tasks:
-        raise words.wrong("a task")
+        raise words.error("a task")
     words.skip("<le/>")
     limit = words.term()
     conditions: list[Expression] = [one for task in tasks for one in task.conditions]
-    conditions += [Apply("le", (_joined("add", [other.load(task.begin) for other in tasks]), limit)) for task in tasks]
+    conditions += [Apply("le", (_joined("add", [other.load(task.start) for other in tasks]), limit)) for task in tasks]
     return _joined("and", conditions)
 
 
-def _there(part: Expression | None) -> Expression:
+def _given(part: Expression | None) -> Expression:
     if part is None:
         raise ValueError("a task has two of origin, duration and end")
     return part
@@ -290,7 +291,7 @@ def _joined(operator: str, terms: Iterable[Expression]) -> Expression:
     return several[0] if len(several) == 1 else Apply(operator, several)
 
 
-_KINDS: dict[str, Callable[[_Words], Expression]] = {
+_KINDS: dict[str, Callable[[_WordReader], Expression]] = {
     "allDifferent": _all_different,
     "weightedSum": _weighted_sum,
     "element": _element,
@@ -299,7 +300,7 @@ _KINDS: dict[str, Callable[[_Words], Expression]] = {
 _EXAMPLES = {
     "allDifferent": "[ V0 V1 V2 ]",
     "weightedSum": "[ {1 V0} {-1 V1} ] <le/> 3",
-    "element": "V0 [ 5 V1 7 ] V2: the first counts, from 1",
+    "element": "V0 [ 5 V1 7 ] V2: the index V0, from 1 on, selects V2",
     "cumulative": "[ {V0 2 1} {V1 2 <nil/> 1} ] <le/> 1",
 }
 __all__ = ["check_global", "is_global", "read_form", "read_global", "variables_of", "write_global"]

@@ -13,7 +13,7 @@ from robochoc.model.problem import Child, Constraint, Parent
 
 
 class Location(NamedTuple):
-    """A file and a line in it (0: no line is to blame); or an object, by what it is and is called."""
+    """A file and a line in it (0: the whole file); or an object, by its kind and name."""
 
     file: str
     line: int = 0
@@ -22,7 +22,7 @@ class Location(NamedTuple):
         return f"{self.file}:{self.line}" if self.line else self.file
 
     def mistake(self, message: str, hint: str) -> Diagnostic:
-        """Return what is wrong there."""
+        """Return a diagnostic for this location."""
         return Diagnostic(self.file, self.line, message, hint)
 
 
@@ -30,24 +30,24 @@ class Locations(Protocol):
     """The locations of one robot and its parts."""
 
     def robot(self) -> Location:
-        """Return where the robot itself stands."""
+        """Return the location of the robot."""
 
     def variable(self, name: str) -> Location:
-        """Return where its variable `name` stands."""
+        """Return the location of the variable `name`."""
 
     def constraint(self, constraint: Constraint) -> Location:
-        """Return where a constraint that it holds stands."""
+        """Return the location of a constraint of the robot."""
 
     def neighbour(self, neighbour: Parent | Child) -> Location:
-        """Return where a neighbour is listed."""
+        """Return the location of the entry of a neighbour."""
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return the message and the hint for a neighbour that is not there."""
+        """Return the message and the hint for a neighbour that the team lacks."""
 
 
 @dataclass(frozen=True)
 class FileLocations:
-    """A robot in the XML file `file`, which says in `line` what kind of problem it is, and its variables in `lines`."""
+    """The locations of a robot in the XML file `file`: its presentation in `line`, its variables in `lines`."""
 
     file: str
     line: int
@@ -70,14 +70,14 @@ class FileLocations:
         return Location(self.file, neighbour.line)
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return the file that should be there."""
+        """Return that the file of the neighbour is missing."""
         missing = Path(self.file).parent / name
         return f"has no file: there is no {missing}.xml", "write that file or delete this agent"
 
 
 @dataclass(frozen=True)
 class ObjectLocations:
-    """A robot that was built in Python. Lines of a file that it may once have been read from are ignored."""
+    """The locations of a robot that was built in Python, by names. Lines of a file are ignored."""
 
     name: str
 
@@ -99,7 +99,7 @@ class ObjectLocations:
         return self._part("parent" if isinstance(neighbour, Parent) else "child", neighbour.name)
 
     def part(self, what: str, name: str) -> Location:
-        """Return anything else of the robot, by its name."""
+        """Return another part of the robot, by its name."""
         return self._part(what, name)
 
     def absent(self, name: str) -> tuple[str, str]:

@@ -13,16 +13,16 @@ MAX_WEIGHT = 1_000_000
 BEYOND = 10**18
 """Integers have at most 18 digits."""
 MAX_NAME = 251
-"""Characters of a robot's name: with `.xml` it is a file's, and no file system takes a longer one."""
+"""The maximum length of a robot's name: with `.xml` it is a file name, and file systems allow no longer ones."""
 _WRITABLE = 2000
-"""Bits of an integer that Python writes in any case."""
+"""Python converts integers of up to so many bits to text, whatever its limit is."""
 RESERVED = "scenario"
-"""No robot's name: the file of that name says how a team changes."""
+"""A name that no robot can have: `scenario.xml` contains the changes of a team."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
 _WORD = re.compile(r"[^ \t\r\n]+")
 _NO_XML = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""Characters that no XML file can hold."""
+"""Characters that XML does not allow."""
 
 
 def is_name(word: str) -> bool:
@@ -38,22 +38,22 @@ def check_name(name: str) -> None:
 
 
 def check_robot_name(name: str, hint: str = "rename it") -> None:
-    """Raise `MistakeError` unless `name` can be a robot's. `hint` says how to give it another."""
+    """Raise `MistakeError` unless `name` can be a robot's name. `hint` is the way to change it."""
     if not is_name(name) or name == RESERVED or len(name) > MAX_NAME:
         what = f"'{shortened(name)}' cannot be a robot's name"
         raise MistakeError(what, f"{hint}: a letter, then letters, digits, '.' and '_'")
 
 
 def check_word(word: str) -> None:
-    """Raise `MistakeError` unless `word` can be the name of anything else."""
+    """Raise `MistakeError` unless `word` can be the name of another part: a domain, a definition, a constraint."""
     if not _WORD.fullmatch(word) or _NO_XML.search(word):
         raise MistakeError(f"the name '{shortened(word)}' is not allowed", "expected a name without blanks")
 
 
 def check_integer(value: int) -> None:
-    """Raise `MistakeError` where `value` has more digits than are allowed."""
+    """Raise `MistakeError` if `value` has more than 18 digits."""
     if not -BEYOND < value < BEYOND:
-        raise MistakeError(f"an integer of {digits(value)} digits", "at most 18 digits, and a sign")
+        raise MistakeError(f"an integer of {digits(value)} digits", "use at most 18 digits")
 
 
 def check_cost(cost: float) -> None:
@@ -61,8 +61,8 @@ def check_cost(cost: float) -> None:
     if cost == INFINITE:
         return
     if not isinstance(cost, int):
-        hint = "costs are integers in the unit of `Robot.costs`, or INFINITE, which forbids also when maximising"
-        raise MistakeError(f"the cost {cost} is no integer", hint)
+        hint = "use integers in the unit of `Robot.costs`, or INFINITE to forbid, also when maximising"
+        raise MistakeError(f"the cost {cost} is not an integer", hint)
     check_integer(cost)
 
 
@@ -74,17 +74,17 @@ def check_weight(weight: int) -> None:
 
 
 def check_unique(what: str, name: str, known: Collection[str]) -> None:
-    """Raise `MistakeError` when `name` is in `known`; `what` has that name."""
+    """Raise `MistakeError` if `name`, that of a `what`, is already in `known`."""
     if name in known:
         raise MistakeError(f"a second {what} '{shortened(name)}'", "names are unique in a file: rename one of them")
 
 
 def digits(value: int) -> int:
-    """Return how many there are; of thousands more or less, as Python writes no integer of so many."""
+    """Return the number of digits of `value`; of very long integers an estimate, since Python does not print them."""
     bits = value.bit_length()
     return len(str(abs(value))) if bits < _WRITABLE else int(bits * 0.30103) + 1
 
 
 def in_short(term: str | int) -> str:
-    """Return a name or an integer as it may stand in a message: Python writes no integer of thousands of digits."""
+    """Return a name or an integer as text for a message; of a longer integer the number of its digits."""
     return term if isinstance(term, str) else str(term) if -BEYOND < term < BEYOND else f"({digits(term)} digits)"

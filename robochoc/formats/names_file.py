@@ -1,4 +1,4 @@
-"""`names.json` in a team's folder: what its robots and variables were called in the files of another tool."""
+"""`names.json` in a team's folder: the original names of robots and variables, from the files of another tool."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.formats.diagnostics import invalid_input
 
 NAMES_FILE = "names.json"
 MAX_BYTES = 64 * 1024 * 1024
 
 
 def names_json(dialect: str, names: Mapping[str, str]) -> bytes:
-    """Return the content of the file: the dialect, and original names by the team's where they differ."""
+    """Return the content of the file.
+
+    Args:
+        dialect: The name of the dialect.
+        names: The original names, by those of the team, where they differ.
+    """
     import msgspec  # noqa: PLC0415 - start-up
 
     content = {"dialect": dialect, "names": dict(names)}
@@ -21,10 +26,10 @@ def names_json(dialect: str, names: Mapping[str, str]) -> bytes:
 
 
 def original_names(folder: Path) -> Mapping[str, str]:
-    """Return the original names that stand in `folder`; none where it has no such file.
+    """Return the original names from the file in `folder`; none if it has no such file.
 
     Raises:
-        InvalidInputError: if the file is there, and is not as `names_json` writes it.
+        InvalidInputError: if the file does not have the form that `names_json` writes.
     """
     import msgspec  # noqa: PLC0415 - start-up
 
@@ -38,8 +43,6 @@ def original_names(folder: Path) -> Mapping[str, str]:
             found = msgspec.json.decode(file.read(MAX_BYTES), type=form)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         hint = "import the problem again, or delete the file"
-        raise InvalidInputError(
-            [Diagnostic(encodable(str(path)), 0, "does not hold the original names of a team", hint)]
-        ) from None
+        raise invalid_input(path, "does not contain the original names of a team", hint) from None
     names: Mapping[str, str] = found.names
     return names

@@ -1,11 +1,11 @@
-"""A priority order as a text file: a robot's name a line, the highest priority first; `#` begins a comment."""
+"""Read a priority order from a text file: one robot's name per line, highest priority first; `#` starts a comment."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened, suggestion
+from robochoc.formats.diagnostics import DiagnosticCollector, invalid_input, shortened, suggestion
 from robochoc.model.original_names import robots_called
 from robochoc.model.problem import Team
 
@@ -14,7 +14,7 @@ _MISSING_SHOWN = 10
 
 
 def read_order(path: Path, team: Team, names: Mapping[str, str] = {}) -> tuple[str, ...]:
-    """Return the order in the file `path`, of all robots of `team`, which it may call by their original `names`.
+    """Return the order in the file `path`, of all robots of `team`. The file may use their original `names`.
 
     Raises:
         InvalidInputError: with every mistake.
@@ -29,10 +29,10 @@ def read_order(path: Path, team: Team, names: Mapping[str, str] = {}) -> tuple[s
             continue
         if name not in known:
             hint = suggestion(name, list(known), "robots")
-            report.add(number, f"'{shortened(name)}' is no robot of {team.name}", hint)
+            report.add(number, f"'{shortened(name)}' is not a robot of {team.name}", hint)
         elif known[name] in places:
             first = places[known[name]]
-            report.add(number, f"'{name}' stands here again", f"name each robot once; it is in line {first}")
+            report.add(number, f"'{name}' is listed twice", f"list each robot once; it is in line {first} already")
         else:
             places[known[name]] = number
     missing = [name for name in team.order if name not in places]
@@ -40,7 +40,7 @@ def read_order(path: Path, team: Team, names: Mapping[str, str] = {}) -> tuple[s
         many = len(missing) > 1
         shown = " ".join(missing[:_MISSING_SHOWN]) + (" ..." if len(missing) > _MISSING_SHOWN else "")
         message = f"{len(missing)} robot{'s are' if many else ' is'} missing: {shown}"
-        report.add(max(1, len(lines)), message, f"add {'them' if many else 'it'}, a name a line, where it belongs")
+        report.add(max(1, len(lines)), message, f"add {'them' if many else 'it'}, one name per line")
     report.finish()
     return tuple(places)
 
@@ -51,14 +51,10 @@ def _text(path: Path) -> str:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise _invalid(path, f"cannot be read: {reason}", "check the path and its permissions") from None
+        raise invalid_input(path, f"cannot be read: {reason}", "check the path and its permissions") from None
     if len(content) > MAX_BYTES:
-        raise _invalid(path, f"is larger than {MAX_BYTES // 2**20} MiB", "an order is a robot's name a line")
+        raise invalid_input(path, f"is larger than {MAX_BYTES // 2**20} MiB", "write one robot's name per line")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise _invalid(path, "is not UTF-8", "an order is a text file with a robot's name a line") from None
-
-
-def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
-    return InvalidInputError([Diagnostic(str(path), 0, message, hint)])
+        raise invalid_input(path, "is not UTF-8", "use a text file with one robot's name per line") from None

@@ -1,4 +1,4 @@
-"""A problem in a team's folder, or in a file of another tool: whatever a user names."""
+"""Read a problem from a team's folder, or from a file of another tool."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 from robochoc.formats.team_reader import read_team
 from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class ReadProblem(NamedTuple):
-    """A team, and what is known of where it comes from.
+    """A team, and its origin.
 
     Attributes:
         team: The team.
         names: The original names of its robots and variables.
-        foreign: Whether it is known by these alone: it is in a file of another tool.
-        notes: What reading such a file has changed.
-        bound: What its format takes for no solution; see `ImportResult`.
+        foreign: Whether it was read from a file of another tool, whose user knows only the original names.
+        notes: The changes that were made as such a file was read.
+        bound: The sum of costs that its format takes for no solution; see `ImportResult`.
     """
 
     team: Team
@@ -42,18 +42,18 @@ def read_problem(
     owner: str | None = None,
     allow_code: bool = False,
 ) -> ReadProblem:
-    """Return the team in the folder `place`, or in the file of another tool.
+    """Return the team in the folder `place`, or in the file `place` of another tool.
 
     Args:
         place: The folder, or the file.
         *more: Further files of the problem in that file.
-        dialect: Of a file: the name of its format. None: it is recognised.
-        infinity: Of a file: costs of at least so much forbid; see `ImportOptions`.
-        owner: Of a file: a regular expression that says which variables belong to one robot.
-        allow_code: Of a file: whether Python files that it names may be executed.
+        dialect: The name of the format of a file. None: it is recognised.
+        infinity: For files: the smallest cost that forbids; see `ImportOptions`.
+        owner: For files: a regular expression that matches variables of one robot; see `ImportOptions`.
+        allow_code: For files: whether Python files that they name may be executed.
 
     Raises:
-        InvalidInputError: with the mistakes of the files, and for options of a file where there is a folder.
+        InvalidInputError: with the mistakes of the files, or if such options are given for a folder.
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
     from robochoc.formats.dialects.registry import read_foreign, recognise, recognise_or_raise  # noqa: PLC0415 - as above
@@ -66,14 +66,11 @@ def read_problem(
         return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes, bound=imported.bound)
     for option, given in (("format", dialect), ("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
-            what, hint = f"is the folder of a team, and '{option}' is for files of other tools", "leave it out"
-            raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
+            what = f"is the folder of a team, and '{option}' is for files of other tools"
+            raise invalid_input(place, what, "leave it out")
     if more and place.is_dir():
-        what, hint = (
-            f"is the folder of a team, and {more[0]} another problem",
-            "name files of one problem, or one folder",
-        )
-        raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
+        what = f"is the folder of a team, and {more[0]} is another problem"
+        raise invalid_input(place, what, "name one folder, or the files of one problem")
     try:
         return ReadProblem(read_team(place), original_names(place), foreign=False)
     except InvalidInputError as invalid:
@@ -82,5 +79,4 @@ def read_problem(
         if found is None or first is None:
             raise
         hint = f"robochoc import {place} -o FOLDER"
-        told = Diagnostic(first.file, 0, f"is {found.title}, not a file of a robot", hint)
-        raise InvalidInputError([told]) from None
+        raise invalid_input(first.file, f"is {found.title}, not a file of a robot", hint) from None

@@ -1,4 +1,7 @@
-"""The third layer: what one robot's file means (docs/reference/format.md, "One robot"; Figure 2)."""
+"""Read the file of one robot: its schema was checked in `xml`, its meaning is checked here.
+
+docs/reference/format.md, "One robot"; the paper, Figure 2.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from pathlib import Path
 from lxml import etree
 
 from robochoc.formats.constraint_reader import ConstraintContext, read_private, read_shared
-from robochoc.formats.costs import Rescaled, places_used, read_units
+from robochoc.formats.costs import CostConversion, places_used, read_units
 from robochoc.formats.definition_reader import (
     check_count,
     read_domain,
@@ -26,6 +29,7 @@ from robochoc.formats.diagnostics import (
     DiagnosticCollector,
     InvalidInputError,
     MistakeError,
+    invalid_input,
     shortened,
     suggestion,
 )
@@ -34,7 +38,7 @@ from robochoc.formats.names import check_robot_name, check_unique
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
     check_shown_variables,
-    refuse_nothing_to_decide,
+    refuse_no_variables,
     repeated_neighbours,
 )
 from robochoc.formats.schema import SchemaError, schema_for, without_schema_errors
@@ -60,7 +64,7 @@ from robochoc.model.symbols import with_table
 
 @dataclass(frozen=True, kw_only=True)
 class RobotFile(TeamMember):
-    """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
+    """A robot, and data of its file that only the checks of the team need."""
 
     context: ConstraintContext
     """The names that constraints of a scenario can refer to."""
@@ -70,30 +74,30 @@ class RobotFile(TeamMember):
         return replace(self, robot=with_table(self.robot, names)) if names else self
 
     def in_places(self, places: int) -> RobotFile:
-        """Return the file with costs counted in units of so many decimal places, or more than now.
+        """Return the file with costs in the unit of so many decimal places, at least as many as now.
 
         Raises:
-            InvalidInputError: when a cost has then too many digits.
+            InvalidInputError: if a cost then has too many digits.
         """
-        finer = 10 ** (places - self.robot.costs.places)
-        if finer == 1:
+        factor = 10 ** (places - self.robot.costs.places)
+        if factor == 1:
             return self
-        rescaled = Rescaled(finer)
+        conversion = CostConversion(factor)
         try:
-            robot = rescaled.robot(self.robot)
-            copies = {name: rescaled.constraints(held) for name, held in self.copies.items()}
-            definitions = rescaled.definitions(self.context.definitions)
+            robot = conversion.robot(self.robot)
+            copies = {name: conversion.constraints(copied) for name, copied in self.copies.items()}
+            definitions = conversion.definitions(self.context.definitions)
         except MistakeError as mistake:
-            hint = f"another file of the team has costs of {places} decimal places, and all are counted in one unit"
+            hint = f"another file of the team has costs with {places} decimal places, and a team has one unit of costs"
             raise InvalidInputError([self.places.robot().mistake(mistake.message, hint)]) from None
         context = replace(self.context, units=robot.costs, definitions=definitions)
         return replace(self, robot=robot, copies=copies, context=context)
 
 
 def read_robot(path: Path | str) -> Robot:
-    """Return the robot in the XML file `path`. It is named after the file's stem.
+    """Return the robot in the XML file `path`. The stem of the file is its name.
 
-    Its neighbours' files are not checked: `read_team` does that.
+    The files of its neighbours are not checked: see `read_team`.
 
     Raises:
         InvalidInputError: with all mistakes of the file.
@@ -103,7 +107,7 @@ def read_robot(path: Path | str) -> Robot:
 
 
 def read_robot_again(path: Path, symbols: tuple[str, ...], units: CostUnits) -> Robot:
-    """Return the robot in the XML file `path`, which returns to a team that has been read before.
+    """Return the robot in the XML file `path`, which rejoins a team that was read before.
 
     Args:
         path: The file. It may have changed.
@@ -111,30 +115,28 @@ def read_robot_again(path: Path, symbols: tuple[str, ...], units: CostUnits) -> 
         units: The units of the team's costs.
 
     Raises:
-        InvalidInputError: with all mistakes of the file; or when it has other symbols, finer costs or another
-            objective, which the others do not know.
+        InvalidInputError: with all mistakes of the file; or if it has symbols, decimal places or an objective that the
+            team does not have.
     """
     table = SymbolTable(symbols)
     file = read_robot_file(path, table)
     costs = file.robot.costs
     if new := table.names[len(symbols) :]:
-        raise InvalidInputError(
-            [Diagnostic(str(path), 0, f"the symbol '{new[0]}' is new to the team", "use its symbols")]
-        )
+        raise invalid_input(path, f"the team has no symbol '{new[0]}'", "use the symbols of the team")
     if file.robot.kind == ProblemKind.DISWCSP and (costs.maximize, max(costs.places, units.places)) != (
         units.maximize,
         units.places,
     ):
-        hint = "the others do not read it again: write the costs as they were"
-        raise InvalidInputError([Diagnostic(str(path), 0, "another objective, or finer costs than the team has", hint)])
+        hint = "the other robots do not read it again: write the costs as before"
+        raise invalid_input(path, "another objective, or more decimal places of costs than the team has", hint)
     return with_table(file.in_places(units.places).robot, symbols)
 
 
 def read_robot_file(path: Path, table: SymbolTable) -> RobotFile:
-    """Return the robot in the XML file `path`, with what the team has to check.
+    """Return the robot in the XML file `path`, with data for the checks of the team.
 
-    Its symbols go into the `table`, which may grow as long as other files are read: `with_table` says it at the end.
-    Raises `InvalidInputError`.
+    Its symbols are added to the `table`, which grows while other files are read; then call `with_table`. Raises
+    `InvalidInputError`.
     """
     _check_name(path.stem, path)
     try:
@@ -144,12 +146,10 @@ def read_robot_file(path: Path, table: SymbolTable) -> RobotFile:
 
 
 def robot_in(content: bytes, name: str) -> Robot:
-    """Return the robot called `name`, whose XML file has this `content`. There need not be such a file.
-
-    The same limits hold as for a file.
+    """Return the robot called `name` from the `content` of its XML file. The same limits apply as for a file.
 
     Raises:
-        InvalidInputError: with all mistakes. Messages name the file `NAME.xml`.
+        InvalidInputError: with all mistakes. Messages use the file name `NAME.xml`.
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)
@@ -158,7 +158,7 @@ def robot_in(content: bytes, name: str) -> Robot:
 
 
 def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
-    """Return the mistakes of a file that its schema has `refused`, in lines where the schema finds none."""
+    """Return further mistakes of a file that its schema `refused`, in lines where the schema finds none."""
     if len(refused.diagnostics) > MAX_PER_FILE:
         return []  # the file was not read to its end
     tree = without_schema_errors(refused.tree, schema_for("instance"))
@@ -173,15 +173,15 @@ def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
 
 
 def _check_name(name: str, path: Path) -> None:
-    """Raise `InvalidInputError` unless `name`, which the file at `path` gives its robot, can be one."""
+    """Raise `InvalidInputError` unless `name`, from the file at `path`, can be a robot's name."""
     try:
         check_robot_name(name, "rename the file")
     except MistakeError as mistake:
-        raise InvalidInputError([Diagnostic(str(path), 0, mistake.message, mistake.hint)]) from None
+        raise invalid_input(path, mistake.message, mistake.hint) from None
 
 
 class _RobotReader:
-    """Walks through one `instance`, which the schema has found valid; every mistake goes into one report."""
+    """Reads one `instance` that is valid by its schema, and collects all mistakes in one report."""
 
     def __init__(self, path: Path, instance: etree._Element, table: SymbolTable) -> None:
         self._table = table
@@ -208,14 +208,14 @@ class _RobotReader:
         weight = int(attribute(presentation, "weight") or Robot.weight)
         file = self._report.file
         robot = Robot(self._name, variables, kind, private, parents, children, topics, file, weight=weight, costs=units)
-        unsaid = frozenset(
+        implied_children = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )
         places = FileLocations(file, line(presentation), self._own)
-        return RobotFile(robot, places, copies, unsaid, context=context)
+        return RobotFile(robot, places, copies, implied_children, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
-        """Yield the elements of a section of the instance, whose count is checked."""
+        """Yield the elements of a section of the instance, and check their number."""
         for container in self._instance.iterchildren(section):
             with self._report.at(line(container)):
                 check_count(container, count, len(container))
@@ -244,8 +244,8 @@ class _RobotReader:
                     variables.append(Variable(name, values))
         if not self._own:
             with self._report.at(line(next(self._instance.iterchildren("variables")))):
-                refuse_nothing_to_decide(self._own)
-            self._report.finish()  # whatever else is wrong may follow from it
+                refuse_no_variables(self._own)
+            self._report.finish()  # other mistakes may only follow from this one
         return tuple(variables)
 
     def _topics(self, symbolic: Collection[str]) -> tuple[Topic, ...]:
@@ -259,7 +259,7 @@ class _RobotReader:
 
     def _units(self, presentation: etree._Element, kind: ProblemKind) -> CostUnits:
         places = places_used(self._instance)
-        units = [CostUnits(attribute(presentation, "objective") == "maximize", places)]  # to go on with
+        units = [CostUnits(attribute(presentation, "objective") == "maximize", places)]  # used if they are invalid
         with self._report.at(line(presentation)):
             units.append(read_units(presentation, kind, places))
         return units[-1]
@@ -290,7 +290,7 @@ class _RobotReader:
             definitions[name] = None
             refuse_predefined(name)
             place = self._report.file, line(element)
-            definitions[name] = read(element, lambda word: self._table.mentioned(word, *place))
+            definitions[name] = read(element, lambda word: self._table.mention(word, *place))
 
     def _constraints(
         self,
@@ -317,21 +317,21 @@ class _RobotReader:
             yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
 
     def _children(self, context: ConstraintContext, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
-        """Yield the children, with this robot's part of PKCs only; what it repeats of TKCs goes into `copies`."""
+        """Yield the children with this robot's parts of PKCs. Copies of TKCs are added to `copies` too."""
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
-            held = self._constraints(agent, context, read_shared)
-            parts = tuple(constraint for constraint in held if constraint.model == ConstraintModel.PKC)
-            kept = tuple(constraint for constraint in held if constraint.model == ConstraintModel.TKC)
-            if kept:
-                copies[name] = kept
-            scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)
+            listed = self._constraints(agent, context, read_shared)
+            parts = tuple(constraint for constraint in listed if constraint.model == ConstraintModel.PKC)
+            copied = tuple(constraint for constraint in listed if constraint.model == ConstraintModel.TKC)
+            if copied:
+                copies[name] = copied
+            scopes = itertools.chain.from_iterable(constraint.variables for constraint in listed)
             shown = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
             if agent.get("variable") is not None:
                 shown = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
                     check_shown_variables(shown, self._own)
-            yield Child(name, shown, parts, line(agent), kept)
+            yield Child(name, shown, parts, line(agent), copied)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
         for neighbour, message in repeated_neighbours(self._name, parents, children):

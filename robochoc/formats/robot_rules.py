@@ -1,16 +1,15 @@
 """Rules for a robot's constraints and neighbours (docs/reference/format.md, "One robot").
 
-With `names` and `definitions` this is the one list of rules on a robot. The readers of files ask them of each element
-that they have read, `objects` asks them of every object of a robot that was built in Python. What two robots can get
-wrong between them is in `neighbours` and `scopes`; what only a file can (XML, schema, counts, references) stands with
-its readers.
+`names`, `definitions`, `symbols` and this module contain all rules for one robot. Readers of files apply them to each
+element, `robot_validation` applies them to the objects of a robot that was built in Python. Rules for several robots
+are in `team_consistency`; rules for files only (XML, schema, counts, references) are in the readers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from robochoc.formats.definitions import shown
+from robochoc.formats.definitions import terms_text
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.names import check_cost, check_integer, is_name
 from robochoc.model.absence import can_be_restated
@@ -34,8 +33,8 @@ from robochoc.model.problem import (
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
 """The hint for `repeated_neighbours`."""
-NOBODY_LEFT = ("all robots have left after this event", "keep one, or add another")
-"""The message and the hint for an event of a scenario after which there is no team."""
+NO_ROBOTS_LEFT = ("all robots have left after this event", "keep one, or add another")
+"""The message and the hint for an event of a scenario after which the team is empty."""
 
 
 def check_terms(terms: Sequence[Term]) -> None:
@@ -49,21 +48,21 @@ def check_terms(terms: Sequence[Term]) -> None:
 
 
 def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits = PLAIN_COSTS) -> None:
-    """Raise `MistakeError` unless its definition takes its terms, and a robot of that `kind` may charge its cost."""
+    """Raise `MistakeError` unless the definition fits the terms, and the cost is valid for a robot of that `kind`."""
     if not constraint.variables:
         raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
     _check_application(constraint.definition, constraint.scope, constraint.parameters)
     if constraint.when_absent == WhenAbsent.RESTATE and not can_be_restated(constraint):
         message = "the constraint cannot be restated for fewer robots (when_absent)"
-        raise MistakeError(message, "only sum, count, and, or, min, max of alike terms, compared with numbers, can be")
+        raise MistakeError(message, "use a sum, count, and, or, min or max of alike terms, compared with numbers")
     if constraint.cost == INFINITE:
         return
     if kind != ProblemKind.DISWCSP:
         raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
     if isinstance(constraint.definition, Relation):
-        raise MistakeError("a cost on a relation", 'a soft relation names the costs of its tuples: semantics="soft"')
+        raise MistakeError("a cost on a relation", 'write the costs of its tuples, with semantics="soft"')
     if isinstance(constraint.definition, Function):
-        raise MistakeError("a cost on a function", "its value is the cost: delete the attribute, or write a predicate")
+        raise MistakeError("a cost on a function", "delete it: the function's value is the cost; or use a predicate")
     check_cost(constraint.cost)
     if constraint.cost * (-1 if units.maximize else 1) < 0:
         _refuse_undefined(constraint.definition)
@@ -74,32 +73,30 @@ _PARTIAL = ("div", "mod", "pow")
 
 
 def _refuse_undefined(predicate: Predicate) -> None:
-    """Raise `MistakeError` for a predicate that may be undefined, where breaking it is worth something."""
+    """Raise `MistakeError` for a predicate that may be undefined, if violating it is rewarded."""
     waiting: list[Expression] = [predicate.body]
     while waiting:
         node = waiting.pop()
         if isinstance(node, Apply):
             if node.operator in _PARTIAL:
-                raise MistakeError(
-                    f"breaking {shortened(predicate.name)} is worth something, and with '{node.operator}' it may be"
-                    " undefined",
-                    "write a function, whose value is the cost: if(..., 0, -5)",
-                )
+                message = f"violating {shortened(predicate.name)} is rewarded, but '{node.operator}' may be undefined"
+                raise MistakeError(message, "write a function, whose value is the cost: if(..., 0, -5)")
             waiting += node.arguments
 
 
 def refuse_private_part(model: ConstraintModel | None) -> None:
-    """Raise `MistakeError` for a private constraint of which a neighbour would hold a part."""
+    """Raise `MistakeError` for a private constraint with the model PKC, of which a neighbour would know a part."""
     if model == ConstraintModel.PKC:
-        raise MistakeError("a private constraint with model PKC", "a private constraint is its robot's alone: no model")
+        raise MistakeError("a private constraint with model PKC", "delete the model: only shared constraints have one")
 
 
 def check_private(constraint: Constraint, own: Collection[str]) -> None:
-    """Raise `MistakeError` unless an intra-agent constraint is over `own` variables only."""
+    """Raise `MistakeError` unless a private constraint is over `own` variables only."""
     for name in constraint.variables:
         if name not in own:
-            hint = suggestion(name, own, "variables") + "; shared constraints stand under agents_parent"
-            raise MistakeError(f"a private constraint over '{shortened(name)}', which is not the robot's own", hint)
+            hint = suggestion(name, own, "variables") + "; list shared constraints under agents_parent"
+            message = f"a private constraint over '{shortened(name)}', which is not a variable of this robot"
+            raise MistakeError(message, hint)
 
 
 def refuse_no_model(model: ConstraintModel | str | None) -> None:
@@ -109,30 +106,30 @@ def refuse_no_model(model: ConstraintModel | str | None) -> None:
 
 
 def check_shared(constraint: Constraint, own: Collection[str]) -> None:
-    """Raise `MistakeError` unless a constraint with a neighbour is over `own` variables and others'."""
+    """Raise `MistakeError` unless a shared constraint is over `own` variables and variables of others."""
     mine = [name for name in constraint.variables if name in own]
     if not mine:
-        hint = suggestion(constraint.variables[0], own, "own variables")
-        raise MistakeError(f"the scope '{shown(constraint.scope)}' has no variable of this robot", hint)
+        hint = suggestion(constraint.variables[0], own, "variables of this robot")
+        raise MistakeError(f"the scope '{terms_text(constraint.scope)}' has no variable of this robot", hint)
     if len(mine) == len(constraint.variables):
-        hint = "name one, or put the constraint into the <constraints> of the instance: it is private"
-        raise MistakeError(f"the scope '{shown(constraint.scope)}' has no variable of the neighbour", hint)
+        hint = "add one, or move the constraint to the <constraints> of the instance: it is private"
+        raise MistakeError(f"the scope '{terms_text(constraint.scope)}' has no variable of the neighbour", hint)
 
 
 def _check_application(definition: Definition, scope: tuple[Term, ...], parameters: tuple[Term, ...]) -> None:
-    """Raise `MistakeError` unless the definition takes so many terms, and scope and parameters are about the same."""
+    """Raise `MistakeError` unless the definition has as many parameters, and scope and parameters have equal terms."""
     if isinstance(definition, Relation) and parameters != scope:
         raise MistakeError(
-            f"parameters '{shown(parameters)}' differ from the scope '{shown(scope)}'",
+            f"parameters '{terms_text(parameters)}' differ from the scope '{terms_text(scope)}'",
             "a relation's tuples follow the scope: leave the parameters out",
         )
     if isinstance(definition, GlobalPredicate) and not all(isinstance(term, str) for term in parameters):
-        raise MistakeError(f"{definition.name} about an integer", "write the integer into its form")
-    takes = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
-    if len(parameters) != takes:
+        raise MistakeError(f"an integer as parameter of {definition.name}", "write the integer into its form")
+    arity = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
+    if len(parameters) != arity:
         raise MistakeError(
-            f"{shortened(definition.name)} takes {takes} terms, but '{shown(parameters)}' has {len(parameters)}",
-            "give it as many as it takes",
+            f"{shortened(definition.name)} takes {arity} terms, but '{terms_text(parameters)}' has {len(parameters)}",
+            f"write {arity} terms",
         )
     if parameters == scope:
         return
@@ -148,28 +145,29 @@ def _check_application(definition: Definition, scope: tuple[Term, ...], paramete
             )
 
 
-def refuse_nothing_to_decide(variables: Collection[object]) -> None:
+def refuse_no_variables(variables: Collection[object]) -> None:
     """Raise `MistakeError` for a robot without variables."""
     if not variables:
-        raise MistakeError("the robot has no variable", 'add <variable name="V1.1" domain="D1"/>')
+        raise MistakeError("the robot has no variables", 'add <variable name="V1.1" domain="D1"/>')
 
 
 def check_shown_variables(shown: Sequence[str], own: Collection[str]) -> None:
-    """Raise `MistakeError` unless the variables `shown` to a child are `own` ones, each once."""
+    """Raise `MistakeError` unless the variables `shown` to a child are `own` variables, each listed once."""
     seen: set[str] = set()
     for variable in shown:
         if variable not in own:
-            hint = suggestion(variable, own, "own variables")
-            raise MistakeError(f"the child must know '{shortened(variable)}', which is not the robot's own", hint)
+            hint = suggestion(variable, own, "variables of this robot")
+            message = f"the child must know '{shortened(variable)}', which is not a variable of this robot"
+            raise MistakeError(message, hint)
         if variable in seen:
-            raise MistakeError(f"the child's variables list '{shortened(variable)}' twice", "name it once")
+            raise MistakeError(f"the variables of the child list '{shortened(variable)}' twice", "list it once")
         seen.add(variable)
 
 
 def repeated_neighbours(
     name: str, parents: Sequence[Parent], children: Sequence[Child]
 ) -> Iterator[tuple[Parent | Child, str]]:
-    """Yield neighbours of the robot `name` that are listed before, or are itself; and what is wrong with each."""
+    """Yield neighbours of the robot `name` that are listed twice or are the robot itself, each with a message."""
     seen = {name: "the robot itself"}
     for role, neighbours in (("parent", parents), ("child", children)):
         for neighbour in neighbours:
@@ -182,11 +180,11 @@ def check_added_constraint(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint that a scenario adds to two robots."""
     if constraint.model == ConstraintModel.PKC:
         message = "a partially known constraint (PKC) in a scenario"
-        raise MistakeError(message, 'each side would need its part: write model="TKC"')
+        raise MistakeError(message, 'a scenario cannot add the parts of both robots: write model="TKC"')
 
 
 def check_constraint_of_added_robot(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint of a robot that a scenario adds."""
     if constraint.model == ConstraintModel.PKC:
         message = "a partially known constraint (PKC) of a robot that a scenario adds"
-        raise MistakeError(message, 'the parent could not bring its part: write model="TKC"')
+        raise MistakeError(message, 'a scenario cannot add the part of the parent: write model="TKC"')

@@ -1,4 +1,4 @@
-"""Writes a robot as Figure 2 does: its order of elements, its counts, two spaces a level."""
+"""Write the XML file of a robot in the form of the paper's Figure 2: order of elements, counts, two spaces a level."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from robochoc.model.problem import (
 )
 
 
-def with_names_apart(robot: Robot) -> Robot:
-    """Return `robot`, in which different domains have different names, and different definitions, too.
+def with_distinct_names(robot: Robot) -> Robot:
+    """Return `robot` with distinct names for different domains, and for different definitions.
 
     The first keeps its name, the others of that name are called NAME.2, NAME.3, ...
     """
@@ -56,7 +56,7 @@ _Named = TypeVar("_Named", Domain, Definition)
 
 
 def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> dict[_Named, str] | None:
-    """Return distinct names for the `things` whose own names are ambiguous. None where all own names are distinct."""
+    """Return new names for the `things` with ambiguous names. None if all names are distinct."""
     first: dict[str, _Named] = dict(predefined)
     names: dict[_Named, str] = {}
     for thing in things:
@@ -97,14 +97,14 @@ _TABLE = "symbols"
 
 
 def robot_xml(robot: Robot) -> bytes:
-    """Return `robot` as the content of its XML file: what `read_robot` reads back.
+    """Return `robot` as the content of its XML file, for `read_robot`.
 
-    Where two different domains or definitions have one name, one of them gets another.
+    If two different domains or definitions have the same name, one of them is renamed.
 
     Raises:
-        ValueError: when the robot cannot be written: a cost is no integer, or a name holds what XML cannot.
+        ValueError: if a cost is not an integer, or a name has characters that XML does not allow.
     """
-    robot = with_names_apart(robot)
+    robot = with_distinct_names(robot)
     instance = etree.Element("instance")
     presentation = etree.SubElement(instance, "presentation", type=robot.kind)
     if robot.weight != Robot.weight:
@@ -135,7 +135,7 @@ def _write_domains(instance: etree._Element, robot: Robot) -> None:
     domains = _by_name(variable.domain for variable in robot.variables)
     table = robot.symbol_table
     section = etree.SubElement(instance, "domains", nbDomains=str(len(domains) + bool(table)))
-    if table:  # no variable has it: it says which code each symbol has, so that every file of the team says the same
+    if table:  # not the domain of a variable: it lists all symbols, so that they have the same codes in every file
         name = next(
             name for number in itertools.count(1) if (name := _TABLE + f".{number}" * (number > 1)) not in domains
         )

@@ -1,4 +1,4 @@
-"""`scenario.xml`: how a team's problem changes over time (docs/reference/format.md, "Changes over time")."""
+"""Read `scenario.xml`: the changes of a team's problem over time (docs/reference/format.md, "Changes over time")."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from lxml import etree
 
 from robochoc.formats.constraint_reader import ConstraintContext, read_shared
 from robochoc.formats.costs import places_used
-from robochoc.formats.definition_reader import integer
+from robochoc.formats.definition_reader import read_integer
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
 from robochoc.formats.robot_reader import RobotFile, read_robot_file
 from robochoc.formats.robot_rules import (
-    NOBODY_LEFT,
+    NO_ROBOTS_LEFT,
     check_added_constraint,
     check_constraint_of_added_robot,
 )
-from robochoc.formats.symbols import SymbolTable, check_kinds, kinds_of
+from robochoc.formats.symbols import SymbolTable, check_argument_types, symbolic_by_variable
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
@@ -39,27 +39,33 @@ from robochoc.model.team_edits import ChangeError
 from robochoc.system.files import resolved
 
 SCENARIO = "scenario.xml"
-"""The one XML file in a team's folder that is no robot."""
+"""The only XML file in a team's folder that is not a robot's."""
 
 
 def has_scenario(folder: Path) -> bool:
-    """Return whether there is anything of that name in `folder`."""
+    """Return whether `folder` has an entry of that name."""
     return os.path.lexists(folder / SCENARIO)
 
 
 def read_scenario(
     folder: Path, team: Team | None, files: Mapping[str, RobotFile], table: SymbolTable
 ) -> tuple[ScenarioEvent, ...]:
-    """Return the events of the scenario in `folder`, each of which the team as it stands then can take.
+    """Return the events of the scenario in `folder`. Each must be possible for the team at that time.
 
-    `team` is None when the robots' `files` have mistakes: then only the scenario's own mistakes are looked for. Files
-    of added robots lie in the folder or below. Symbols go into the `table`. Raises `InvalidInputError`.
+    Args:
+        folder: The team's folder. Files of added robots are in it or below.
+        team: The team. None if the files of the robots have mistakes: then only the scenario itself is checked.
+        files: The robots' files.
+        table: The symbols of the team, to which those of the scenario are added.
+
+    Raises:
+        InvalidInputError: with all mistakes.
     """
     return _ScenarioReader(folder, team, files, table).events()
 
 
 def places_of_scenario(folder: Path) -> int:
-    """Return how many decimal places the costs in the scenario in `folder` have, the added robots' included."""
+    """Return the largest number of decimal places of a cost in the scenario in `folder`, or of an added robot."""
     try:
         root = read_xml(folder / SCENARIO, "scenario")
     except InvalidInputError:
@@ -73,10 +79,9 @@ def places_of_scenario(folder: Path) -> int:
 
 
 class _ScenarioReader:
-    """Walks through the events, and changes the team on the way.
+    """Reads the events in order, and applies each to the team.
 
-    A change that the team cannot take is reported and left out. Names that it would have added are no mistakes after
-    that: one mistake is reported once.
+    An impossible change is reported and left out. Names that it would have added are not reported afterwards.
     """
 
     def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile], table: SymbolTable) -> None:
@@ -87,11 +92,11 @@ class _ScenarioReader:
         self._contexts: dict[str, ConstraintContext] = {name: file.context for name, file in files.items()}
         self._places = max((file.robot.costs.places for file in files.values()), default=0)
         self._report = DiagnosticCollector(str(self._path))
-        self._elsewhere: list[Diagnostic] = []
+        self._robot_mistakes: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
-        self._unread = False
-        """True if a file of an added robot could not be read. Its contents are then not known."""
-        self._missed: set[str] = set()
+        self._has_unread_file = False
+        """True if a file of an added robot could not be read. Its contents are then unknown."""
+        self._not_added: set[str] = set()
         """Robots, variables and constraints that could not be added."""
 
     def events(self) -> tuple[ScenarioEvent, ...]:
@@ -100,9 +105,9 @@ class _ScenarioReader:
             events = tuple([self._event(one) for one in read_xml(self._path, "scenario").iterchildren("event")])
             self._report.finish()
         except InvalidInputError as invalid:
-            self._elsewhere += invalid.diagnostics
-        if self._elsewhere:
-            raise InvalidInputError(dict.fromkeys(self._elsewhere))
+            self._robot_mistakes += invalid.diagnostics
+        if self._robot_mistakes:
+            raise InvalidInputError(dict.fromkeys(self._robot_mistakes))
         return events
 
     def _event(self, element: etree._Element) -> ScenarioEvent:
@@ -114,24 +119,24 @@ class _ScenarioReader:
                         self._apply(change, place)
                         changes.append(change)
         if self._team and not self._team.robots:
-            self._report.add(line(element), *NOBODY_LEFT)
+            self._report.add(line(element), *NO_ROBOTS_LEFT)
             self._team = None
         after = attribute(element, "after")
         return ScenarioEvent(tuple(changes), None if after == "solved" else int(after.split()[0]))
 
     def _changes(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
-        """Yield the changes that `element` stands for, each with its line."""
+        """Yield the changes in `element`, each with its line."""
         if element.tag == "add_constraint":
             yield from self._added_constraints(element)
         elif element.tag == "add_agent":
-            robot = self._added(attribute(element, "file"))
+            robot = self._read_added_robot(attribute(element, "file"))
             if robot:
                 yield line(element), AddAgent(robot)
         else:
             yield line(element), self._change(element)
 
     def _change(self, element: etree._Element) -> Change:
-        """Return what an element says that needs no other file."""
+        """Return the change in an element that refers to no other file."""
         match element.tag:
             case "remove_agent":
                 return RemoveAgent(attribute(element, "name"))
@@ -143,84 +148,84 @@ class _ScenarioReader:
                 return RemoveConstraint(*(attribute(element, name) for name in ("agent", "parent", "name")))
 
     def _value(self, element: etree._Element) -> int:
-        """Return an integer, or the code of a symbol, as the variable's domain takes it. Raises `MistakeError`."""
+        """Return an integer, or the code of a symbol if the variable's domain is symbolic. Raises `MistakeError`."""
         variable, word = attribute(element, "variable"), attribute(element, "value")
         if self._team is None:
-            return 0  # nothing is known of the variable
+            return 0  # the variable's domain is unknown
         known = self._team.variables.get(variable)
         if known and known.domain.symbols:
-            return self._table.declared(word)
-        return integer(word)
+            return self._table.declare(word)
+        return read_integer(word)
 
-    def _added(self, name: str) -> Robot | None:
-        """Return the robot in the file `name`; None: it has mistakes, which are reported with that file's lines."""
+    def _read_added_robot(self, name: str) -> Robot | None:
+        """Return the robot in the file `name`; None if the file has mistakes, which are added to the report."""
         if not _inside(self._folder, name).is_file():
-            self._missed.add(Path(name).stem)
-            self._unread = True
+            self._not_added.add(Path(name).stem)
+            self._has_unread_file = True
             message = f"there is no file '{shortened(name)}' in the team's folder"
             raise MistakeError(message, "write late/NAME.xml, below the folder's own robots")
-        own = Path(name).stem
-        there_already = self._team is not None and own in self._team
+        robot_name = Path(name).stem
+        is_present = self._team is not None and robot_name in self._team
         try:
             file = read_robot_file(self._folder / name, self._table).in_places(self._places)
-            if not there_already:
+            if not is_present:
                 _refuse_parts(file.robot)
         except InvalidInputError as invalid:
-            self._elsewhere += invalid.diagnostics
-            self._unread = True
-            if not there_already:
-                self._contexts.pop(own, None)
+            self._robot_mistakes += invalid.diagnostics
+            self._has_unread_file = True
+            if not is_present:
+                self._contexts.pop(robot_name, None)
             return None
-        if not there_already:
-            self._contexts[own] = file.context
+        if not is_present:
+            self._contexts[robot_name] = file.context
         return file.robot
 
     def _added_constraints(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
         agent, parent = attribute(element, "agent"), attribute(element, "parent")
         context = self._contexts.get(agent)
         if context is None:
-            if self._team is None or self._unread:
+            if self._team is None or self._has_unread_file:
                 return
-            raise MistakeError(f"there is no robot '{shortened(agent)}'", "name a robot that is there at that time")
+            raise MistakeError(f"there is no robot '{shortened(agent)}'", "name a robot of the team at that time")
         for child in element.iterchildren("constraint"):
             with self._report.at(line(child)):
-                self._missed.add(attribute(child, "name"))
+                self._not_added.add(attribute(child, "name"))
                 constraint = read_shared(child, context)
                 if constraint:
                     check_added_constraint(constraint)
-                    self._missed.discard(constraint.name)
+                    self._not_added.discard(constraint.name)
                     yield line(child), AddConstraint(agent, parent, constraint)
 
     def _apply(self, change: Change, place: int) -> None:
-        """Change the team. Raises `MistakeError` where it cannot take that."""
+        """Apply a change to the team. Raises `MistakeError` if it is impossible."""
         if self._team is not None and isinstance(change, AddConstraint):
-            check_kinds(change.constraint, kinds_of(self._team.robots))
+            check_argument_types(change.constraint, symbolic_by_variable(self._team.robots))
         while self._team is not None:
             try:
                 self._team = apply_changes(self._team, [change])
             except ChangeError as bad:
                 if isinstance(change, AddAgent) and bad.line:
-                    self._blame(change.robot, bad, place)
+                    self._report_in_robot_file(change.robot, bad, place)
                     change = AddAgent(_without_line(change.robot, bad.line))
                     continue
-                self._missed |= _names_brought(change)
-                if not self._excused(bad):
+                self._not_added |= _added_names(change)
+                if not self._is_consequence(bad):
                     raise MistakeError(bad.message, bad.hint) from None
             return
 
-    def _blame(self, robot: Robot, bad: ChangeError, place: int) -> None:
-        """Tell a mistake of an added robot's file; the robot joins without what is wrong with it."""
-        if not self._excused(bad):
+    def _report_in_robot_file(self, robot: Robot, bad: ChangeError, place: int) -> None:
+        """Add a mistake in an added robot's file. The robot joins without the wrong part."""
+        if not self._is_consequence(bad):
             message = f"{bad.message}, when {SCENARIO}:{place} adds this robot"
-            self._elsewhere.append(Diagnostic(robot.file, bad.line, message, bad.hint))
+            self._robot_mistakes.append(Diagnostic(robot.file, bad.line, message, bad.hint))
 
-    def _excused(self, bad: ChangeError) -> bool:
-        """Return whether `bad` may only follow from a mistake that was reported already."""
-        return bool(bad.missing) and (self._unread or bad.missing in self._missed)
+    def _is_consequence(self, bad: ChangeError) -> bool:
+        """Return whether `bad` may only follow from a mistake that was reported before."""
+        return bool(bad.missing) and (self._has_unread_file or bad.missing in self._not_added)
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """Return the path of the file `name` in `folder`, whether it is there or not. Raises `MistakeError`."""
+    """Return the path of the file `name` in `folder`, which need not exist. Raises `MistakeError`."""
     top = folder.resolve()
     try:
         path = resolved(top / name)
@@ -232,7 +237,7 @@ def _inside(folder: Path, name: str) -> Path:
 
 
 def _refuse_parts(robot: Robot) -> None:
-    """Raise `InvalidInputError` where an added robot brings its part of partially known constraints."""
+    """Raise `InvalidInputError` if an added robot has partially known constraints."""
     report = DiagnosticCollector(robot.file)
     for constraint in robot.shared:
         with report.at(constraint.line):
@@ -252,8 +257,8 @@ def _without_line(robot: Robot, number: int) -> Robot:
     )
 
 
-def _names_brought(change: Change) -> set[str]:
-    """Return what would be there, had `change` been made."""
+def _added_names(change: Change) -> set[str]:
+    """Return the names of the robots, variables and constraints that `change` adds."""
     match change:
         case AddAgent(robot):
             return {robot.name, *(variable.name for variable in robot.variables)}

@@ -1,4 +1,4 @@
-"""Writes what changes over time: `scenario.xml`, the files of robots that join, and what robots' files say for it."""
+"""Write the files of a team with a scenario: `scenario.xml`, its robots, and the robots that join later."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from robochoc.model.problem import (
 
 
 def team_files(team: Team) -> dict[str, bytes]:
-    """Return the files of a valid team, by their paths in its folder: robots, and its scenario if it has one.
+    """Return the contents of the files of a valid team, by path: its robots, and its scenario if it has one.
 
-    A constraint that an event adds refers to a definition in the file of the robot that gets it.
+    The definitions of constraints that an event adds are in the file of the robot that gets the constraint.
 
     Raises:
         ValueError: if a robot cannot be written (`robot_xml`).
     """
     files = {f"{robot.name}.xml": _File(robot) for robot in team.robots}
     present = {robot.name: files[f"{robot.name}.xml"] for robot in team.robots}
-    labels = _Labels(team)
+    texts = _ValueTexts(team)
     root = etree.Element("scenario")
     for event in team.scenario:
         after = "solved" if event.after is None else f"{event.after} messages"
@@ -46,7 +46,7 @@ def team_files(team: Team) -> dict[str, bytes]:
                 added = etree.SubElement(element, "add_constraint", agent=change.agent, parent=change.parent)
                 present[change.agent].add(change.constraint, added)
             else:
-                element.append(_element(change, labels))
+                element.append(_element(change, texts))
     written = {path: file.content() for path, file in files.items()}
     if team.scenario:
         etree.indent(root)
@@ -56,67 +56,67 @@ def team_files(team: Team) -> dict[str, bytes]:
 
 
 class _File:
-    """A robot's file, and the constraints that events add to it."""
+    """The file of a robot, with the definitions of constraints that events add."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._added: list[tuple[Constraint, etree._Element]] = []
 
     def add(self, constraint: Constraint, holder: etree._Element) -> None:
-        """Note a constraint, whose element is to stand in `holder`."""
+        """Add a constraint of an event, whose element belongs into `holder`."""
         self._added.append((constraint, holder))
 
     def content(self) -> bytes:
-        """Return the file, and put the elements of the added constraints where they belong.
+        """Return the contents of the file, and move the elements of the added constraints into their events.
 
-        The file is written as if the constraints were private ones; then their elements move, and the definitions stay.
+        The added constraints are first written as private ones, so that their definitions are written too.
         """
         if not self._added:
             return robot_xml(self._robot)
-        extra = tuple(constraint for constraint, _ in self._added)
+        added = tuple(constraint for constraint, _ in self._added)
         private = self._robot.private
-        whole = etree.fromstring(robot_xml(replace(self._robot, private=(*private, *extra))))
-        section = whole.find("constraints")
-        if section is None:  # what is written has them
-            raise ValueError(f"the constraints of {self._robot.name} are not written")
+        root = etree.fromstring(robot_xml(replace(self._robot, private=(*private, *added))))
+        section = root.find("constraints")
+        if section is None:
+            raise ValueError(f"the constraints of {self._robot.name} were not written")
         for element, (_, holder) in zip(list(section)[len(private) :], self._added, strict=True):
             holder.append(element)
         if private:
             section.set("nbConstraints", str(len(private)))
         else:
-            whole.remove(section)
-        etree.indent(whole)
-        body = etree.tostring(whole, pretty_print=True, encoding="unicode")
+            root.remove(section)
+        etree.indent(root)
+        body = etree.tostring(root, pretty_print=True, encoding="unicode")
         return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
 
 
-class _Labels:
-    """Values as files write them."""
+class _ValueTexts:
+    """The values of variables as text: integers, or names of symbols."""
 
     def __init__(self, team: Team) -> None:
         joining = [c.robot for event in team.scenario for c in event.changes if isinstance(c, AddAgent)]
         self._variables = {one.name: one for robot in (*team.robots, *joining) for one in robot.variables}
 
-    def of(self, variable: str, value: int) -> str:
-        """Return a value of a variable: a symbol by its name."""
+    def text(self, variable: str, value: int) -> str:
+        """Return the text of a value of `variable`."""
         known = self._variables.get(variable)
         return str(known.domain.label(value) if known else value)
 
 
-def _element(change: RemoveAgent | RemoveValue | AddValue | RemoveConstraint, labels: _Labels) -> etree._Element:
+def _element(change: RemoveAgent | RemoveValue | AddValue | RemoveConstraint, texts: _ValueTexts) -> etree._Element:
     match change:
         case RemoveAgent(name):
             return etree.Element("remove_agent", name=name)
         case RemoveValue(variable, value):
-            return etree.Element("remove_value", variable=variable, value=labels.of(variable, value))
+            return etree.Element("remove_value", variable=variable, value=texts.text(variable, value))
         case AddValue(variable, value):
-            return etree.Element("add_value", variable=variable, value=labels.of(variable, value))
+            return etree.Element("add_value", variable=variable, value=texts.text(variable, value))
         case RemoveConstraint(agent, parent, name):
             return etree.Element("remove_constraint", agent=agent, parent=parent, name=name)
 
 
 def _free_path(name: str, taken: Mapping[str, object]) -> str:
-    """Return a path for the file of a robot that joins; one may join again."""
+    """Return a free path for the file of a robot that joins, perhaps several times."""
     path, number = f"late/{name}.xml", 1
     while path in taken:
         number += 1

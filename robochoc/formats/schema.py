@@ -1,4 +1,4 @@
-"""The second layer: the XSD schemas, and libxml2's messages in plain words."""
+"""Validate XML files by their XSD schemas, with libxml2's messages in plain words."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, Invali
 
 _REMOVABLE = {"constraint", "topic", "agent"}
 _ROUNDS = 2
-"""Without an attribute that was refused, an element may lack one: that is found in a second round."""
+"""An element may lack an attribute after a misspelt one was removed: a second round finds that."""
 
 _ATTRIBUTE = re.compile(r", attribute '([^']*)'")
 _LACKS_ATTRIBUTE = "is required but missing"
@@ -25,7 +25,11 @@ _TEXT = "Character content"
 
 
 def without_schema_errors(tree: etree._Element, schema: etree.XMLSchema) -> etree._Element | None:
-    """Return `tree` without what `schema` refuses. None: that would take away too much. `tree` itself is changed."""
+    """Remove invalid parts from `tree` and return it. None: too much would have to be removed.
+
+    Only parts to which nothing else refers are removed: attributes, unknown elements, constraints, topics, neighbours.
+    Otherwise one mistake would be reported several times. So mistakes of other layers can be reported as well.
+    """
     for _ in range(_ROUNDS):
         mistakes = refused_by(schema, tree)
         if not mistakes:
@@ -46,7 +50,7 @@ def _element(document: etree._ElementTree, path: str | None) -> etree._Element |
 
 
 def _repair(element: etree._Element, message: str) -> bool:
-    """Take out of `element` what the schema's `message` refuses. Return False where that must stay."""
+    """Remove the part of `element` that the `message` of the schema is about. Return False if it cannot be removed."""
     attribute = _ATTRIBUTE.search(message)
     if attribute:
         element.attrib.pop(attribute[1], "")
@@ -64,7 +68,7 @@ def _repair(element: etree._Element, message: str) -> bool:
 
 
 def _remove(element: etree._Element) -> bool:
-    """Remove `element`, and the count of elements that its parent states."""
+    """Remove `element`, and the number of elements that its parent states."""
     parent = element.getparent()
     if parent is None:
         return False
@@ -75,10 +79,10 @@ def _remove(element: etree._Element) -> bool:
 
 
 _LIBXML2 = Lock()
-"""Held by who uses a schema: robots of one machine may read their files in threads.
+"""The lock for every use of a schema: robots of one machine may read their files in threads.
 
-libxml2 prepares the types of all schemas while it compiles the first one: two threads that do so at a time spoil each
-other's memory. And lxml gives a schema one log of errors, whoever asks.
+libxml2 initialises the types of all schemas while it compiles the first one, and two threads at a time would corrupt
+memory. And a schema has one error log in lxml, for all threads.
 """
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "functions", "constraints"}
@@ -97,19 +101,19 @@ _PARTS = (
 """The parts of libxml2's messages."""
 
 _PHRASES = (
-    ("[duplicate]", "a second <{element}>", "it may stand once: put the two together"),
+    ("[duplicate]", "a second <{element}>", "only one is allowed: merge the two"),
     ("This element is not expected. Expected", "<{element}> does not belong in <{parent}>", "expected {expected}"),
-    ("This element is not expected", "<{element}> does not belong in <{parent}>", "mend its spelling or delete it"),
+    ("This element is not expected", "<{element}> does not belong in <{parent}>", "correct its spelling or delete it"),
     ("Missing child element", "<{element}> lacks {lacking}", "add it, even if it is empty"),
     ("is required but missing", "<{element}> lacks its attribute '{missing}'", 'write <{element} {missing}="...">'),
-    ("' is not allowed.", "<{element}> has no attribute '{attribute}'", "mend its spelling or delete it"),
+    ("' is not allowed.", "<{element}> has no attribute '{attribute}'", "correct its spelling or delete it"),
     ("[facet", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
     ("is not a valid value of", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
-    ("Element content is not allowed", "an element inside <{element}>, which holds text only", "delete it"),
-    ("Character content", "text inside <{element}>, where none belongs", "delete it"),
+    ("Element content is not allowed", "an element inside <{element}>, which contains only text", "delete it"),
+    ("Character content", "text inside <{element}>, where no text is allowed", "delete it"),
     ("", "{message}", "see the schemas in xsd/"),
 )
-"""Each kind of message in plain words, and the next step. The first that fits counts."""
+"""A part of libxml2's message, the message in plain words, and the next step. The first match counts."""
 
 _PATTERNS = {
     "'[A-Za-z][A-Za-z0-9_.]*'": "a name: a letter, then letters, digits, '.' and '_'",
@@ -126,7 +130,7 @@ class SchemaError(InvalidInputError):
     """An XML file that its schema refuses. It may have other mistakes too.
 
     Attributes:
-        tree: What could be read of it.
+        tree: The parsed file.
     """
 
     def __init__(self, diagnostics: Iterable[Diagnostic], tree: etree._Element) -> None:
@@ -151,15 +155,15 @@ class LogEntry(Protocol):
 
 
 def entries(error_log: object) -> list[LogEntry]:
-    """Return the messages in an lxml `error_log`, which the stubs leave opaque."""
+    """Return the messages in an lxml `error_log`, which has no type in the stubs."""
     return list(cast("Iterable[LogEntry]", error_log))
 
 
 @cache
 def schema_for(root: str) -> etree.XMLSchema:
-    """Return the schema of files with that root element, compiled when the first of them is read.
+    """Return the schema of files with that root element. It is compiled when the first of them is read.
 
-    Schemas lie in the wheel's package, or at the checkout's top.
+    Schemas are in the package of a wheel, or at the top of a checkout.
     """
     name, here = _SCHEMAS[root], Path(__file__).resolve()
     inside, outside = here.parents[1] / "xsd" / name, here.parents[2] / "xsd" / name
@@ -168,7 +172,7 @@ def schema_for(root: str) -> etree.XMLSchema:
 
 
 def refused_by(schema: etree.XMLSchema, tree: etree._Element) -> list[LogEntry]:
-    """Return what `schema` refuses in `tree`; nothing: it is valid."""
+    """Return the errors of `tree` by `schema`; none if it is valid."""
     with _LIBXML2:
         return [] if schema.validate(tree) else entries(schema.error_log)
 
@@ -185,7 +189,7 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
     for entry in refused:
         parts = _parts(entry)
         if difflib.get_close_matches(parts["missing"], unknown.get(entry.path, [])):
-            continue  # one slip of the pen is one mistake: `typ` is unknown, and so `type` is missing
+            continue  # one misspelt attribute is one mistake: `typ` is unknown, and so `type` is missing
         if parts["attribute"]:
             unknown.setdefault(entry.path, []).append(parts["attribute"])
         message, hint = next(phrase for sign, *phrase in _PHRASES if sign in parts["message"])

@@ -1,4 +1,4 @@
-"""Symbols in files: their names, the table of their codes, and who may be compared with whom.
+"""Symbols in files: their names, the table of their codes, and type checks of constraints.
 
 docs/reference/format.md, "Symbols".
 """
@@ -23,10 +23,10 @@ _NUMBER = re.compile(r"[-+.0-9]+")
 
 
 class SymbolTable:
-    """The symbols of a team's files in the order in which they appear: the place of a symbol is its code."""
+    """The symbols in the files of a team, in the order of their first use: the index of a symbol is its code."""
 
     def __init__(self, known: Sequence[str] = ()) -> None:
-        """Begin with symbols whose codes are `known`."""
+        """Start with the symbols `known`, whose codes are their indices."""
         self._codes = {name: code for code, name in enumerate(known)}
         self._declared: set[str] = set()
         self._mentioned: dict[str, tuple[str, int]] = {}
@@ -36,20 +36,20 @@ class SymbolTable:
         """All symbols so far, by their codes."""
         return tuple(self._codes)
 
-    def declared(self, word: str) -> int:
-        """Return the code of a symbol that stands in a domain. Raises `MistakeError`."""
+    def declare(self, word: str) -> int:
+        """Return the code of a symbol in a domain. Raises `MistakeError`."""
         code = self._code(word)
         self._declared.add(word)
         return code
 
-    def mentioned(self, word: str, file: str, line: int) -> int:
-        """Return the code of a symbol that stands elsewhere, in that `line` of a file. Raises `MistakeError`."""
+    def mention(self, word: str, file: str, line: int) -> int:
+        """Return the code of a symbol that is used elsewhere, in that `line` of a file. Raises `MistakeError`."""
         code = self._code(word)
         self._mentioned.setdefault(word, (file, line))
         return code
 
     def undeclared(self) -> Iterator[Diagnostic]:
-        """Yield the symbols that stand in no domain of any file."""
+        """Yield the symbols that are in no domain of any file."""
         for word, (file, line) in self._mentioned.items():
             if word not in self._declared:
                 hint = suggestion(word, sorted(self._declared), "symbols")
@@ -74,13 +74,13 @@ def check_symbol(word: str) -> None:
 
 
 def check_symbolic_domain(domain: Domain) -> None:
-    """Raise `MistakeError` unless the values of a domain that was built in Python are codes of its symbols."""
+    """Raise `MistakeError` unless the values of a symbolic domain are codes of its symbols."""
     check_table(domain.symbols)
     for part in domain.ranges:
         if part.start < 0 or part.stop > len(domain.symbols):
             wrong = part.start if part.start < 0 else part.stop - 1
-            message = f"the value {wrong} of domain {shortened(domain.name)} is no symbol"
-            raise MistakeError(message, f"there are {len(domain.symbols)}, with the codes 0, 1, ...")
+            message = f"the value {wrong} of domain {shortened(domain.name)} is not the code of a symbol"
+            raise MistakeError(message, f"use codes from 0 to {len(domain.symbols) - 1}")
 
 
 def check_table(names: Sequence[str]) -> None:
@@ -90,38 +90,38 @@ def check_table(names: Sequence[str]) -> None:
     for word in names:
         check_symbol(word)
     if len(set(names)) < len(names):
-        raise MistakeError("a symbol stands twice in the table of symbols", "each has one code")
+        raise MistakeError("a symbol occurs twice in the table of symbols", "list each symbol once")
 
 
 def check_one_table(robot: Robot) -> None:
-    """Raise `MistakeError` where symbols of a robot have different codes in its domains, or none."""
+    """Raise `MistakeError` unless all symbolic domains of a robot have the same valid table of symbols."""
     tables = [one.domain.symbols for one in robot.variables if one.domain.symbols]
     tables += [robot.symbols] if robot.symbols else []
     if any(table != tables[0] for table in tables[1:]):
-        message = "its symbolic domains have different symbols"
-        raise MistakeError(message, "all domains of a team have one table; their ranges say which are in which domain")
+        raise MistakeError("its symbolic domains have different tables of symbols", _ONE_TABLE)
     check_table(robot.symbols)
 
 
 def check_symbolic_definition(definition: Definition, table: Sequence[str]) -> None:
-    """Raise `MistakeError` unless what a definition says of symbols is in the `table`."""
+    """Raise `MistakeError` unless symbolic parameters or columns of a definition exist, and codes are in `table`."""
     if not isinstance(definition, Relation):
         unknown = [name for name in definition.symbolic if name not in definition.parameters]
         if unknown:
-            message = f"'{shortened(unknown[0])}' is to be a symbol, and no parameter"
-            raise MistakeError(message, "`symbolic` lists parameters")
+            message = f"`symbolic` contains '{shortened(unknown[0])}', which is not a parameter"
+            raise MistakeError(message, "list names of parameters")
         return
     for column in definition.symbolic:
         if not 0 <= column < definition.arity:
-            raise MistakeError(f"column {column} is to hold symbols", f"there are {definition.arity}, from 0 on")
+            message = f"`symbolic` contains the column {column}, which does not exist"
+            raise MistakeError(message, f"use numbers from 0 to {definition.arity - 1}")
         for values in definition.tuples:
             if not 0 <= values[column] < len(table):
-                message = f"the value {values[column]} in column {column} is no symbol"
-                raise MistakeError(message, "see `Robot.symbols`: the value is the place of a name there")
+                message = f"the value {values[column]} in column {column} is not the code of a symbol"
+                raise MistakeError(message, "use an index of `Robot.symbols`")
 
 
-def check_kinds(constraint: Constraint, symbolic: Mapping[str, bool]) -> None:
-    """Raise `MistakeError` where a constraint takes a symbol for an integer, or an integer for a symbol.
+def check_argument_types(constraint: Constraint, symbolic: Mapping[str, bool]) -> None:
+    """Raise `MistakeError` if a constraint uses a symbol as an integer, or an integer as a symbol.
 
     Args:
         constraint: The constraint.
@@ -134,55 +134,55 @@ def check_kinds(constraint: Constraint, symbolic: Mapping[str, bool]) -> None:
     for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True):
         if None not in {wanted, kind} and wanted is not kind:
             name = shortened(constraint.definition.name)
-            message = f"{name} takes {_SAID[bool(wanted)]} where '{term}' stands, and that is {_SAID[bool(kind)]}"
-            raise MistakeError(message, "write symbol X or int X among its parameters, as its arguments are")
+            message = f"{name} expects {_TYPES[bool(wanted)]}, but '{term}' is {_TYPES[bool(kind)]}"
+            raise MistakeError(message, "write symbol X or int X among its parameters, like the argument")
     if isinstance(constraint.definition, Relation):
         return  # a column of a relation without tuples fits any domain
     loose = {
         kind: term for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True) if wanted is None
     }
     if loose.keys() >= {True, False}:
-        message = f"'{loose[True]}' is a symbol, and '{loose[False]}' an integer"
-        raise MistakeError(message, "symbols are compared with symbols; name one in an expression: eq(X, 'red')")
+        message = f"'{loose[True]}' is a symbol, but '{loose[False]}' is an integer"
+        raise MistakeError(message, "compare symbols with symbols; in an expression, quote a symbol: eq(X, 'red')")
 
 
 def mistyped_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield constraints that take another robot's symbols for integers, or its integers for symbols."""
+    """Yield constraints that use another robot's symbols as integers, or its integers as symbols."""
     if not any(robot.symbol_table for robot in members.robots):
         return
-    symbolic = kinds_of(members.robots)
+    symbolic = symbolic_by_variable(members.robots)
     for robot in members.robots:
         parts = [part for child in robot.children for part in (*child.constraints, *child.copies)]
         for constraint in (*robot.shared, *parts):
             try:
-                check_kinds(constraint, symbolic)
+                check_argument_types(constraint, symbolic)
             except MistakeError as mistake:
                 place = members.files[robot.name].places.constraint(constraint)
                 yield place.mistake(mistake.message, mistake.hint)
 
 
 def different_tables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots, built in Python, whose symbols have other codes than those of the first that has any."""
+    """Yield robots, built in Python, whose symbols have other codes than those of the first robot with symbols."""
     first: Robot | None = None
     for robot in members.robots:
         if robot.symbol_table:
             first = first or robot
             if robot.symbol_table != first.symbol_table:
                 message = f"its symbols differ from those of '{first.name}'"
-                hint = "all symbolic domains of a team have one table; their ranges say which are in which domain"
-                yield members.place(robot.name).mistake(message, hint)
+                yield members.place(robot.name).mistake(message, _ONE_TABLE)
 
 
-def kinds_of(robots: Iterable[Robot]) -> dict[str, bool]:
+def symbolic_by_variable(robots: Iterable[Robot]) -> dict[str, bool]:
     """Return for each variable of `robots` whether its values are symbols."""
     return {one.name: bool(one.domain.symbols) for robot in robots for one in robot.variables}
 
 
-_SAID = {True: "a symbol", False: "an integer"}
+_TYPES = {True: "a symbol", False: "an integer"}
+_ONE_TABLE = "use one table in all domains of a team; the ranges of a domain select its symbols"
 
 
 def _kinds(definition: Definition) -> list[bool | None]:
-    """Return for each parameter whether it is a symbol; None where it may be one or not."""
+    """Return for each parameter whether it is a symbol; None if both are possible."""
     if isinstance(definition, Relation):
         known = bool(definition.tuples or definition.symbolic)
         return [place in definition.symbolic if known else None for place in range(definition.arity)]
@@ -195,8 +195,8 @@ def codes_of(words: Collection[str], table: SymbolTable) -> list[int]:
     """Return the codes of the symbols of a domain, in ascending order. Raises `MistakeError`."""
     codes: set[int] = set()
     for word in words:
-        code = table.declared(word)
+        code = table.declare(word)
         if code in codes:
-            raise MistakeError(f"the symbol '{shortened(word)}' stands twice in the domain", "name it once")
+            raise MistakeError(f"the symbol '{shortened(word)}' occurs twice in the domain", "list it once")
         codes.add(code)
     return sorted(codes)

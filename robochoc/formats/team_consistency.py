@@ -1,6 +1,6 @@
-"""Check the members of a team and their parents: the statements of two robots about each other.
+"""Check the robots of a team against each other: their neighbours, costs, variables and shared constraints.
 
-docs/reference/format.md, "The team".
+docs/reference/format.md, "The team", and "One robot" on n-ary constraints.
 """
 
 from __future__ import annotations
@@ -28,19 +28,22 @@ def excessive_numbers(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield constraints with parents whose scopes do not fit the place where they stand."""
+    """Yield constraints with parents that are listed under the wrong robot or parent."""
     for robot in members.robots:
         if members.has_all_parents(robot.name):
             near = {robot.name, *members.agreed[robot.name]}
             for parent in robot.parents:
                 for constraint in parent.constraints:
-                    mistake = _foreign(members, near, parent, constraint) or _place(members, robot, parent, constraint)
+                    mistake = _unrelated_variable(members, near, parent, constraint)
+                    mistake = mistake or _wrong_parent(members, robot, parent, constraint)
                     if mistake:
                         yield members.files[robot.name].places.constraint(constraint).mistake(*mistake)
 
 
-def _foreign(members: TeamMembers, near: set[str], parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """Return a variable in the scope that belongs to no robot in `near` (itself and its parents), if there is one."""
+def _unrelated_variable(
+    members: TeamMembers, near: set[str], parent: Parent, constraint: Constraint
+) -> tuple[str, str] | None:
+    """Return the mistake if a variable of the scope belongs to no robot in `near`: the robot and its parents."""
     for name in constraint.variables:
         owners = members.owners.get(name, [])
         if not owners and not members.broken:
@@ -48,27 +51,27 @@ def _foreign(members: TeamMembers, near: set[str], parent: Parent, constraint: C
             hint = f"{suggestion(name, known, 'variables')} ({members.place(parent.name)})"
             return f"no robot has the variable '{shortened(name)}'", hint
         if len(owners) == 1 and owners[0] not in near:
-            message = f"the variable '{name}' belongs to '{owners[0]}', which is no parent of this robot"
-            hint = "a constraint stands with the lowest robot of its scope, and the others are parents of that"
+            message = f"the variable '{name}' belongs to '{owners[0]}', which is not a parent of this robot"
+            hint = "list a constraint with the lowest robot of its scope, and all others as parents of that robot"
             return message, f"{hint} ({members.place(owners[0], name)})"
     return None
 
 
-def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """Return why the constraint should not stand under `parent`, if so."""
+def _wrong_parent(members: TeamMembers, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
+    """Return the mistake if the constraint does not belong under `parent`."""
     found = [members.owners.get(name, []) for name in constraint.variables]
     if any(len(owners) != 1 for owners in found):
-        return None  # another mistake, which is reported elsewhere
+        return None  # reported as another mistake
     others = {owners[0] for owners in found} - {robot.name}
     if parent.name not in others:
-        message = f"the scope has no variable of the parent '{parent.name}', under which it stands"
-        return message, f"move it to '{min(others)}'; '{parent.name}' is {members.place(parent.name)}"
+        message = f"the scope has no variable of the parent '{parent.name}', under which the constraint is listed"
+        return message, f"move it to '{min(others)}'; '{parent.name}' is at {members.place(parent.name)}"
     if constraint.model == ConstraintModel.PKC and len(others) > 1:
         message = "a PKC constraint over more than two robots"
         return message, f"only '{robot.name}' and '{parent.name}' ({members.place(parent.name)}) can share its parts"
     lowest = [max(others, key=rank.__getitem__) for rank in members.ranks]
     if lowest and parent.name not in lowest:
-        message = f"the constraint stands under '{parent.name}', the lowest parent of its scope is '{lowest[0]}'"
+        message = f"the constraint is listed under '{parent.name}', but the lowest parent of its scope is '{lowest[0]}'"
         return message, f"move it to '{lowest[0]}' ({members.place(lowest[0])})"
     return None
 
@@ -79,22 +82,24 @@ def misplaced_parts(members: TeamMembers) -> Iterator[Diagnostic]:
         for child in robot.children:
             if members.is_parent(robot.name, child.name):
                 for part in child.constraints:
-                    mistake = _foreign_to_both(members, robot, child.name, part) or _unshown(members, child.name, part)
+                    mistake = _third_variable(members, robot, child.name, part)
+                    mistake = mistake or _hidden_variable(members, child.name, part)
                     if mistake:
                         yield members.files[robot.name].places.constraint(part).mistake(*mistake)
 
 
-def _foreign_to_both(members: TeamMembers, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
+def _third_variable(members: TeamMembers, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
+    """Return the mistake if a variable of the part belongs to neither of the two robots."""
     own, others = members.own[robot.name], members.own[child]
     for name in part.variables:
         if name not in own and name not in others:
             hint = f"{suggestion(name, others, 'variables')} ({members.place(child)})"
-            return f"'{shortened(name)}' is no variable of '{robot.name}' or '{child}'", hint
+            return f"'{shortened(name)}' is not a variable of '{robot.name}' or '{child}'", hint
     return None
 
 
-def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
-    """Return the mistake that the parent's part has a variable which `child` shows to no robot."""
+def _hidden_variable(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
+    """Return the mistake if the parent's part has a variable that `child` shows to no robot."""
     if members.broken:
         return None
     robot = members.files[child].robot
@@ -102,16 +107,19 @@ def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, s
     shown = {*robot.interface}.union(*below)
     for name in part.variables:
         if name in members.own[child] and name not in shown:
-            message = f"the part looks at '{shortened(name)}', which '{child}' shows to nobody"
-            return message, f"let '{child}' hold its part of the PKC as well ({members.place(child, name)})"
+            message = f"the part contains '{shortened(name)}', which '{child}' shows to no robot"
+            return message, f"add the part of '{child}' to its file as well ({members.place(child, name)})"
     return None
 
 
 def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield variables that a child's constraints need, and that its parent's file does not name for it."""
+    """Yield variables that a child's constraints need, but its parent's file does not list for it."""
     for robot in members.robots:
         for child in robot.children:
-            if members.is_parent(robot.name, child.name) and child.name not in members.files[robot.name].unsaid:
+            if (
+                members.is_parent(robot.name, child.name)
+                and child.name not in members.files[robot.name].implied_children
+            ):
                 needed = members.needed(robot.name, child.name)
                 lacking = [name for name in needed if name not in child.variables]
                 if lacking:
@@ -122,7 +130,7 @@ def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield neighbours that are not there."""
+    """Yield neighbours that the team lacks."""
     known = dict.fromkeys([*members.files, *sorted(members.broken)])
     for entry in members.entries.values():
         if entry.other not in known:
@@ -133,7 +141,7 @@ def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield pairs of robots of which each should call the other the opposite of what it is called itself."""
+    """Yield pairs of neighbours that do not agree which of them is the parent."""
     for entry in members.entries.values():
         name, other = entry.robot.name, entry.other
         answer = members.entries.get((other, name))
@@ -147,7 +155,7 @@ def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield cycles of parents, each without a link in common with those before it."""
+    """Yield cycles of parents. No two of them have a link in common."""
     parents = {name: set(agreed) for name, agreed in members.agreed.items()}
     while True:
         try:
@@ -158,7 +166,7 @@ def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
                 parents[child].discard(parent)
                 links.append(members.entries[child, parent])
             elsewhere = " or ".join(str(link.place) for link in links[1:])
-            hint = f"one of these parents must go: the one here, or at {elsewhere}"
+            hint = f"delete one of these parents: here, or at {elsewhere}"
             yield links[0].place.mistake(f"the parents form a cycle: {error}", hint)
         else:
             return
@@ -171,12 +179,12 @@ def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
         if robot.kind is not usual[0][0]:
             other = next(other for other in members.robots if other.kind is usual[0][0])
             message = f"the robot is a {robot.kind}, but '{other.name}' is a {other.kind}"
-            hint = f"a team is one or the other: change the type here or at {members.place(other.name)}"
+            hint = f"a team has one kind of problem: change the type here or at {members.place(other.name)}"
             yield members.place(robot.name).mistake(message, hint)
 
 
 def mixed_costs(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots that differ from most others in what is done with the sum of costs, or in the unit of costs."""
+    """Yield robots whose objective, or unit of costs, differs from that of most others."""
     usual = Counter((robot.costs.maximize, robot.costs.places) for robot in members.robots).most_common(1)
     for robot in members.robots:
         maximize, places = robot.costs.maximize, robot.costs.places
@@ -185,10 +193,10 @@ def mixed_costs(members: TeamMembers) -> Iterator[Diagnostic]:
         other = next(one for one in members.robots if (one.costs.maximize, one.costs.places) == usual[0][0])
         if maximize is not other.costs.maximize:
             message = f"the robot {_objective(robot)} costs, but '{other.name}' {_objective(other)} them"
-            hint = f"a team does one or the other: change the objective here or at {members.place(other.name)}"
+            hint = f"a team has one objective: change it here or at {members.place(other.name)}"
         else:
-            message = f"costs of {places} decimal places, but '{other.name}' has {other.costs.places}"
-            hint = "the robots of a team count costs in one unit"
+            message = f"costs with {places} decimal places, but '{other.name}' has {other.costs.places}"
+            hint = "use one unit of costs for all robots of the team"
         yield members.place(robot.name).mistake(message, hint)
 
 
@@ -197,22 +205,22 @@ def _objective(robot: Robot) -> str:
 
 
 def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield variables that more than one robot calls its own."""
+    """Yield variables that several robots own."""
     for variable, (first, *others) in members.owners.items():
         for other in others:
-            message = f"the variable '{shortened(variable)}' is also one of '{first}'"
+            message = f"the variable '{shortened(variable)}' belongs to '{first}' too"
             hint = f"names of variables are unique in a team: rename it here or at {members.place(first, variable)}"
             yield members.place(other, variable).mistake(message, hint)
 
 
 def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots that stand before one of their parents, where the team says an order of its own."""
+    """Yield robots that precede one of their parents in the order of a team that was built in Python."""
     rank = {name: place for place, name in enumerate(members.order)}
     if not members.ranks:
         return  # the links themselves have a mistake
     for name, parents in members.agreed.items() if rank else ():
         late = next((parent for parent in parents if rank[parent] > rank[name]), None)
         if late is not None:
-            message = f"the robot stands before its parent '{late}' in the team"
-            hint = "the robots of a team stand in priority order, parents before their children"
+            message = f"the robot precedes its parent '{late}' in the team"
+            hint = "list robots in priority order, parents before their children"
             yield members.place(name).mistake(message, hint)

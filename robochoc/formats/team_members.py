@@ -1,4 +1,4 @@
-"""The robots of a team, from files or built in Python, as the checks of a whole team need them."""
+"""The robots of a team, from files or built in Python, with data that the checks of the team share."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ class NeighbourRole(StrEnum):
 
     @property
     def opposite(self) -> NeighbourRole:
-        """Return what the other says of the robot, if they agree."""
+        """Return the role that the robot has for this neighbour."""
         return NeighbourRole.CHILD if self == NeighbourRole.PARENT else NeighbourRole.PARENT
 
 
 @dataclass(frozen=True)
 class TeamMember:
-    """A robot with the locations of its parts, and what only its file says."""
+    """A robot with the locations of its parts, and further contents of its file."""
 
     robot: Robot
     places: Locations
     copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
-    """By child: the TKC constraints that the original platform's files repeat with the parent."""
-    unsaid: frozenset[str] = frozenset()
-    """The children for which `variable` is left out: the variables they must know follow from the scopes."""
+    """By child: copies of its TKC constraints, which the original platform's files list with the parent."""
+    implied_children: frozenset[str] = frozenset()
+    """The children without the attribute `variable`: the variables that they must know follow from the scopes."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class NeighbourEntry:
 
 @dataclass(frozen=True)
 class TeamMembers:
-    """The robots of a team, as far as each is right by itself.
+    """The valid robots of a team.
 
-    `broken` names the robots that have mistakes of their own. They are there, but nothing is known of them: a check
-    that would need them says nothing, so that one mistake is reported once. `order` is the robots' order, where
-    something else than the links says it: a team that was built in Python has one.
+    `broken` names the robots that have mistakes of their own. Checks that would need them are left out, so that no
+    mistake is reported twice. `order` is the order of the robots of a team that was built in Python; without it, the
+    order follows from the links.
     """
 
     files: Mapping[str, TeamMember]
@@ -61,7 +61,7 @@ class TeamMembers:
 
     @property
     def robots(self) -> Iterator[Robot]:
-        """The robots that could be read."""
+        """The valid robots."""
         return (file.robot for file in self.files.values())
 
     @cached_property
@@ -76,7 +76,7 @@ class TeamMembers:
         }
 
     def is_parent(self, parent: str, child: str) -> bool:
-        """Return whether both could be read, and both say so."""
+        """Return whether both robots are valid, and agree that `parent` is a parent of `child`."""
         below, above = self.entries.get((parent, child)), self.entries.get((child, parent))
         return (
             below is not None
@@ -87,19 +87,19 @@ class TeamMembers:
 
     @cached_property
     def agreed(self) -> dict[str, list[str]]:
-        """The parents of each robot that agree to be its parents."""
+        """The parents of each robot that list it as a child."""
         return {
             robot.name: [parent.name for parent in robot.parents if self.is_parent(parent.name, robot.name)]
             for robot in self.robots
         }
 
     def has_all_parents(self, name: str) -> bool:
-        """Return whether every parent of `name` could be read and agrees."""
+        """Return whether every parent of `name` is valid and lists it as a child."""
         return len(self.agreed[name]) == len(self.files[name].robot.parents)
 
     @cached_property
     def owners(self) -> dict[str, list[str]]:
-        """The robots, mostly one, that own each variable."""
+        """The robots that own each variable: one, unless that is a mistake."""
         owners: dict[str, list[str]] = {}
         for robot in self.robots:
             for variable in robot.variables:
@@ -108,9 +108,9 @@ class TeamMembers:
 
     @cached_property
     def ranks(self) -> tuple[Mapping[str, int], ...]:
-        """Each robot's place in the priority order; empty while some mistake leaves the order open.
+        """Each robot's place in the priority order; empty if mistakes leave the order unknown.
 
-        The links may leave several orders: there is the one that readers of files take, and `order`, if there is one.
+        Several orders may respect the links: the first is the one that readers of files compute, the second `order`.
         """
         if self.broken or not all(self.has_all_parents(name) for name in self.files):
             return ()
@@ -127,7 +127,7 @@ class TeamMembers:
 
     @cached_property
     def _used(self) -> dict[str, dict[str, Constraint]]:
-        """For each robot the variables in the constraints it holds, and the first that uses each."""
+        """For each robot the variables in its shared constraints, with the first constraint that uses each."""
         used: dict[str, dict[str, Constraint]] = {}
         for robot in self.robots:
             first = used[robot.name] = {}
@@ -137,12 +137,12 @@ class TeamMembers:
         return used
 
     def needed(self, parent: str, child: str) -> dict[str, Constraint]:
-        """Return the variables of `parent` in constraints that `child` holds, with the constraint that needs each."""
+        """Return the variables of `parent` in shared constraints of `child`, with the first that uses each."""
         used = self._used[child]
         return {variable: used[variable] for variable in self.own[parent] if variable in used}
 
     def place(self, robot: str, variable: str = "") -> Location:
-        """Return where a robot stands, or a variable of its, for a message about two robots."""
+        """Return the location of a robot, or of a variable of the robot, for a message about two robots."""
         places = self.files[robot].places
         return places.variable(variable) if variable else places.robot()
 

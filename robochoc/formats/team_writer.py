@@ -1,4 +1,4 @@
-"""Writing a team as a folder, whole or not at all."""
+"""Write a team as a folder of XML files: completely, or not at all."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
+from robochoc.formats.diagnostics import invalid_input
 from robochoc.formats.names_file import NAMES_FILE
 from robochoc.formats.robot_reader import robot_in
 from robochoc.formats.scenario_reader import SCENARIO
@@ -17,27 +17,27 @@ from robochoc.model.problem import Team
 from robochoc.system.files import errors_naming, resolved
 
 SKETCH_FILE = "sketch.json"
-"""The file in which `robochoc app` keeps beside a team how it was drawn."""
+"""The file in a team's folder in which `robochoc app` saves the drawing of the team."""
 GROUND_FILE = "map.json"
-"""The file beside a team that says where its robots stand on a map, and what is blocked: `robochoc fly --map`."""
-_SURELY_READ = 1024 * 1024
-"""Bytes of a file that meets no limit of its reader, if the robot is valid."""
+"""The file in a team's folder with the places of its robots on a map, and blocked cells: `robochoc fly --map`."""
+_ALWAYS_READABLE = 1024 * 1024
+"""A file of a valid robot that is not larger, in bytes, is within the limits of its reader."""
 
 
 def write_team(
-    team: Team, folder: Path, *, replace: bool = False, beside: Mapping[str, bytes] = MappingProxyType({})
+    team: Team, folder: Path, *, replace: bool = False, extra_files: Mapping[str, bytes] = MappingProxyType({})
 ) -> None:
-    """Write one XML file per robot into `folder`, and its scenario: it is then complete, or not there at all.
+    """Write the XML files of the robots of `team`, and its scenario. The folder is then complete, or does not exist.
 
     Args:
         team: A valid team.
         folder: The folder to be written.
-        replace: Whether a folder of a team that is there already is replaced: one with XML files only, and those that
-            an import, the application or a problem on a map writes.
-        beside: The contents of other files that are written there, by their names.
+        replace: Whether an existing folder of a team is replaced. It may only contain XML files, and files that an
+            import, the application or a problem on a map writes.
+        extra_files: The contents of further files in the folder, by name.
 
     Raises:
-        InvalidInputError: if the team is invalid, files cannot express it, or the folder is there and is not replaced.
+        InvalidInputError: if the team is invalid, files cannot express it, or the folder exists and is not replaced.
         OSError: if it cannot be written.
     """
     import secrets  # noqa: PLC0415 - start-up: only to write a team
@@ -48,7 +48,7 @@ def write_team(
     for path, content in files.items():
         _check_size(path, content)
     if folder.exists() or folder.is_symlink():
-        _may_replace(folder, replace=replace)
+        _check_replaceable(folder, replace=replace)
     folder = resolved(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     new = folder.with_name(f".{secrets.token_hex(8)}.new")
@@ -56,7 +56,7 @@ def write_team(
     try:
         with errors_naming(folder):
             new.mkdir()
-            for path, content in {**files, **beside}.items():
+            for path, content in {**files, **extra_files}.items():
                 (new / path).parent.mkdir(exist_ok=True)
                 (new / path).write_bytes(content)
             if folder.exists():
@@ -70,29 +70,25 @@ def write_team(
 
 
 def _check_size(path: str, content: bytes) -> None:
-    """Raise `InvalidInputError` when no reader would take a robot's file: it may be too large."""
-    if len(content) > _SURELY_READ and path != SCENARIO:
+    """Raise `InvalidInputError` if a robot's file would be rejected by its reader, as too large."""
+    if len(content) > _ALWAYS_READABLE and path != SCENARIO:
         robot_in(content, Path(path).stem)
 
 
-def _may_replace(folder: Path, *, replace: bool) -> None:
+def _check_replaceable(folder: Path, *, replace: bool) -> None:
     if not replace:
-        raise _refusal(folder, "it exists already", "choose another folder with -o, or replace it with --force")
+        raise invalid_input(folder, "it exists already", "choose another folder with -o, or replace it with --force")
     if folder.is_symlink() or not folder.is_dir() or folder.resolve() == Path(folder.resolve().anchor):
-        raise _refusal(folder, "it is no folder, and is not replaced", "choose another folder with -o")
-    if foreign := sorted(entry.name for entry in folder.iterdir() if not _is_ours(entry)):
-        raise _refusal(
+        raise invalid_input(folder, "it is not a folder, and is not replaced", "choose another folder with -o")
+    if foreign := sorted(entry.name for entry in folder.iterdir() if not _is_team_file(entry)):
+        raise invalid_input(
             folder,
-            f"it holds {foreign[0]!r}, which is no robot's file, and is not replaced",
-            "choose another folder with -o, or remove it yourself",
+            f"it contains {foreign[0]!r}, which is not a file of a team, and is not replaced",
+            "choose another folder with -o, or delete it yourself",
         )
 
 
-def _is_ours(entry: Path) -> bool:
+def _is_team_file(entry: Path) -> bool:
     if entry.is_dir() and not entry.is_symlink() and re.fullmatch(r"late\d*", entry.name):
-        return all(_is_ours(below) for below in entry.iterdir())
+        return all(_is_team_file(below) for below in entry.iterdir())
     return entry.is_file() and (entry.suffix == ".xml" or entry.name in {NAMES_FILE, SKETCH_FILE, GROUND_FILE})
-
-
-def _refusal(folder: Path, message: str, hint: str) -> InvalidInputError:
-    return InvalidInputError([Diagnostic(str(folder), 0, message, hint)])

@@ -1,7 +1,7 @@
-"""The original platform's files repeat TKC constraints with the parent: both copies must allow the same tuples.
+"""Check copies of TKC constraints: the original platform's files list these with the child and with the parent.
 
-Compared is, for each set of variables, what all constraints on it say together: as they are written, and where that
-differs by trying every tuple.
+For each set of variables, all constraints on it are compared together: by their definitions and, where these differ, by
+trying every tuple.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MAX_COMPARED = 1_000_000
 
 
 def differing_copies(members: TeamMembers, misplaced: Collection[str]) -> Iterator[Diagnostic]:
-    """Yield copies that differ from the child's constraints. Children whose files are in `misplaced` are left out."""
+    """Yield copies that differ from the child's constraints. Children with files in `misplaced` are not checked."""
     domains = {variable.name: variable.domain for robot in members.robots for variable in robot.variables}
     for file in members.files.values():
         for name, copies in file.copies.items():
@@ -34,43 +34,42 @@ def differing_copies(members: TeamMembers, misplaced: Collection[str]) -> Iterat
 def _differing(
     file: str, copies: Iterable[Constraint], child: Robot, domains: Mapping[str, Domain]
 ) -> Iterator[Diagnostic]:
-    held = _grouped(constraint for constraint in child.shared if constraint.model == ConstraintModel.TKC)
-    for variables, group in _grouped(copies).items():
+    child_groups = _by_variables(constraint for constraint in child.shared if constraint.model == ConstraintModel.TKC)
+    for variables, group in _by_variables(copies).items():
         what = f"the copy of '{shortened(group[0].name)}' over {shortened(' '.join(variables))}"
-        originals = held.get(variables)
+        originals = child_groups.get(variables)
         if originals is None:
             message = f"{what}: '{child.name}' has no such constraint"
             yield Diagnostic(file, group[0].line, message, f"delete the copy, or add the constraint to {child.file}")
-        elif _written(group) != _written(originals):
+        elif _content(group) != _content(originals):
             difference = _difference(variables, group, originals, domains, child.costs)
             if difference:
                 hint = f"leave the copy out, or make it equal to {child.file}:{originals[0].line}"
                 yield Diagnostic(file, group[0].line, f"{what} {difference}", hint)
 
 
-def _grouped(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], list[Constraint]]:
-    """Return constraints by the set of their variables."""
+def _by_variables(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], list[Constraint]]:
     groups: dict[tuple[str, ...], list[Constraint]] = {}
     for constraint in constraints:
         groups.setdefault(tuple(sorted(constraint.variables)), []).append(constraint)
     return groups
 
 
-def _written(group: Iterable[Constraint]) -> Counter[Hashable]:
-    """Return the content of the constraints, independent of their names and their definitions' names."""
-    written: Counter[Hashable] = Counter()
+def _content(group: Iterable[Constraint]) -> Counter[Hashable]:
+    """Return the contents of the constraints without their names and the names of their definitions."""
+    contents: Counter[Hashable] = Counter()
     for constraint in group:
         definition = constraint.definition
         if isinstance(definition, Relation):
             tuples = frozenset(zip(definition.tuples, definition.costs or definition.tuples, strict=True))
-            written[definition.semantics, definition.default_cost, constraint.parameters, tuples] += 1
+            contents[definition.semantics, definition.default_cost, constraint.parameters, tuples] += 1
         else:
-            written[type(definition), _applied(constraint), constraint.cost] += 1
-    return written
+            contents[type(definition), _applied(constraint), constraint.cost] += 1
+    return contents
 
 
 def _applied(constraint: Constraint) -> Expression:
-    """Return the body of a predicate or function, about the variables and constants it is applied to."""
+    """Return the body of a predicate or function with the actual variables and constants."""
     if isinstance(constraint.definition, Relation):
         raise TypeError("a relation has no body")
     terms: dict[str, Expression] = {
@@ -97,29 +96,34 @@ def _difference(
     domains: Mapping[str, Domain],
     units: CostUnits,
 ) -> str:
-    """Return where the two say different things; empty where they nowhere do. Costs count in `units`."""
+    """Return the first difference between the two groups in words; empty if there is none. Costs are in `units`."""
     if any(variable not in domains for variable in variables):
         return ""  # of a robot whose file is broken
     if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
-        return f"is written differently from the child's, and more than {MAX_COMPARED} tuples are not compared"
-    left = [_price(constraint, variables, units) for constraint in copies]
-    right = [_price(constraint, variables, units) for constraint in originals]
+        return (
+            "has another definition than the child's constraint, and its tuples are too many to compare"
+            f" (more than {MAX_COMPARED})"
+        )
+    copy_costs = [_cost_function(constraint, variables, units) for constraint in copies]
+    child_costs = [_cost_function(constraint, variables, units) for constraint in originals]
     for values in product(*(domains[variable] for variable in variables)):
-        here, there = sum(price(values) for price in left), sum(price(values) for price in right)
+        here, there = sum(cost(values) for cost in copy_costs), sum(cost(values) for cost in child_costs)
         if here != there:
             shown = shortened(" ".join(map(str, values)))
-            return f"has the tuple '{shown}' {_said(here, units)}, and the child has it {_said(there, units)}"
+            return f"differs: '{shown}' is {_in_words(here, units)}, and with the child {_in_words(there, units)}"
     return ""
 
 
-def _said(cost: float, units: CostUnits) -> str:
+def _in_words(cost: float, units: CostUnits) -> str:
     if cost in {0, INFINITE}:
         return "forbidden" if cost else "allowed"
     return f"at a cost of {cost_text(cost, units)}"
 
 
-def _price(constraint: Constraint, variables: tuple[str, ...], units: CostUnits) -> Callable[[tuple[int, ...]], float]:
-    """Return what values of `variables` pay: `Constraint.price`, made for a million calls."""
+def _cost_function(
+    constraint: Constraint, variables: tuple[str, ...], units: CostUnits
+) -> Callable[[tuple[int, ...]], float]:
+    """Return the cost of `constraint` as a function of the values of `variables`, faster than `Constraint.price`."""
     definition = constraint.definition
     if isinstance(definition, Relation):
         slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]

@@ -1,6 +1,6 @@
-"""A bounded reader of TOML: in `tomllib`, time and memory grow with the square of the parts of a dotted key.
+"""Read TOML with bounds: the time and memory of `tomllib` grow with the square of the length of a dotted key.
 
-The tables of `tomllib` have no lines. Lines are looked up in the text when an error is reported.
+The tables of `tomllib` have no line numbers: these are found in the text when an error is reported.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def toml_tables(text: str) -> dict[str, Any]:
 
 
 def convert(tables: object, kind: type[_Kind], text: str, hint: str, table: str = "") -> _Kind:
-    """Return `tables`, the contents of a file or of one table in it, as a struct.
+    """Convert `tables`, the contents of a file or of one table in it, to a struct.
 
     Args:
         tables: The decoded TOML.
@@ -59,8 +59,8 @@ def convert(tables: object, kind: type[_Kind], text: str, hint: str, table: str 
         inner, number = _STEP.sub("", place), _STEP.search(place)
         name = ".".join(filter(None, (table, re.sub(r"\[[^]]*\]", "", inner))))
         line = line_of(text, name, field, int(number[1]) if number else 0) if field else _line_of_value(text, name)
-        told = describe_decode_error(error, kind)
-        raise MistakeError(f"{table}: {told}" if table else told, hint, line) from None
+        message = describe_decode_error(error, kind)
+        raise MistakeError(f"{table}: {message}" if table else message, hint, line) from None
 
 
 def line_of(text: str, table: str, key: str = "", number: int = 0) -> int:

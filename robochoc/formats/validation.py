@@ -1,8 +1,8 @@
-"""Validation of teams by the rules of docs/reference/format.md, wherever they come from.
+"""Validate teams by the rules of docs/reference/format.md.
 
-A team that was read is valid: its reader has asked the same. A team that was built in Python, by hand, by a generator
-or by a change, is validated before it is solved or written. What has been found valid is remembered for
-as long as that very object lives: teams cannot be changed, and `dataclasses.replace` makes another object.
+The reader of a team has applied the same rules. A team that was built in Python, by hand, by a generator or by a
+change, is validated before it is solved or written. Valid teams are remembered for as long as the objects exist: teams
+are immutable, and `dataclasses.replace` creates another object.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from itertools import islice
 from typing import TypeVar
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
-from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_types
+from robochoc.formats.field_types import FIELD_TYPES_HINT, FieldTypeError, check_field_types
 from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_integer
 from robochoc.formats.robot_rules import (
-    NOBODY_LEFT,
+    NO_ROBOTS_LEFT,
     check_added_constraint,
     check_constraint_of_added_robot,
 )
 from robochoc.formats.robot_validation import RobotValidator, repeated_robots
-from robochoc.formats.symbols import check_kinds, different_tables, kinds_of, mistyped_constraints
+from robochoc.formats.symbols import check_argument_types, different_tables, mistyped_constraints, symbolic_by_variable
 from robochoc.formats.team_consistency import (
     cycles,
     disagreements,
@@ -48,39 +48,39 @@ from robochoc.model.team_edits import ChangeError
 MAX_BETWEEN = 1000
 """The maximum number of mistakes between the robots of one team that are reported."""
 
-_NOTHING = ScenarioEvent(())
+_NO_CHANGES = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
 
 _valid: dict[int, weakref.ref[Team]] = {}
-"""The teams that are known to be valid, by `id`. To hash a team would take as long as to look at it."""
+"""The teams that are known to be valid, by `id`: hashing a team would take as long as validating it."""
 
 
 def check_team(team: Team) -> None:
     """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (docs/reference/format.md).
 
-    The messages are those for files; where a file's have its name and a line, these have the robot, and what of it is
-    wrong. A team that was found valid before is not looked at again.
+    The messages are those for files, with the robot and its part instead of the file and the line. A team that was
+    found valid before is not validated again.
     """
     if is_known_valid(team):
         return
-    found = _of_the_whole(team) or _mistakes(team) or list(_of_the_scenario(team))
+    found = _team_mistakes(team) or _robot_mistakes(team) or list(_scenario_mistakes(team))
     if found:
         raise InvalidInputError(_numbered(found))
     note_valid(team)
 
 
 def check_writable(team: Team) -> None:
-    """Raise `InvalidInputError` unless `team` is valid, and robots' files can say all of it.
+    """Raise `InvalidInputError` unless `team` is valid, and files can express it.
 
-    They have no order but the links', and do not say what changes have left of a variable's neighbours.
+    Files have no order but that of the links, and no `Robot.shown`, which some changes of a team set.
     """
     check_team(team)
     found = [
         ObjectLocations(robot.name)
         .robot()
         .mistake(
-            f"it shows '{shortened(robot.shown[0])}', though nothing else of it says so",
-            "a file cannot say that: it is what a change has left",
+            f"`shown` contains '{shortened(robot.shown[0])}', which a file cannot express",
+            "only changes of a team set `shown`: write the team as it was before",
         )
         for robot in team.robots
         if robot.shown
@@ -93,20 +93,20 @@ def check_writable(team: Team) -> None:
 
 
 def check_robot(robot: Robot) -> None:
-    """Raise `InvalidInputError` with every mistake of `robot` that can be found without its neighbours."""
+    """Raise `InvalidInputError` if `robot` has mistakes that can be found without its neighbours."""
     found = RobotValidator().mistakes(robot)
     if found:
         raise InvalidInputError(_numbered(found))
 
 
 def check_event(team: Team, event: ScenarioEvent) -> None:
-    """Raise `InvalidInputError` when `event`, which happens to `team`, brings what no team could have.
+    """Raise `InvalidInputError` if `event`, for `team`, contains invalid robots, constraints or values.
 
-    Changes that this team cannot take are no mistake here: it may have lost the robots that they concern.
+    Changes that are impossible for this team are allowed: the team may have lost the robots that they concern.
     """
     place = Location("an event")
-    found = list(_of_the_shape(event, ScenarioEvent, place)) or [
-        mistake for change in event.changes for mistake in _of_the_change(_robots(team, event), change, place)
+    found = list(_type_mistakes(event, ScenarioEvent, place)) or [
+        mistake for change in event.changes for mistake in _change_mistakes(_robots(team, event), change, place)
     ]
     found = found or list(_excessive_changes(team, event.changes, place))
     if found:
@@ -145,16 +145,13 @@ def note_valid(team: Team) -> None:
 
 
 def is_known_valid(team: Team) -> bool:
-    """Return whether this very object has been found valid before."""
+    """Return whether this object was found valid before."""
     known = _valid.get(id(team))
     return known is not None and known() is team
 
 
 def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
-    """Yield `found`; of equal diagnostics, those after the first get a number.
-
-    Lines tell two constraints of a file apart. Two objects may have the same name and scope.
-    """
+    """Yield `found`, with numbers for equal diagnostics: two objects may have the same name and scope."""
     seen: Counter[Diagnostic] = Counter()
     for mistake in found:
         seen[mistake] += 1
@@ -162,7 +159,7 @@ def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
 
 
 def check_between_robots(members: TeamMembers) -> list[Diagnostic]:
-    """Return what the robots of a team get wrong between them."""
+    """Return the mistakes between the robots of a team."""
     return list(islice(_between(members), MAX_BETWEEN))
 
 
@@ -184,66 +181,66 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from differing_copies(members, {mistake.file for mistake in scopes})
 
 
-def _of_the_whole(team: Team) -> list[Diagnostic]:
+def _team_mistakes(team: Team) -> list[Diagnostic]:
     """Return the mistakes that prevent further checks: no robots, or objects of other types."""
     given: object = team
     place = Location("the team")
-    found = list(_of_the_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
+    found = list(_type_mistakes(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
     if found:
         return found
     place = Location(f"team {shortened(team.name)}")
     robots: object = team.robots
     if not isinstance(robots, tuple):
-        return [place.mistake(f"robots: {FieldTypeError(robots, 'a tuple')}", AS_BUILT)]
+        return [place.mistake(f"robots: {FieldTypeError(robots, 'a tuple')}", FIELD_TYPES_HINT)]
     try:
         team.name.encode()
     except UnicodeEncodeError:
-        return [place.mistake("its name has no UTF-8 form", "give it another")]
+        return [place.mistake("its name cannot be encoded in UTF-8", "rename it")]
     if not team.robots:
-        return [place.mistake("there is no robot here", "a team has one robot or more")]
+        return [place.mistake("the team has no robots", "add at least one")]
     return []
 
 
-def _of_the_shape(value: object, kind: type, place: Location) -> Iterator[Diagnostic]:
+def _type_mistakes(value: object, kind: type, place: Location) -> Iterator[Diagnostic]:
     try:
         check_field_types(value, kind)
     except FieldTypeError as error:
-        yield place.mistake(error.explanation, AS_BUILT)
+        yield place.mistake(error.explanation, FIELD_TYPES_HINT)
 
 
-def _mistakes(team: Team) -> list[Diagnostic]:
-    objects = RobotValidator()
+def _robot_mistakes(team: Team) -> list[Diagnostic]:
+    validator = RobotValidator()
     found: list[Diagnostic] = []
-    right: dict[str, TeamMember] = {}
+    valid: dict[str, TeamMember] = {}
     broken: set[str] = set()
     for robot in team.robots:
-        mistakes = objects.mistakes(robot)
+        mistakes = validator.mistakes(robot)
         found += mistakes
         name = getattr(robot, "name", None)
         if mistakes and isinstance(name, str):
             broken.add(name)
         elif not mistakes:
-            right.setdefault(robot.name, TeamMember(robot, ObjectLocations(robot.name)))
+            valid.setdefault(robot.name, TeamMember(robot, ObjectLocations(robot.name)))
     named = [robot for robot in team.robots if isinstance(getattr(robot, "name", None), str)]
-    twice = list(repeated_robots(named))
+    repeated = list(repeated_robots(named))
     for name in broken:
-        right.pop(name, None)
-    if twice or len(named) < len(team.robots):
-        return [*found, *twice]
-    return [*found, *check_between_robots(TeamMembers(right, frozenset(broken), team.order))]
+        valid.pop(name, None)
+    if repeated or len(named) < len(team.robots):
+        return [*found, *repeated]
+    return [*found, *check_between_robots(TeamMembers(valid, frozenset(broken), team.order))]
 
 
 # Changes over time
 
 
-def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
+def _scenario_mistakes(team: Team) -> Iterator[Diagnostic]:
     """Yield all mistakes of the first invalid event. Later ones might only follow from it."""
     now = replace(team, scenario=()) if team.scenario else team
     for number, event in enumerate(team.scenario, start=1):
         place = Location(f"event {number} of the scenario")
-        found = list(_of_the_time(event, place))
+        found = list(_time_mistakes(event, place))
         for change in event.changes:
-            mistakes = list(_of_the_change(_robots(now), change, place))
+            mistakes = list(_change_mistakes(_robots(now), change, place))
             found += mistakes
             if not mistakes:
                 try:
@@ -251,45 +248,45 @@ def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
                 except ChangeError as bad:
                     found.append(place.mistake(bad.message, bad.hint))
         if not found and not now.robots:
-            found.append(place.mistake(*NOBODY_LEFT))
+            found.append(place.mistake(*NO_ROBOTS_LEFT))
         if found:
             yield from found
             return
 
 
-def _of_the_time(event: ScenarioEvent, place: Location) -> Iterator[Diagnostic]:
+def _time_mistakes(event: ScenarioEvent, place: Location) -> Iterator[Diagnostic]:
     try:
         check_integer(event.after or 0)
     except MistakeError as mistake:
         yield place.mistake(mistake.message, mistake.hint)
     if event.after is not None and event.after < 0:
-        yield place.mistake("an event after less than no message", "expected None, or a number of messages")
+        yield place.mistake(f"an event after {event.after} messages", "use None, or a number of messages from 0 on")
 
 
-def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
+def _robots(team: Team, event: ScenarioEvent = _NO_CHANGES) -> dict[str, Robot]:
     """Return the robots of `team`, and those that `event` adds, by name."""
     coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
     return {robot.name: robot for robot in (*team.robots, *coming)}
 
 
 def _check_symbol(variable: str, value: int, robots: Mapping[str, Robot]) -> None:
-    """Raise `MistakeError` where a symbolic variable is to have a value, or to lose one, that stands for no symbol."""
+    """Raise `MistakeError` if a symbolic variable gets or loses a `value` that is not the code of a symbol."""
     for robot in robots.values():
         for one in robot.variables:
             if one.name == variable and one.domain.symbols and not 0 <= value < len(one.domain.symbols):
-                message = f"the value {value} of '{shortened(variable)}' is no symbol"
-                raise MistakeError(message, f"there are {len(one.domain.symbols)}, with the codes 0, 1, ...")
+                message = f"the value {value} of '{shortened(variable)}' is not the code of a symbol"
+                raise MistakeError(message, f"use codes from 0 to {len(one.domain.symbols) - 1}")
 
 
 def _check_same_places(robot: Robot, robots: Mapping[str, Robot]) -> None:
-    """Raise `MistakeError` unless a robot that joins counts costs in the unit of those that are there."""
+    """Raise `MistakeError` unless a robot that joins has the same unit of costs as the robots of the team."""
     for other in robots.values():
         if other.costs.places != robot.costs.places:
-            message = f"'{shortened(robot.name)}' has costs of {robot.costs.places} decimal places"
-            raise MistakeError(message, f"'{other.name}' has {other.costs.places}: a team counts costs in one unit")
+            message = f"'{shortened(robot.name)}' has costs with {robot.costs.places} decimal places"
+            raise MistakeError(message, f"'{other.name}' has {other.costs.places}: use one unit of costs in a team")
 
 
-def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
+def _change_mistakes(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
     """Yield mistakes of a change that do not depend on the rest of the team."""
     try:
         match change:
@@ -300,7 +297,7 @@ def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location)
                     check_constraint_of_added_robot(constraint)
             case AddConstraint(agent, _, constraint):
                 check_added_constraint(constraint)
-                check_kinds(constraint, kinds_of(robots.values()))
+                check_argument_types(constraint, symbolic_by_variable(robots.values()))
                 if agent in robots:
                     yield from RobotValidator().mistakes_of_constraint(constraint, robots[agent])
             case AddValue(variable, value) | RemoveValue(variable, value):

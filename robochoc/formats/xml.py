@@ -1,7 +1,6 @@
-"""From a file to a checked XML tree: the first two layers, well-formedness and schema.
+"""Read XML files, which are not trusted: they must be well-formed, and valid by their schema.
 
-What a file may do to the reader ends here: no entities, no DTD, no network, no size beyond the limit, and nothing
-that is not a regular file is waited for.
+No entities, no DTD, no access to the network, a limited size, and regular files only.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ BLANKS = " \t\r\n"
 _DOCTYPE = re.compile(rb"(?>\xef\xbb\xbf)?(?>[ \t\r\n]|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _HINTS = {
     etree.ErrorTypes.ERR_ATTRIBUTE_NOT_STARTED: 'write name="value"',
-    etree.ErrorTypes.ERR_ATTRIBUTE_REDEFINED: "an attribute stands once in an element",
+    etree.ErrorTypes.ERR_ATTRIBUTE_REDEFINED: "write each attribute of an element once",
     etree.ErrorTypes.ERR_ATTRIBUTE_WITHOUT_VALUE: 'write name="value"',
-    etree.ErrorTypes.ERR_DOCUMENT_EMPTY: "an XML file begins with <",
-    etree.ErrorTypes.ERR_DOCUMENT_END: "one root element holds everything",
+    etree.ErrorTypes.ERR_DOCUMENT_EMPTY: "start the XML file with <",
+    etree.ErrorTypes.ERR_DOCUMENT_END: "write one root element that contains everything",
     etree.ErrorTypes.ERR_ENTITYREF_SEMICOL_MISSING: "write &amp; for the character &",
     etree.ErrorTypes.ERR_GT_REQUIRED: "end the tag with >; is the file complete?",
     etree.ErrorTypes.ERR_LT_IN_ATTRIBUTE: "is the quote before it missing? Write &lt; for the character <",
@@ -38,7 +37,7 @@ _HINTS = {
     etree.ErrorTypes.ERR_SPACE_REQUIRED: "end the tag with >",
     etree.ErrorTypes.ERR_TAG_NAME_MISMATCH: "close every element by its own end tag",
     etree.ErrorTypes.ERR_TAG_NOT_FINISHED: "close every element by its own end tag; is the file complete?",
-    etree.ErrorTypes.ERR_UNDECLARED_ENTITY: "only &lt; &gt; &amp; &quot; &apos; are known: write the character itself",
+    etree.ErrorTypes.ERR_UNDECLARED_ENTITY: "write the character itself: only &lt; &gt; &amp; &quot; &apos; are known",
 }
 """The hints for libxml2's more frequent messages."""
 
@@ -47,7 +46,7 @@ def read_xml(path: Path, root: str) -> etree._Element:
     """Return the root element of the XML file `path`, which must be a `root` and valid by its schema.
 
     Raises:
-        InvalidInputError: with every mistake that the failing layer shows.
+        InvalidInputError: if it is not well-formed, or with all errors by its schema.
     """
     try:
         content = _bytes(path, MAX_BYTES)
@@ -74,7 +73,7 @@ def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
     if tree.tag != root:
         what = f"the root element is <{etree.QName(tree).localname}>"
         if tree.tag.endswith(f"}}{root}"):
-            what = f"<{root}> stands in an XML namespace"
+            what = f"<{root}> is in an XML namespace"
         raise _invalid(path, line(tree), what, f"expected <{root}>, without any xmlns")
     schema = schema_for(root)
     if len(content) > _SMALL:
@@ -87,7 +86,7 @@ def parsed_tree(content: bytes, path: Path, most: int, *, long_texts: bool = Fal
     """Return the root element of `content`, which is not trusted: no entities, no DTD, at most `most` bytes.
 
     Raises:
-        InvalidInputError: if it is no such XML. It calls the file `path`.
+        InvalidInputError: if it is not valid. Messages use `path`.
     """
     _check_text(content, path, most)
     doctype = _DOCTYPE.match(content)
@@ -106,7 +105,7 @@ def attribute(element: etree._Element, name: str) -> str:
 
 
 def line(element: etree._Element) -> int:
-    """Return where `element` stands in its file."""
+    """Return the line of `element` in its file."""
     return cast("int | None", element.sourceline) or 0
 
 
@@ -128,10 +127,10 @@ def _parser(
 
 
 def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSchema) -> etree._Element:
-    """Return `tree`, cut off behind the last mistake that is reported.
+    """Return `tree`, cut off after the last mistake that is reported.
 
-    For each mistake lxml counts the siblings before it, and a million of them take it hours. A parser that validates
-    while it reads does not, but knows no lines either: it only says how much to look at.
+    For each mistake lxml counts the preceding siblings, which takes hours for a million mistakes. A parser that
+    validates while it reads is fast, but has no line numbers: it only finds the place to cut.
     """
     counting = _parser(schema)
     for start in range(0, len(content), _CHUNK):
@@ -144,9 +143,9 @@ def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSc
 def _check_text(content: bytes, path: Path, most: int) -> None:
     """Raise `InvalidInputError` unless `content` is UTF-8, not empty, and within the limit."""
     if len(content) > most:
-        raise _invalid(path, 0, f"is larger than {most // 2**20} MiB", "a robot's file is a few kB; split it")
+        raise _invalid(path, 0, f"is larger than {most // 2**20} MiB", "split it: a robot's file has a few kB")
     if not content.strip():
-        raise _invalid(path, 0, "is empty", "see 'robochoc generate' for a file that is not")
+        raise _invalid(path, 0, "is empty", "see 'robochoc generate' for examples")
     try:
         content.decode()
     except UnicodeDecodeError as error:
@@ -155,11 +154,11 @@ def _check_text(content: bytes, path: Path, most: int) -> None:
 
 
 def _bytes(path: Path, most: int) -> bytes:
-    """Return at most one byte more than is allowed. A FIFO is opened without waiting for its writer, and refused."""
+    """Return at most one byte more than allowed. A FIFO is opened without waiting for its writer, and rejected."""
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise _invalid(path, 0, "is not a regular file", "every .xml here must be an XML file: move it away")
+        raise _invalid(path, 0, "is not a regular file", "move it away: each .xml here must be an XML file")
     with os.fdopen(descriptor, "rb") as file:
         return file.read(most + 1)
 
@@ -169,9 +168,9 @@ def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser)
     for first in entries(parser.error_log):
         what = re.split(r", (?:use|try) XML_PARSE_HUGE", first.message.strip())[0]
         return _invalid(
-            path, first.line, f"is not well-formed XML: {what}", _HINTS.get(first.type, "mend the XML there")
+            path, first.line, f"is not well-formed XML: {what}", _HINTS.get(first.type, "correct the XML there")
         )
-    return _invalid(path, 0, f"is not well-formed XML: {error}", "mend the XML")
+    return _invalid(path, 0, f"is not well-formed XML: {error}", "correct the XML")
 
 
 def _unreadable(path: Path, error: OSError) -> InvalidInputError:

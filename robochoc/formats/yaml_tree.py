@@ -1,7 +1,7 @@
-"""YAML 1.1 as a bounded tree with line numbers: what pyDCOP's loader would see, and nothing that is executed.
+"""Read YAML 1.1 as a tree with line numbers, with the values that pyDCOP's loader reads. Nothing is executed.
 
-PyYAML only finds the events; the tree is made of them here, so that its depth and size, aliases counted in full, are
-bounded before they are there.
+PyYAML only parses the events. The tree is built from them here, so that its depth and its size (aliases counted in
+full) are limited before it exists.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ MAX_BYTES = 64 * 1024 * 1024
 MAX_DEPTH = 32
 """The maximum depth of nested lists and mappings."""
 MAX_NODES = 2_000_000
-"""The maximum number of values, those behind aliases counted each time."""
+"""The maximum number of values. Values of aliases count each time."""
 
 Scalar = None | bool | int | Fraction | float | str
-"""A value: a float of YAML is the decimal that it shows, as a fraction; only infinities are floats."""
+"""A single value. Floats of YAML are exact fractions; only infinities are floats."""
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CORE = "tag:yaml.org,2002:"
@@ -37,16 +37,16 @@ _MERGE = _CORE + "merge"
 Read = TypeVar("Read")
 _NOTHING_ASKED: frozenset[Scalar] = frozenset()
 _ALIKE = 0.75
-"""Keys with a higher similarity count as the same word, misspelt."""
+"""Keys with a higher similarity count as misspellings of each other."""
 _Path = tuple["_Path", str | int] | None
 """The path from the root to a value: the path to its parent, and its key or number there."""
 
 
 class Node:
-    """A value of the file, and a record of its parts that a reader has used.
+    """A value of the file, with a record of the parts that a reader has used.
 
     Readers have access to the parts only by `scalar`, `items`, `get` and `named`. Each marks its results as read, and
-    `read_yaml` refuses a file with a part that was not read. `skip` marks everything below as left out on purpose.
+    `read_yaml` rejects a file with a part that was not read. `skip` marks everything below as ignored on purpose.
 
     Attributes:
         line: The line of its beginning, from 1 on.
@@ -77,7 +77,7 @@ class Node:
 
     @property
     def is_empty(self) -> bool:
-        """Return whether nothing is written there."""
+        """Return whether the value is empty."""
         return self._value is None
 
     @property
@@ -112,14 +112,14 @@ class Node:
         return self._value.get(key)
 
     def named(self) -> Iterator[tuple[Scalar, Node]]:
-        """Yield the keys and values of a mapping whose keys the author of the file chooses; nothing for others."""
+        """Yield the keys and values of a mapping whose keys the author of the file chooses; nothing if it is none."""
         if isinstance(self._value, dict):
             self._is_read = True
             self._asked = frozenset(self._value)
             yield from self._value.items()
 
     def skip(self) -> None:
-        """Leave out this value and everything in it."""
+        """Ignore this value and everything in it."""
         self._is_read = self._is_skipped = True
 
     def key_line(self, key: Scalar) -> int:
@@ -132,7 +132,7 @@ class Node:
         Args:
             key: The key.
             owner: The name of the mapping in messages.
-            hint: What to write.
+            hint: The next step.
 
         Raises:
             MistakeError: if the key is missing. The message names a key that may be a misspelling.
@@ -147,14 +147,14 @@ class Node:
         raise MistakeError(f"{owner} has no {key}", hint or f"write {key}:", self.line)
 
     def copy(self, line: int) -> Node:
-        """Return an alias in `line`: another value with the same parts."""
+        """Return a node for an alias in `line`, with the same parts."""
         alias = Node(line, self._value, self._key_lines)
         alias.size = self.size
         return alias
 
     @property
     def is_done(self) -> bool:
-        """Return whether a reader has used it, and it has no parts."""
+        """Return whether it is a single value that a reader has used."""
         return self._is_read and self.is_scalar
 
     def unread(self, path: _Path) -> Iterator[MistakeError | tuple[Node, _Path]]:
@@ -222,7 +222,7 @@ def _written(path: _Path) -> str:
 
 _PROBLEM = "a problem has a name, an objective, domains, variables and constraints"
 Repeated = Callable[[int, str], None]
-"""A function that handles a duplicate key: it gets the line and the key. The later value counts."""
+"""A function that handles a duplicate key, called with the line and the key. The later value counts."""
 
 
 def read_yaml(
@@ -232,9 +232,9 @@ def read_yaml(
 
     Args:
         text: The file.
-        read: Reads the root, with all parts.
+        read: Reads the root and all its parts.
         expected: The usual content of such a file.
-        repeated: Called for each duplicate key. None: duplicate keys are refused.
+        repeated: Called for each duplicate key. None: duplicate keys are errors.
 
     Raises:
         MistakeError: if the text is empty, is not valid YAML, or has a part that `read` did not use; with the line.
@@ -247,7 +247,7 @@ def read_yaml(
 
 
 def unread_parts(root: Node) -> list[MistakeError]:
-    """Return a mistake for each part below `root`, at whatever depth, that no reader has used."""
+    """Return a mistake for each part below `root`, at any depth, that no reader has used."""
     found: list[MistakeError] = []
     left: deque[tuple[Node, _Path]] = deque([(root, None)])
     while left:
@@ -261,7 +261,7 @@ def unread_parts(root: Node) -> list[MistakeError]:
 
 
 def root_keys(text: str) -> set[str]:
-    """Return the keys of the root mapping in `text`, as far as it is YAML: it may be the beginning of a file."""
+    """Return the keys of the root mapping in `text`, which may be only the beginning of a file."""
     keys, depth, is_key = set(), 0, True
     try:
         for event in yaml.parse(text, Loader=_LOADER):
@@ -292,13 +292,13 @@ def _tree(text: str, expected: str, repeated: Repeated) -> Node:
         return _Composer(expected, repeated).root(events)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
-        raise MistakeError(f"is not YAML: {error.problem or error.context}", "mend it there", line) from None
+        raise MistakeError(f"is not YAML: {error.problem or error.context}", "correct it there", line) from None
     except (yaml.YAMLError, ValueError) as error:
-        raise MistakeError(f"is not YAML: {shortened(str(error))}", "mend the file") from None
+        raise MistakeError(f"is not YAML: {shortened(str(error))}", "correct the file") from None
 
 
 class _Composer:
-    """Makes the tree of events, with a stack of its own: nesting does not recurse."""
+    """Builds the tree from events, with an explicit stack instead of recursion."""
 
     def __init__(self, expected: str, repeated: Repeated) -> None:
         self._expected = expected
@@ -316,7 +316,7 @@ class _Composer:
                 case yaml.DocumentStartEvent():
                     documents += 1
                     if documents > 1:
-                        raise MistakeError("a second document", "one problem is one document: delete the '---'", line)
+                        raise MistakeError("a second document", "write one document: delete the '---'", line)
                 case yaml.AliasEvent():
                     self._add(self._alias(str(event.anchor), line))
                 case yaml.ScalarEvent():
@@ -381,7 +381,7 @@ class _Composer:
         if merges:
             for source in node.items or [node]:
                 if not source.is_mapping:
-                    raise MistakeError("'<<' merges something that is no mapping", "let an alias follow it", line)
+                    raise MistakeError("'<<' merges a value that is not a mapping", "write an alias after it", line)
                 holder.merged.update({key: one for key, one in source.named() if key not in holder.merged})
             holder.node.merge(holder.merged)
         elif not holder.node.enter(key, node, line):
@@ -389,7 +389,7 @@ class _Composer:
 
     def _key(self, node: Node) -> Scalar:
         if not node.is_scalar:
-            raise MistakeError("a list or a mapping as a key", "keys are names and numbers", node.line)
+            raise MistakeError("a list or a mapping as a key", "use a name or a number", node.line)
         return node.scalar
 
     def _is_merge(self, event: Any) -> bool:  # noqa: ANN401 - a scalar's event
@@ -406,18 +406,18 @@ class _Composer:
                 raise MistakeError(f"the date {shortened(event.value)}", "write it in quotes", line)
             raise _tag_mistake(tag, line)
         try:
-            value = self._made(tag, event.value)
+            value = self._constructed(tag, event.value)
         except (ValueError, KeyError, OverflowError, yaml.YAMLError):
-            what = f"'{shortened(event.value)}' is no {tag.removeprefix(_CORE)}"
-            raise MistakeError(what, "mend the number, or write it in quotes", line) from None
+            what = f"'{shortened(event.value)}' is not a valid {tag.removeprefix(_CORE)}"
+            raise MistakeError(what, "correct the number, or write it in quotes", line) from None
         if not isinstance(value, float):
             return value
         if math.isnan(value):
-            raise MistakeError(".nan is no number", "write a number", line)
+            raise MistakeError(".nan is not a number", "write a number", line)
         return value if math.isinf(value) else Fraction(repr(value))
 
-    def _made(self, tag: str, text: str) -> bool | int | float | str | None:
-        """Return a scalar as PyYAML's safe loader makes it."""
+    def _constructed(self, tag: str, text: str) -> bool | int | float | str | None:
+        """Return a scalar with the value that PyYAML's safe loader constructs."""
         node = yaml.ScalarNode(tag, text)
         match tag.removeprefix(_CORE):
             case "null":
@@ -434,7 +434,7 @@ class _Composer:
 
 @dataclass(slots=True)
 class _Open:
-    """A list or a mapping that has not ended yet, and the key whose value comes next."""
+    """A list or a mapping that is not complete yet, and the key whose value is next."""
 
     node: Node
     anchor: str | None
@@ -443,10 +443,10 @@ class _Open:
 
 
 def shown(value: Scalar) -> str:
-    """Return `value` as pyDCOP compares it with the words of a table: as Python's `str` has it."""
+    """Return `value` as Python's `str` does: pyDCOP compares this text with the words of a table."""
     return repr(float(value)) if isinstance(value, Fraction) else str(value)
 
 
 def _tag_mistake(tag: str, line: int) -> MistakeError:
     short = tag.replace(_CORE, "!!", 1)
-    return MistakeError(f"the tag {shortened(short)} is not allowed", "problems are plain data: delete the tag", line)
+    return MistakeError(f"the tag {shortened(short)} is not allowed", "delete it: only plain data is read", line)

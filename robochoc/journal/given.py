@@ -106,7 +106,7 @@ class TeamReader:
         empty = set(given.empty)
         robots = tuple(_as_given(self._robots[name], given.shown.get(name, ()), empty) for name in given.order)
         if robots and given.told_in is not UNSET:
-            robots = (replace(robots[0], told_in=CostUnits(*given.told_in)), *robots[1:])
+            robots = (replace(robots[0], user_units=CostUnits(*given.told_in)), *robots[1:])
         team = Team(self._name, robots)
         _check(team)
         return team
@@ -126,7 +126,7 @@ def told_by(given: Given | None, cost: float) -> Cost | float:
     if given is None or given.told_in is UNSET:
         return cost
     units = CostUnits(*given.told_in)
-    return units.told(-cost if units.maximize else cost)
+    return units.in_user_units(-cost if units.maximize else cost)
 
 
 def invalidated_of(given: Given) -> Invalidated:

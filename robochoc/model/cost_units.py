@@ -27,7 +27,7 @@ class CostUnits:
     places: int = 0
     constant: int = 0
 
-    def told(self, total: float) -> Cost:
+    def in_user_units(self, total: float) -> Cost:
         """Return `total`, an integer number of these units without the constant, in the user's numbers."""
         whole = int(total) + self.constant
         return Decimal(whole).scaleb(-self.places) if self.places else whole

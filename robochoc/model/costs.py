@@ -2,7 +2,7 @@
 
 Users write decimals, negative costs and utilities that are maximised. `normalized` turns such a team into one of the
 same solutions and the same order among them: utilities change their sign, functions are counted in the team's unit, and
-the least cost of a constraint that has negative ones is taken out of it (`Constraint.offset`). `told_cost` turns a sum
+the least cost of a constraint that has negative ones is taken out of it (`Constraint.offset`). `user_cost` turns a sum
 of normalised costs back into the user's number. All of this is integer arithmetic, so nothing is rounded.
 """
 
@@ -42,7 +42,7 @@ class UnboundedCostError(RobochocError, ValueError):
 
 
 def normalized(team: Team) -> Team:
-    """Return `team` with integer costs of 0 or more that are minimised; `told_in` says how to tell them.
+    """Return `team` with integer costs of 0 or more that are minimised; `user_units` says how to tell them.
 
     A team that is so already is returned as it is.
 
@@ -86,7 +86,7 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
             replace(one, constraints=all_of(one.constraints), copies=all_of(one.copies)) for one in robot.children
         ),
         costs=PLAIN_COSTS,
-        told_in=CostUnits(units.maximize, units.places, robot.costs.constant * finer),
+        user_units=CostUnits(units.maximize, units.places, robot.costs.constant * finer),
     )
 
 
@@ -104,7 +104,7 @@ def normalized_constraint(constraint: Constraint, units: CostUnits, domains: Dom
             return constraint
 
 
-def told_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
+def user_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
     """Return a cost in the user's numbers.
 
     Args:
@@ -112,14 +112,14 @@ def told_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
         total: A sum of normalised costs of the constraints of `team`.
         without: Robots that have withdrawn: their constraints were restated or dropped.
     """
-    sign = -1 if team.told_in.maximize else 1
-    return team.told_in.told(sign * (int(total) + _taken_out(team, without)))
+    sign = -1 if team.user_units.maximize else 1
+    return team.user_units.in_user_units(sign * (int(total) + _taken_out(team, without)))
 
 
 def flat_units(team: Team) -> CostUnits:
     """Return the units of a normalised `team`, with what was taken out of its costs in the constant."""
-    sign = -1 if team.told_in.maximize else 1
-    return replace(team.told_in, constant=team.told_in.constant + sign * _taken_out(team))
+    sign = -1 if team.user_units.maximize else 1
+    return replace(team.user_units, constant=team.user_units.constant + sign * _taken_out(team))
 
 
 def _taken_out(team: Team, without: Collection[str] = ()) -> int:
@@ -143,7 +143,7 @@ def normalized_joining(team: Team, robot: Robot) -> Robot:
     for constraint in _held_by_others(team, robot.name):
         if isinstance(constraint.definition, Function) and (new := wider.intersection(constraint.variables)):
             raise UnboundedCostError(f"{min(new)} has new values, and others have functions for the values it had")
-    return normalized_robot(robot, team.told_in, domains)
+    return normalized_robot(robot, team.user_units, domains)
 
 
 def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
@@ -163,13 +163,13 @@ def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
                 f"the value {change.value} is new to {change.variable}, whose costs are functions: their bounds are"
                 " those of the values that the files and the scenario name"
             )
-    changes = tuple(_normalized_change(change, team.told_in, domains) for change in event.changes)
+    changes = tuple(_normalized_change(change, team.user_units, domains) for change in event.changes)
     return replace(event, changes=changes)
 
 
 def _needs_it(robot: Robot) -> bool:
     """Return whether the costs of `robot`, which may be normalised already, are not."""
-    if robot.told_in != PLAIN_COSTS:
+    if robot.user_units != PLAIN_COSTS:
         return False
     return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, robot.constraints()))
 

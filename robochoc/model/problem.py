@@ -147,7 +147,7 @@ class Robot:
         weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
         costs: The unit of its costs, and whether their sum is minimised or maximised, as its file says.
         symbols: The names of the team's symbols, where no domain of its own says them.
-        told_in: Of a robot with normalised costs (`model/costs.py`): the units in which its costs are told to the user.
+        user_units: Of a robot with normalised costs (`model/costs.py`): the units in which the user reads its costs.
     """
 
     name: str
@@ -162,7 +162,7 @@ class Robot:
     weight: int = 1
     costs: CostUnits = PLAIN_COSTS
     symbols: tuple[str, ...] = ()
-    told_in: CostUnits = PLAIN_COSTS
+    user_units: CostUnits = PLAIN_COSTS
 
     def constraints(self) -> Iterator[Constraint]:
         """Yield every constraint in its file: private ones, shared ones, and its parts of partially known ones."""
@@ -304,9 +304,9 @@ class Team:
         return self.robots[0].kind if self.robots else ProblemKind.DISCSP
 
     @cached_property
-    def told_in(self) -> CostUnits:
-        """Of a normalised team (`model/costs.py`): the units in which its costs are told to the user."""
-        return common_units(robot.told_in for robot in self.robots)
+    def user_units(self) -> CostUnits:
+        """Of a normalised team (`model/costs.py`): the units in which the user reads its costs."""
+        return common_units(robot.user_units for robot in self.robots)
 
     @cached_property
     def order(self) -> tuple[str, ...]:

@@ -89,7 +89,7 @@ def _cost(constraint: Constraint, units: CostUnits) -> str:
         return "in the table"
     if constraint.cost == INFINITE:
         return "must hold"
-    return cost_shown(CostUnits(places=units.places).told(constraint.cost))
+    return cost_shown(CostUnits(places=units.places).in_user_units(constraint.cost))
 
 
 def shown_values(values: Iterable[object]) -> str:

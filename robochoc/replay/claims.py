@@ -18,7 +18,7 @@ from robochoc.communication.search_result import SearchResult
 from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
-from robochoc.model.costs import told_cost
+from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Answer, Metrics, Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.disac import DisAC
@@ -167,10 +167,10 @@ def _published(whose: str, recorded: Answer, replayed: Answer, team: Team) -> It
     if faults:
         yield Contradiction(what=whose + "assignment", recorded=recorded.assignment, replayed=faults[0])
         return
-    cost = told_cost(team, assignment_cost(team, recorded.assignment), without=withdrawn)
+    cost = user_cost(team, assignment_cost(team, recorded.assignment), without=withdrawn)
     if recorded.cost != cost:
         yield Contradiction(what=whose + "cost", recorded=recorded.cost, replayed=cost)
-    rank = Rank(team, partial(told_cost, team))
+    rank = Rank(team, partial(user_cost, team))
     of_recorded = rank.of(cost, withdrawn)
     found = replayed.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}
     of_replayed = rank.of(replayed.cost or 0, replayed.withdrawn)
@@ -207,7 +207,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseA
     phase = RunPhase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
-        return evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team), ANY_DEADLINE)
+        return evaluate_search(phase, Search(result, check), team.kind, partial(user_cost, team), ANY_DEADLINE)
     except (RefutedError, TooManySolutionsError):
         return PhaseAnswer(Verdict.UNKNOWN)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from robochoc.model.change import describe_change, team_after_events
 from robochoc.model.cost_units import Cost
-from robochoc.model.costs import told_cost
+from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
@@ -105,12 +105,12 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
         if total != found.cost:
             raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {found.cost:,}")
     if verdict == Verdict.UNKNOWN and found.bound is not None:
-        bound = told_cost(team, found.bound) if price is None else found.bound // price
+        bound = user_cost(team, found.bound) if price is None else found.bound // price
     if verdict == Verdict.OPTIMAL and team.kind == ProblemKind.DISCSP and not robots_without_values(team, assignment):
         verdict = Verdict.SOLUTION
     has_answer = found.cost is not None or verdict == Verdict.SOLUTION
     withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
-    paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
+    paid = user_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
     is_impossible = verdict == Verdict.NO_SOLUTION
     return PhaseAnswer(
         verdict,

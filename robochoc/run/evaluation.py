@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from robochoc.communication.search_result import SearchResult
 from robochoc.model.cost_units import Cost
-from robochoc.model.costs import told_cost
+from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
@@ -191,7 +191,7 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
     withdrawn = robots_without_values(team, assignment) if phase.withdrawal else ()
     check_assignment(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
-    paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn)
+    paid = user_cost(team, assignment_cost(team, assignment), without=withdrawn)
     listed = _checked_optima(phase, result, team, compiled, paid)
     dropped = dropped_constraints(team, withdrawn)
     return Answer(
@@ -220,7 +220,7 @@ def _checked_optima(
     for assignment in listed:
         withdrawn = robots_without_values(team, assignment) if phase.withdrawal else ()
         check_assignment(team, assignment, withdrawn)
-        if told_cost(team, assignment_cost(team, assignment), without=withdrawn) != cost:
+        if user_cost(team, assignment_cost(team, assignment), without=withdrawn) != cost:
             raise RefutedError(f"the optima that were listed for {team.name} do not cost the same")
     return Optima(number, tuple([{name: one[name] for name in team.variables if name in one} for one in listed]))
 

@@ -305,7 +305,7 @@ class ScenarioRun:
     def _read_again(self, name: str) -> None:
         """Replace the robot `name` by what its file says now, as if it had said so from the beginning."""
         symbols = symbol_table(self.team.robots)
-        read = read_robot_again(Path(self.team[name].file), symbols, self._files.told_in)
+        read = read_robot_again(Path(self.team[name].file), symbols, self._files.user_units)
         robot = normalized_joining(self._files, read)
         if name in self._files:
             self._files = rejoin(self._files, robot)

@@ -12,7 +12,7 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Began, Observer
 from robochoc.journal.given import TeamWriter
 from robochoc.model.cost_units import Cost
-from robochoc.model.costs import normalized_event, told_cost
+from robochoc.model.costs import normalized_event, user_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
 from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preprocessing, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
@@ -105,7 +105,7 @@ class ThisMachine(Deployment):
 
     def told(self, total: float) -> Cost:
         """See `Deployment.told`."""
-        return told_cost(self._scenario.team, total)
+        return user_cost(self._scenario.team, total)
 
     @property
     def lost(self) -> tuple[str, ...]:

@@ -90,8 +90,8 @@ def priced_components(team: Team, withdrawal_cost: int | None = None) -> list[We
             return components_with_withdrawal(team, withdrawal_cost)
         return weighted_components(team.variables.values(), list(team.constraints()))
     except _CostSumError as error:
-        units = replace(team.told_in, constant=0)
-        total, limit = (cost_shown(units.told(cost)) for cost in (error.total, error.limit))
+        units = replace(team.user_units, constant=0)
+        total, limit = (cost_shown(units.in_user_units(cost)) for cost in (error.total, error.limit))
         raise UnsupportedError(
             f"costs may add up to {total}, but central solvers minimise sums up to {limit}: round costs to fewer"
             " decimals, or replace costs that mean 'never' by infinity"

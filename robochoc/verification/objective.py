@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost
-from robochoc.model.costs import told_cost
+from robochoc.model.costs import user_cost
 from robochoc.model.problem import INFINITE, Constraint, Team, Value
 from robochoc.solver.encoding import cost_function, max_cost
 
@@ -109,7 +109,7 @@ class Objective:
 
     def told(self, cost: float) -> Cost:
         """Return `cost`, which includes withdrawal costs, in the user's numbers."""
-        return told_cost(self._team, cost)
+        return user_cost(self._team, cost)
 
 
 def withdrawal_cost(team: Team) -> float:

@@ -57,7 +57,7 @@ def test_import_replaces_nothing_unless_told(problem: Path, tmp_path: Path) -> N
     assert robochoc_within("import", problem, "-o", team, "--force", "--order", "lexicographic").returncode == 0
     (team / "notes.txt").write_text("mine")
     other = robochoc_within("import", problem, "-o", team, "--force")
-    assert "it holds 'notes.txt'" in other.stderr
+    assert "it contains 'notes.txt'" in other.stderr
 
 
 def test_import_of_a_folder_makes_a_team_of_each_problem(problem: Path, tmp_path: Path) -> None:
@@ -303,8 +303,8 @@ def test_orders_and_kills_may_use_original_names(tmp_path: Path) -> None:
     assert "    r-2\n    └── r-1" in robochoc_within(*words, "simulator", "--order", order).stdout
     order.write_text("r-2\nr_2\nr-3\n")
     wrong = robochoc_within(*words, "simulator", "--order", order)
-    assert "'r_2' stands here again (name each robot once; it is in line 1)" in wrong.stderr
-    assert "'r-3' is no robot of dynamic (did you mean 'r-2'?)" in wrong.stderr
+    assert "'r_2' is listed twice (list each robot once; it is in line 1 already)" in wrong.stderr
+    assert "'r-3' is not a robot of dynamic (did you mean 'r-2'?)" in wrong.stderr
     assert "r-9" in robochoc_within(*words, "processes", "--kill", "r-9@1").stderr
     assert robochoc_within(*words, "processes", "--kill", "r-2@50").returncode == 0
     problem = load(file)

@@ -53,9 +53,9 @@ def test_every_mistake_of_an_order_file_is_told_with_its_line(tmp_path: Path) ->
     for content, told in [
         ("RA\nRB\n", [(2, "1 robot is missing: RC")]),
         ("", [(1, "3 robots are missing: RA RB RC")]),
-        ("RA\n\nRX # who\nRC\nRB\n", [(3, "'RX' is no robot of random")]),
-        ("RC\nRB\nRA\nRB\n", [(4, "'RB' stands here again")]),
-        ("RC\nRC\nRX\nRA RB\n", [(2, "again"), (3, "'RX'"), (4, "'RA RB'"), (4, "2 robots are missing: RA RB")]),
+        ("RA\n\nRX # who\nRC\nRB\n", [(3, "'RX' is not a robot of random")]),
+        ("RC\nRB\nRA\nRB\n", [(4, "'RB' is listed twice")]),
+        ("RC\nRC\nRX\nRA RB\n", [(2, "twice"), (3, "'RX'"), (4, "'RA RB'"), (4, "2 robots are missing: RA RB")]),
     ]:
         listed = tmp_path / "order.txt"
         listed.write_text(content)
@@ -74,7 +74,7 @@ def test_a_wrong_order_file_is_invalid_input(four: Path) -> None:
     assert done.returncode == 1
     assert done.stdout == ""
     first, second = done.stderr.splitlines()
-    assert first.startswith(f"{listed}:2: 'Robot9.9' is no robot of queens3d-4")
+    assert first.startswith(f"{listed}:2: 'Robot9.9' is not a robot of queens3d-4")
     assert second.startswith(f"{listed}:2: 15 robots are missing: Robot1.2")
 
 

@@ -31,7 +31,7 @@ from robochoc.communication.network.profile import (
     visible_robot,
 )
 from robochoc.formats import read_team
-from robochoc.formats.definition_reader import MAX_VALUES
+from robochoc.formats.definitions import MAX_VALUES
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.model.team_edits import without_robots
 from robochoc.protocols.traits import Traits

@@ -15,7 +15,7 @@ from robochoc.model.allocation import Job, Worker, several
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.costs import normalized, told_cost
+from robochoc.model.costs import normalized, user_cost
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
@@ -43,7 +43,7 @@ AUCTIONS = (*BUNDLING, "cbaa")
 
 def cost(allocation: Allocation, total: float) -> float:
     """`total`, a sum of normalised costs, as it is told to the user."""
-    return float(told_cost(normalized(allocation.team), total))
+    return float(user_cost(normalized(allocation.team), total))
 
 
 def run(allocation: Allocation, protocol: str, chance: Random, solver: AceProcess) -> Outcome:

@@ -122,7 +122,7 @@ def plain(team: Team) -> Team:
     """Return `team` with costs of 0 or more that are minimised, and told as they are."""
     robots = normalized(team).robots
     own = [tuple(replace(one, offset=0) for one in robot.private) for robot in robots]
-    made = [replace(robot, private=costs, told_in=PLAIN_COSTS) for robot, costs in zip(robots, own, strict=True)]
+    made = [replace(robot, private=costs, user_units=PLAIN_COSTS) for robot, costs in zip(robots, own, strict=True)]
     return replace(team, robots=tuple(made))
 
 

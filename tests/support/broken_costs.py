@@ -21,7 +21,7 @@ COSTS = [
              (R2, "<relation ", ("-infinity, where costs are minimised", "write infinity"))),
     weighted("a cost of ten decimal places",
              [relation('<relation name="r1" semantics="soft">0.1234567891:1 1</relation>')],
-             (R2, "<relation ", ("is no cost", "9 places"))),
+             (R2, "<relation ", ("is not a cost", "9 places"))),
     weighted(
         "a cost finer than the scale",
         [
@@ -39,9 +39,9 @@ COSTS = [
         (R2, "<relation ", "an integer of"),
     ),
     weighted("a scale that is no power of ten", [(R2, 'type="DisWCSP"', 'type="DisWCSP" scale="0.25"')],
-             (R2, "<presentation", ("the scale '0.25'", "a power of ten"))),
+             (R2, "<presentation", ("invalid scale '0.25'", "a power of ten"))),
     weighted("an infinite constant", [(R2, 'type="DisWCSP"', 'type="DisWCSP" constant="infinity"')],
-             (R2, "<presentation", "'infinity' is no cost")),
+             (R2, "<presentation", "'infinity' is not a cost")),
     case("maximize in a DisCSP", [(R2, 'type="DisCSP"', 'type="DisCSP" objective="maximize"')],
          (R2, "<presentation", ("maximize in a DisCSP", "DisWCSP"))),
     case("a constant in a DisCSP", [(R2, 'type="DisCSP"', 'type="DisCSP" constant="1"')],
@@ -58,7 +58,7 @@ COSTS = [
             (R2, "</predicates>", "</predicates>" + FUNCTION),
             (R2, 'name="C2" reference="r1"', 'name="C2" reference="f1" cost="0.5"'),
         ],
-        (R2, 'name="C2"', ("a cost on a function", "its value is the cost")),
+        (R2, 'name="C2"', ("a cost on a function", "value is the cost")),
     ),
     weighted(
         "a predicate that is worth something where it is undefined",
@@ -66,7 +66,7 @@ COSTS = [
             predicate("eq(div(X,Y),add(i,j))"),
             (R2, 'name="C1" reference="p1"', 'name="C1" cost="-2" reference="p1"'),
         ],
-        (R2, 'name="C1"', ("p1 is worth something, and with 'div' it may be undefined", "write a function")),
+        (R2, 'name="C1"', ("violating p1 is rewarded, but 'div' may be undefined", "write a function")),
     ),
     weighted("one that maximizes", [(R2, 'type="DisWCSP"', 'type="DisWCSP" objective="maximize"')],
              (R2, "<presentation", ("the robot maximizes costs, but 'Robot1' minimizes them", "Robot1.xml:3"))),

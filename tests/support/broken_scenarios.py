@@ -199,7 +199,7 @@ VALUES = [
     change("a value comes that is there", '<add_value variable="V2" value="7"/>', "'V2' has the value 7 already"),
     change("a value of nobody's variable", '<add_value variable="V9" value="7"/>', "no robot has the variable 'V9'"),
     change("a value of one who has left", '<add_value variable="V3" value="7"/>', "the variable 'V3'", before=GONE),
-    change("a value that is none", '<add_value variable="V3" value="x"/>', "'x' is no integer", "at most 18 digits"),
+    change("a value that is none", '<add_value variable="V3" value="x"/>', "'x' is not an integer", "18 digits"),
 ]  # fmt: skip
 
 CONSTRAINTS = [

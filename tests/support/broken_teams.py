@@ -62,7 +62,7 @@ NEIGHBOURS = [
     case("a DisWCSP among DisCSPs", [(R2, '"DisCSP"', '"DisWCSP"')],
          (R2, "<presentation", ("the robot is a DisWCSP", "Robot1.xml:3"))),
     case("two owners of one variable", [(R3, "V3", "V2"), (R3, "W1 V2 V2", "W1 V1 V2")],
-         (R3, "<variable ", ("'V2' is also one of 'Robot2'", "Robot2.xml:8"))),
+         (R3, "<variable ", ("'V2' belongs to 'Robot2' too", "Robot2.xml:8"))),
     case("a variable that its owner does not have", [(R3, 'scope="V1 V3"', 'scope="V9 V3"')],
          (R3, 'name="C4"', ("no robot has the variable 'V9'", "Robot1.xml:3"))),
     case("a constraint under the wrong parent", [(R3, C4, ""), (R3, C5, C4 + C5), (R3, 'nbConstraints="1"', "")],
@@ -70,11 +70,11 @@ NEIGHBOURS = [
     case("n-ary under the higher parent", [(R3, C5, ""), (R3, C4, C4 + "\n" + C5), (R3, ' nbConstraints="1"', "")],
          (R3, 'name="C5"', ("the lowest parent of its scope is 'Robot2'", "Robot2.xml:3"))),
     case("n-ary in a higher file", [(R2, '"le" scope="V1 V2"', '"le" scope="V3 V2"')],
-         (R2, 'name="C3"', ("'V3' belongs to 'Robot3', which is no parent", "Robot3.xml:8"))),
+         (R2, 'name="C3"', ("'V3' belongs to 'Robot3', which is not a parent", "Robot3.xml:8"))),
     case("a PKC of three robots", [(R3, 'model="TKC" name="C5"', 'model="PKC" name="C5"')],
          (R3, 'name="C5"', ("PKC constraint over more than two", "Robot2.xml:3"))),
     case("a part over a third robot", [(R1, '"ne" scope="V1 V2"', '"ne" scope="V1 V3"')],
-         (R1, 'name="C3"', ("'V3' is no variable of 'Robot1' or 'Robot2'", "Robot2.xml:3"))),
+         (R1, 'name="C3"', ("'V3' is not a variable of 'Robot1' or 'Robot2'", "Robot2.xml:3"))),
     case(
         "a part over what its owner shows to nobody",
         [
@@ -82,10 +82,10 @@ NEIGHBOURS = [
             (R2, '<variable name="V2"', '<variable name="W2" domain="D1"/>\n    <variable name="V2"'),
             (R1, '"ne" scope="V1 V2"', '"ne" scope="V1 W2"'),
         ],
-        (R1, 'name="C3"', ("looks at 'W2', which 'Robot2' shows to nobody", "hold its part", "Robot2.xml:8")),
+        (R1, 'name="C3"', ("contains 'W2', which 'Robot2' shows to no robot", "add the part", "Robot2.xml:8")),
     ),
     case("a child told what is not one's own", [(R2, 'variable="V2"', 'variable="V1"')],
-         (R2, 'variable="V1"', ("must know 'V1'", "known own variables: V2"))),
+         (R2, 'variable="V1"', ("must know 'V1'", "known variables of this robot: V2"))),
     case("a child told twice", [(R2, 'variable="V2"', 'variable="V2 V2"')],
          (R2, 'variable="V2 V2"', "list 'V2' twice")),
     case("a child told too little", [(R1, 'variable="V1 W1"', 'variable="V1"')],
@@ -93,7 +93,7 @@ NEIGHBOURS = [
     case("a copy that the child does not have", [told(C4, C5.replace("sum", "lt").replace("W1 V2 V3", "W1 V3"))],
          (R1, 'name="C5"', ("the copy of 'C5'", "'Robot3' has no such constraint"))),
     case("a copy that says something else", [told(C4.replace("ne", "lt"))],
-         (R1, 'name="C4"', ("the tuple '2 1' forbidden, and the child has it allowed", "Robot3.xml:25"))),
+         (R1, 'name="C4"', ("'2 1' is forbidden, and with the child allowed", "Robot3.xml:25"))),
     case(
         "a copy too large to compare",
         [
@@ -101,7 +101,7 @@ NEIGHBOURS = [
             (R1, D4, '<domain name="D1">1..2000</domain>'),
             (R3, D4, '<domain name="D1">1..2000</domain>'),
         ],
-        (R1, 'name="C4"', ("more than 1000000 tuples", "leave the copy out")),
+        (R1, 'name="C4"', ("more than 1000000", "leave the copy out")),
     ),
 ]  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from robochoc.model.absence import restated
 from robochoc.model.cost_units import common_units
-from robochoc.model.costs import normalized, told_cost
+from robochoc.model.costs import normalized, user_cost
 from robochoc.model.problem import INFINITE, Function, ProblemKind, Team
 from robochoc.model.symbols import symbol_table
 from robochoc.model.team_edits import without_robots
@@ -33,7 +33,7 @@ class Truth:
         """Return what the best solution of the others costs; None: there is none."""
         rest = without_robots(self._counted, without)
         least = minimum_cost(rest) if rest.robots else 0
-        return None if least == INFINITE else Fraction(str(told_cost(self._counted, least, without)))
+        return None if least == INFINITE else Fraction(str(user_cost(self._counted, least, without)))
 
     def withdrawal(self, without: Collection[str] = ()) -> tuple[int, Fraction]:
         """Return the least weight of robots that have to withdraw, and the least cost of the others then."""

@@ -90,7 +90,7 @@ def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUni
     says = _says(constraint, symbols, units)
     says = says if len(says) <= _LONGEST else f"{says[: _LONGEST - 1]}…"
     if isinstance(constraint.definition, Predicate) and constraint.cost != INFINITE:
-        cost = cost_shown(CostUnits(places=units.places).told(constraint.cost))
+        cost = cost_shown(CostUnits(places=units.places).in_user_units(constraint.cost))
         says = say("imported.or-costs", says=says, cost=cost)
     return say("imported.own-part", says=says) if constraint.model == ConstraintModel.PKC else says
 
@@ -131,7 +131,7 @@ def _label(value: int, symbolic: bool, symbols: Sequence[str]) -> str:  # noqa: 
 def _priced(cost: float, units: CostUnits) -> str:
     if cost == INFINITE:
         return say("imported.forbidden")
-    return say("imported.costing", cost=cost_shown(CostUnits(places=units.places).told(cost)))
+    return say("imported.costing", cost=cost_shown(CostUnits(places=units.places).in_user_units(cost)))
 
 
 class _Reading:

@@ -62,7 +62,7 @@ def save(sketch: Sketch, folder: Path, *, replace: bool = False) -> None:
     team = _checked_team(sketch)
     if not replace and folder.exists():
         raise invalid_input(folder, "the folder exists already", "choose another folder, or replace this one")
-    write_team(team, folder, replace=replace, beside={SKETCH_FILE: sketch_file(sketch, team_files(team))})
+    write_team(team, folder, replace=replace, extra_files={SKETCH_FILE: sketch_file(sketch, team_files(team))})
 
 
 def zipped(sketch: Sketch) -> bytes:

@@ -171,7 +171,7 @@ def _import(
         imported = read_foreign(source.files, options, dialect)
         team = with_order(imported.team, order_for(imported.team, order))
         write_team(
-            team, source.folder, replace=force, beside={NAMES_FILE: names_json(imported.dialect, imported.names)}
+            team, source.folder, replace=force, extra_files={NAMES_FILE: names_json(imported.dialect, imported.names)}
         )
     except InvalidInputError as invalid:
         return entry | {"errors": [str(diagnostic) for diagnostic in invalid.diagnostics]}

@@ -101,7 +101,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
 
         other_files[GROUND_FILE] = ground_map_json(ground)
     with elapsed_time("generate", f"writing {len(team.robots):,} robots"):
-        write_team(team, folder, replace=replace, beside=other_files)
+        write_team(team, folder, replace=replace, extra_files=other_files)
     constraints = sum(len(robot.shared) for robot in team.robots)
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")

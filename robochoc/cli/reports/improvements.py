@@ -56,7 +56,7 @@ class ImprovementReporter:
         last = epoch.improvements[-1]
         answer = "an optimum" if last.verdict == "optimal" else "a solution"
         shown = "" if last.cost is None or team.kind == ProblemKind.DISCSP else cost_shown(last.cost)
-        maximised = any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
+        maximised = any(robot.costs.maximize or robot.user_units.maximize for robot in team.robots)
         cost = shown and f" {'worth' if maximised else 'of cost'} {shown}"
         without = f", {len(last.withdrawn)} of {len(team.robots)} withdrawn" if last.withdrawn else ""
         return on_one_line(f"{team.name}: {answer}{cost}{without} after {last.at_s:.1f} s")

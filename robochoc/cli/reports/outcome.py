@@ -202,7 +202,7 @@ def _by_the_deadline(outcome: Outcome) -> str:
 
 def _maximizes(team: Team) -> bool:
     """Return whether the team's costs are utilities; of a normalised team, whether they were."""
-    return any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
+    return any(robot.costs.maximize or robot.user_units.maximize for robot in team.robots)
 
 
 def _best(team: Team) -> str:

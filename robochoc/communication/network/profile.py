@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import msgspec
 
-from robochoc.formats.definition_reader import MAX_VALUES
+from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.names import is_name
 from robochoc.formats.symbols import check_symbol

@@ -1,4 +1,4 @@
-"""From text to tree: tokens, recursive descent, types."""
+"""Parse functional expressions: tokens, recursive descent, types."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_DIGITS = 18
 
 
 class ExpressionError(RobochocError, ValueError):
-    """The text is not an expression: what is wrong, where (an offset into the text), and what to do about it."""
+    """A text that is not a valid expression, with an error message, its position (an offset in the text) and a hint."""
 
     def __init__(self, message: str, position: int, hint: str = "") -> None:
         super().__init__(f"{message}, at character {position + 1}" + (f" ({hint})" if hint else ""))
@@ -30,11 +30,11 @@ class ExpressionError(RobochocError, ValueError):
 
 @dataclass(frozen=True)
 class SymbolNames:
-    """What an expression may say of symbols.
+    """The symbols that an expression may contain.
 
     Attributes:
         names: The names of the expression that stand for symbols.
-        code: Returns the code of a symbol by its name. Raises `ValueError`, which says why, for what is none.
+        code: Returns the code of a symbol by its name. Raises `ValueError` with the reason for an invalid symbol.
     """
 
     names: Collection[str]
@@ -44,24 +44,24 @@ class SymbolNames:
 def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames | None = None) -> Expression:
     """Read a functional expression over `names`.
 
-    This is XCSP 2.1's functional form, and what Figure 2 writes besides: an argument list in parentheses of its own,
-    infix `+ - *`, and `minus(i-j)` (docs/reference/format.md).
+    This is XCSP 2.1's functional form, with the extensions in Figure 2: an argument list in further parentheses, infix
+    `+ - *`, and `minus(i-j)` (docs/reference/format.md).
 
     Args:
         text: The text.
         names: The names that may occur in it.
         wanted: The type of its value.
-        symbols: Which of `names` stand for symbols, if any; then other words are names of symbols, and so is
-            everything in quotes, `'red'`. Only eq, ne and in compare symbols.
+        symbols: Which of `names` stand for symbols, if any; then other words, and words in quotes (`'red'`), are names
+            of symbols. Only eq, ne and in compare symbols.
 
     Raises:
-        ExpressionError: if the text is no such expression. It says where, and what to do.
+        ExpressionError: if the text is not such an expression, with the position and the next step.
     """
     if len(text) > MAX_TEXT:
         raise ExpressionError(
             f"the expression has {len(text)} characters", MAX_TEXT, f"{MAX_TEXT} are allowed: split the predicate"
         )
-    return _Parser(text, names, symbols).whole(wanted)
+    return _Parser(text, names, symbols).expression(wanted)
 
 
 class _Token(NamedTuple):
@@ -70,7 +70,7 @@ class _Token(NamedTuple):
 
 
 class _Parsed(NamedTuple):
-    """A part of the text that has been understood."""
+    """A parsed part of the text."""
 
     expression: Expression
     type: Type
@@ -96,12 +96,10 @@ class _Parser:
         self._next = 0
         self._nodes = 0
 
-    def whole(self, wanted: Type) -> Expression:
+    def expression(self, wanted: Type) -> Expression:
         parsed = self._sum(1)
         if self._peek().text == ",":
-            raise ExpressionError(
-                "a list where one expression should stand", self._peek().position, "use and(..., ...)"
-            )
+            raise ExpressionError("a list instead of one expression", self._peek().position, "use and(..., ...)")
         if self._peek().text:
             raise ExpressionError(
                 f"'{_shortened(self._peek().text)}' after the end of the expression",
@@ -114,14 +112,14 @@ class _Parser:
     def _sum(self, level: int) -> _Parsed:
         left = self._product(level)
         while self._peek().text in {"+", "-"}:
-            sign = self._take()
+            sign = self._advance()
             left = self._combined(sign, left, self._product(level))
         return left
 
     def _product(self, level: int) -> _Parsed:
         left = self._atom(level)
         while self._peek().text == "*":
-            sign = self._take()
+            sign = self._advance()
             left = self._combined(sign, left, self._atom(level))
         return left
 
@@ -135,7 +133,7 @@ class _Parser:
     def _atom(self, level: int) -> _Parsed:
         if level > MAX_DEPTH:
             raise _too_deep(self._peek().position)
-        token = self._take()
+        token = self._advance()
         if token.text == "(":
             return self._parenthesised(level)._replace(infix="", operands=(), position=token.position)
         if token.text == "-":
@@ -144,9 +142,7 @@ class _Parser:
             return self._integer(token, 1)
         if token.text in {"", ")", ",", "+", "*"}:
             what = f"'{token.text}'" if token.text else "the end"
-            raise ExpressionError(
-                f"{what} where a term should stand", token.position, "add an integer, a name or a call"
-            )
+            raise ExpressionError(f"{what} instead of a term", token.position, "add an integer, a name or a call")
         if self._peek().text == "(":
             return self._set(token, level) if token.text == "set" else self._call(token, level)
         if self._symbols and token.text not in self._names:
@@ -179,21 +175,21 @@ class _Parser:
 
     def _parenthesised(self, level: int) -> _Parsed:
         parsed = self._sum(level + 1)
-        closing = self._take()
+        closing = self._advance()
         if closing.text == ",":
             raise ExpressionError(
-                "a list in parentheses where one term should stand",
+                "a list in parentheses instead of one term",
                 closing.position,
-                "parentheses of its own are for the whole argument list of a function: and((a, b))",
+                "extra parentheses are allowed only around all arguments of a function: and((a, b))",
             )
         if closing.text != ")":
-            raise ExpressionError(f"'{_shortened(closing.text)}' where ')' should stand", closing.position, "close it")
+            raise ExpressionError(f"'{_shortened(closing.text)}' instead of ')'", closing.position, "add ')'")
         return parsed
 
     def _negative(self, sign: _Token) -> _Parsed:
         if not self._peek().text.isdecimal():
-            raise ExpressionError("'-' before something else than an integer", sign.position, "write neg(...)")
-        return self._integer(self._take(), -1)._replace(position=sign.position)
+            raise ExpressionError("'-' before a term that is not an integer", sign.position, "write neg(...)")
+        return self._integer(self._advance(), -1)._replace(position=sign.position)
 
     def _integer(self, token: _Token, sign: int) -> _Parsed:
         if len(token.text) > MAX_DIGITS:
@@ -226,7 +222,7 @@ class _Parser:
         return self._applied(resolved, arguments, name.position)
 
     def _membership(self, name: _Token, arguments: tuple[_Parsed, ...]) -> _Parsed:
-        """Return `in(x, set(1, 2))`, whose set is written into it."""
+        """Return `in(x, set(1, 2))`, with the members of the set as arguments."""
         if len(arguments) != 2:  # noqa: PLR2004 - a term and a set
             raise ExpressionError(f"'in' takes 2 arguments, not {len(arguments)}", name.position, "in(X, set(1, 2))")
         term, members = arguments
@@ -249,10 +245,10 @@ class _Parser:
             self._next += 1
             arguments.append(self._sum(level + 1))
         for _ in range(pairs):
-            token = self._take()
+            token = self._advance()
             if token.text != ")":
                 raise ExpressionError(
-                    f"'{_shortened(token.text)}' where ',' or ')' should stand",
+                    f"'{_shortened(token.text)}' instead of ',' or ')'",
                     token.position,
                     "separate arguments by ','",
                 )
@@ -278,7 +274,7 @@ class _Parser:
     def _peek(self) -> _Token:
         return self._tokens[self._next]
 
-    def _take(self) -> _Token:
+    def _advance(self) -> _Token:
         token = self._tokens[self._next]
         if token.text:
             self._next += 1
@@ -286,7 +282,7 @@ class _Parser:
 
 
 def _tokens(text: str) -> list[_Token]:
-    """Return the tokens of `text`; the last is empty and stands for its end."""
+    """Return the tokens of `text`; the last one is empty and marks the end."""
     tokens = []
     for match in _TOKEN.finditer(text):
         if match[2]:
@@ -300,7 +296,7 @@ def _tokens(text: str) -> list[_Token]:
 
 
 def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
-    """Return where each opening parenthesis, by its index among the tokens, is closed."""
+    """Return the index of the closing token for the index of each opening parenthesis."""
     closing: dict[int, int] = {}
     opened: list[int] = []
     for index, token in enumerate(tokens):
@@ -308,15 +304,15 @@ def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
             opened.append(index)
         elif token.text == ")":
             if not opened:
-                raise ExpressionError("')' that closes nothing", token.position, "delete it, or open it with '('")
+                raise ExpressionError("')' without '('", token.position, "delete it, or add '('")
             closing[opened.pop()] = index
     if opened:
-        raise ExpressionError("'(' that is never closed", tokens[opened[-1]].position, "add the missing ')'")
+        raise ExpressionError("'(' without ')'", tokens[opened[-1]].position, "add the missing ')'")
     return closing
 
 
 def _operands(name: _Token, operator: Operator, only: _Parsed) -> tuple[_Parsed, ...]:
-    """Return the arguments of a function that wants two and was given one infix term: `minus(i-j)`."""
+    """Return the two arguments of a function that has one infix term as its argument: `minus(i-j)`."""
     if only.infix and only.infix == operator.infix:
         return only.operands
     shown = _shortened(text(only.expression))
@@ -344,17 +340,17 @@ def _check_type(parsed: _Parsed, wanted: Type, what: str) -> None:
         return
     hint = _TYPE_HINTS.get((wanted, parsed.type), "compare it: eq ne lt le gt ge")
     shown = _shortened(text(parsed.expression))
-    raise ExpressionError(f"{what} should be {wanted}, and '{shown}' is {parsed.type}", parsed.position, hint)
+    raise ExpressionError(f"{what} should be {wanted}, but '{shown}' is {parsed.type}", parsed.position, hint)
 
 
 _TYPE_HINTS = {
-    (Type.INTEGER, Type.BOOLEAN): "make a number of it: if(..., 1, 0)",
-    (Type.INTEGER, Type.SYMBOL): "only eq, ne and in take symbols",
+    (Type.INTEGER, Type.BOOLEAN): "convert it to a number: if(..., 1, 0)",
+    (Type.INTEGER, Type.SYMBOL): "only eq, ne and in accept symbols",
     (Type.BOOLEAN, Type.SYMBOL): "compare it: eq ne in",
     (Type.SYMBOL, Type.INTEGER): "compare symbols with symbols",
     (Type.SYMBOL, Type.BOOLEAN): "compare symbols with symbols",
     **{(Type.SET, other): "write in(X, set(1, 2))" for other in Type},
-    **{(other, Type.SET): "a set is for in(X, set(1, 2))" for other in Type},
+    **{(other, Type.SET): "use a set only in in(X, set(1, 2))" for other in Type},
 }
 
 

@@ -49,7 +49,7 @@ class RunCase:
     @property
     def has_negative_costs(self) -> bool:
         """Return whether something was taken out of costs, so that none is negative."""
-        return self.team.told_in.maximize or any(constraint.offset for constraint in self.team.constraints())
+        return self.team.user_units.maximize or any(constraint.offset for constraint in self.team.constraints())
 
     @property
     def is_distributed(self) -> bool:

@@ -81,7 +81,7 @@ class Machines(Deployment):
     def told(self, total: float) -> Cost:
         """See `Deployment.told`."""
         units = common_units(member.profile.units for member in self._master.members.robots.values())
-        return units.told(-int(total) if units.maximize else int(total))
+        return units.in_user_units(-int(total) if units.maximize else int(total))
 
     @property
     def lost(self) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ def test_decimals_and_negative_costs_are_integers_of_the_files_unit(tmp_path: Pa
     read, units = own_relation(tmp_path, relation, ' constant="-7"')
     assert units == CostUnits(places=2, constant=-700)
     assert (read.costs, read.default_cost) == ((-25, 200, INFINITE), 150)
-    assert units.told(-25) == Decimal("-7.25")
+    assert units.in_user_units(-25) == Decimal("-7.25")
 
 
 def test_a_cost_holds_until_the_next_one(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_a_cost_is_written_as_it_is_read(places: int, *, maximize: bool) -> None
     for cost in (0, 1, -1, 10, -10, 123456789012, 10**18 - 1, 1 - 10**18, INFINITE):
         assert read_cost(cost_text(cost, units), units) == cost
     for word in ("", "1e3", "0x1", "1.", ".1", "--1", "1.0000000000", "inf", "nan"):
-        with pytest.raises(MistakeError, match="is no cost"):
+        with pytest.raises(MistakeError, match="is not a cost"):
             read_cost(word, units)
 
 
@@ -140,7 +140,7 @@ def test_copies_are_compared_in_one_unit(tmp_path: Path) -> None:
     assert read_team(folder)["RA"].costs.places == 3
     (folder / "RB.xml").write_text(file("B", relations=half("0.25"), parents=CHILD_OF_A.format(shared.format("B A"))))
     with pytest.raises(
-        InvalidInputError, match=r"has the tuple '1 2' at a cost of -0\.5, and the child has it at a cost of -0\.75"
+        InvalidInputError, match=r"differs: '1 2' is at a cost of -0\.5, and with the child at a cost of -0\.75"
     ):
         read_team(folder)
 

@@ -211,7 +211,7 @@ def test_two_domains_of_one_name_are_told_apart_in_the_file(tmp_path: Path) -> N
 def test_what_cannot_be_written_is_refused() -> None:
     values = (Variable("V1", Domain("D1", (range(3),))),)
     soft = Relation("R", 1, Semantics.SOFT, ((1,),), (0.5,), 0)
-    with pytest.raises(ValueError, match="no integer"):
+    with pytest.raises(ValueError, match="not an integer"):
         robot_xml(Robot("Robot1", values, private=(Constraint("C", soft, ("V1",), ("V1",), None),)))
 
 

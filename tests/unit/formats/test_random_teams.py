@@ -16,7 +16,7 @@ from robochoc.formats import check_team, read_team, robot_in, robot_xml, write_t
 from robochoc.formats.global_constraints import read_form
 from robochoc.journal.given import TeamReader, TeamWriter
 from robochoc.model.assembly import Extras, assemble
-from robochoc.model.costs import normalized, told_cost
+from robochoc.model.costs import normalized, user_cost
 from robochoc.model.expression import SymbolNames, Type, parse
 from robochoc.model.problem import (
     INFINITE,
@@ -148,4 +148,4 @@ def test_it_costs_the_same_when_normalised_and_recorded(seeds: int) -> None:
             assert sum(one.price(assignment) for one in recorded.constraints()) == total, (seed, assignment)
             if paid < INFINITE and team.kind is ProblemKind.DISWCSP:
                 units = team.robots[0].costs
-                assert told_cost(counted, total) == units.told(paid), (seed, assignment)
+                assert user_cost(counted, total) == units.in_user_units(paid), (seed, assignment)

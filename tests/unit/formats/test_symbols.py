@@ -144,27 +144,37 @@ def test_a_scenario_names_symbols(tmp_path: Path) -> None:
 @looped(
     ("file", "old", "new", "told"),
     [
-        ("RA.xml", "dark-blue</", "dark-blue red</", "RA.xml:4: the symbol 'red' stands twice"),
+        ("RA.xml", "dark-blue</", "dark-blue red</", "RA.xml:4: the symbol 'red' occurs twice"),
         ("RA.xml", "dark-blue</", "1..4</", "RA.xml:4: '1..4' cannot be a symbol"),
         ("RA.xml", "dark-blue</", "a:b</", "RA.xml:4: 'a:b' cannot be a symbol"),
         ("RA.xml", "dark-blue</", f"{'x' * 101}</", "cannot be a symbol"),
         ("RA.xml", 'nbValues="3"', 'nbValues="4"', "RA.xml:4: nbValues is 4, but there are 3"),
-        ("RA.xml", "symbol X", "word X", "RA.xml:9: the parameters"),
+        ("RA.xml", "symbol X", "word X", "RA.xml:9: invalid parameters"),
         ("RA.xml", "symbol X int Y", "int X int Y", "RA.xml:11: predicate warm: unknown name 'red'"),
         ("RA.xml", "eq(Y, 2)", "eq(Y, red)", "RA.xml:11: predicate warm: argument 1 of 'eq' should be a symbol"),
-        ("RA.xml", "eq(Y, 2)", "eq(X, 2)", "argument 2 of 'eq' should be a symbol, and '2' is integer"),
-        ("RA.xml", "eq(Y, 2)", "lt(X, red)", "argument 1 of 'lt' should be integer, and 'X' is a symbol"),
+        ("RA.xml", "eq(Y, 2)", "eq(X, 2)", "argument 2 of 'eq' should be a symbol, but '2' is integer"),
+        ("RA.xml", "eq(Y, 2)", "lt(X, red)", "argument 1 of 'lt' should be integer, but 'X' is a symbol"),
         ("RA.xml", "set(red, ", "set(red, 1, ", "a member of the set should be a symbol"),
-        ("RA.xml", 'scope="A N"', 'scope="N A"', "RA.xml:14: warm takes a symbol where 'N' stands, and that is an int"),
-        ("RA.xml", 'reference="warm" scope="A N"', 'reference="eq" scope="A N"', "'A' is a symbol, and 'N' an integer"),
-        ("RA.xml", 'reference="warm" scope="A N"', 'reference="eq" scope="A 1"', "'A' is a symbol, and '1' an integer"),
-        ("RA.xml", 'reference="warm" scope="A N"', 'reference="lt" scope="A N"', "lt takes an integer where 'A'"),
+        ("RA.xml", 'scope="A N"', 'scope="N A"', "RA.xml:14: warm expects a symbol, but 'N' is an integer"),
+        (
+            "RA.xml",
+            'reference="warm" scope="A N"',
+            'reference="eq" scope="A N"',
+            "'A' is a symbol, but 'N' is an int",
+        ),
+        (
+            "RA.xml",
+            'reference="warm" scope="A N"',
+            'reference="eq" scope="A 1"',
+            "'A' is a symbol, but '1' is an int",
+        ),
+        ("RA.xml", 'reference="warm" scope="A N"', 'reference="lt" scope="A N"', "lt expects an integer, but 'A'"),
         ("RA.xml", "set(red, ", "set(rad, ", "RA.xml:9: no domain of the team has the symbol 'rad' (did you mean"),
         ("RA.xml", "</variables>", '</variables><topics><topic name="t" x="A"/></topics>', "x of the topic: the expr"),
         ("RB.xml", "|red 2", "|2 2", "RB.xml:5: '2' in a column of symbols"),
-        ("RB.xml", "|red 2", "|red pink", "RB.xml:5: 'pink' is no integer"),
-        ("RB.xml", 'scope="A B"', 'scope="N B"', "RB.xml:8: r takes a symbol where 'N' stands"),
-        ("RB.xml", "green 1|red 2", "1 1|2 2", "RB.xml:8: r takes an integer where 'A' stands, and that is a symbol"),
+        ("RB.xml", "|red 2", "|red pink", "RB.xml:5: 'pink' is not an integer"),
+        ("RB.xml", 'scope="A B"', 'scope="N B"', "RB.xml:8: r expects a symbol, but 'N' is"),
+        ("RB.xml", "green 1|red 2", "1 1|2 2", "RB.xml:8: r expects an integer, but 'A' is a symbol"),
     ],
 )
 def test_symbols_and_integers_are_not_mixed(tmp_path: Path, file: str, old: str, new: str, told: str) -> None:
@@ -222,13 +232,13 @@ def variable(symbols: tuple[str, ...], *ranges: range) -> tuple[Variable, ...]:
     ("fields", "told"),
     [
         ({"variables": variable(("red", "blue"))}, "robot RB: its symbols differ from those of 'RA'"),
-        ({"variables": variable(("red", "red"))}, "robot RA, domain D: a symbol stands twice"),
+        ({"variables": variable(("red", "red"))}, "robot RA, domain D: a symbol occurs twice"),
         ({"variables": variable(("red", "7"))}, "robot RA, domain D: '7' cannot be a symbol"),
         (
             {"variables": variable(("red", "green"), range(3))},
             "robot RA, domain D: the value 2 of",
         ),
-        ({"symbols": ("x",)}, "robot RA: its symbolic domains have different symbols"),
+        ({"symbols": ("x",)}, "robot RA: its symbolic domains have different tables of symbols"),
     ],
 )
 def test_tables_that_are_none(fields: dict[str, object], told: str) -> None:
@@ -241,17 +251,17 @@ def test_a_constraint_that_was_not_marked() -> None:
     body = Apply("eq", (Name("X"), RED))
     private = (Constraint("P", Predicate("p", ("X",), body), ("A",), ("A",), None),)
     robot = Robot("RA", (Variable("A", COLOURS),), private=private)
-    with pytest.raises(InvalidInputError, match="p takes an integer where 'A' stands, and that is a symbol"):
+    with pytest.raises(InvalidInputError, match="p expects an integer, but 'A' is a symbol"):
         check_team(Team("t", (robot,)))
     unknown = Relation("r", 1, Semantics.SUPPORTS, ((5,),), symbolic=(0,))
     robot = replace(robot, private=(Constraint("P", unknown, ("A",), ("A",), None),))
-    with pytest.raises(InvalidInputError, match="the value 5 in column 0 is no symbol"):
+    with pytest.raises(InvalidInputError, match="the value 5 in column 0 is not the code of a symbol"):
         check_team(Team("t", (robot,)))
 
 
 def test_a_value_that_is_no_symbol_cannot_be_added() -> None:
     team = replace(built(), scenario=(ScenarioEvent((AddValue("A", 2),)),))
-    with pytest.raises(InvalidInputError, match="the value 2 of 'A' is no symbol"):
+    with pytest.raises(InvalidInputError, match="the value 2 of 'A' is not the code of a symbol"):
         check_team(team)
 
 

@@ -196,7 +196,7 @@ def test_what_changes_leave_can_be_solved(team: Team) -> None:
          "takes 2 terms, but 'A' has 1"),
         (AddAgent(Robot("RC", (Variable("C", Domain("D", ())),))), "domain D has no value"),
         (AddValue("A", 10**18), "19 digits"),
-        ("nonsense", "'nonsense' where RemoveAgent or AddAgent"),
+        ("nonsense", "'nonsense' instead of RemoveAgent or AddAgent"),
     ],
 )  # fmt: skip
 def test_what_a_field_says_is_held_against_the_rules(change: Change, message: str) -> None:
@@ -286,7 +286,7 @@ def test_what_files_cannot_say_is_not_written(team: Team, tmp_path: Path, monkey
     showing = replace(team, robots=(*team.robots[:2], replace(team["Robot3"], shown=("V3",))))
     big = Relation("r", 3, Semantics.CONFLICTS, tuple((10**17 + number, 10**17, 10**17) for number in range(40_000)))
     large = team_of({"A": range(2), "B": range(2)}, [Constraint("C", big, ("A", "B", 1), ("A", "B", 1))])
-    for unwritable, why in ((showing, "shows 'V3'"), (large, "larger than 2 MiB")):
+    for unwritable, why in ((showing, "`shown` contains 'V3'"), (large, "larger than 2 MiB")):
         check_team(unwritable)
         with pytest.raises(InvalidInputError, match=why):
             write_team(unwritable, tmp_path / "team")

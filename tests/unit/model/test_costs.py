@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.model.cost_units import cost_shown
-from robochoc.model.costs import UnboundedCostError, flat_units, normalized, normalized_robot, told_cost
+from robochoc.model.costs import UnboundedCostError, flat_units, normalized, normalized_robot, user_cost
 from robochoc.model.expression import Type, evaluate, parse
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
 from robochoc.model.expression.tree import UndefinedValueError
@@ -39,7 +39,7 @@ def test_normalised_costs_tell_the_cost_of_every_assignment(seed: int) -> None:
             exact = units.constant * unit + sum(
                 Fraction(cost) * (1 if isinstance(one.definition, Function) else unit) for one, cost in outer
             )
-            assert Fraction(told_cost(counted, assignment_cost(counted, assignment))) == exact
+            assert Fraction(user_cost(counted, assignment_cost(counted, assignment))) == exact
 
 
 @examples(60)

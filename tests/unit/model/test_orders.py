@@ -13,7 +13,7 @@ import pytest
 
 from robochoc.formats import read_team, write_team
 from robochoc.formats.global_constraints import read_form
-from robochoc.formats.robot_writer import with_names_apart
+from robochoc.formats.robot_writer import with_distinct_names
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import Order, OrderError, compute_order, constraint_graph, with_order, with_priorities
@@ -198,7 +198,7 @@ def test_definitions_of_one_name_in_two_files_do_not_become_one() -> None:
     given = [apart("A", "B", (1, 1)), apart("A", "C", (2, 2)), apart("A", "D", (2, 2)), apart("A", "E", (1, 1))]
     turned = with_priorities(team_of(dict.fromkeys("ABCDE", (1, 2)), given), ["RB", "RC", "RD", "RE", "RA"])
     assert [one.definition for one in turned["RA"].shared] == [one.definition for one in given]
-    written = with_names_apart(turned["RA"])
+    written = with_distinct_names(turned["RA"])
     assert [one.definition.name for one in written.shared] == ["R", "R.2", "R.2", "R"]
     assert [meaning(one) for one in written.shared] == [meaning(one) for one in given]
 

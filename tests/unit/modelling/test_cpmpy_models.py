@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import robochoc
-from robochoc.model.costs import normalized, told_cost
+from robochoc.model.costs import normalized, user_cost
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.modelling.cpmpy_models import cpmpy_team
@@ -138,7 +138,7 @@ def by_hand(model: Term, given: RandomExpressions) -> tuple[bool, int | None]:
 def solved(team: Team) -> tuple[bool, int | None]:
     small = normalized(team)
     answer = CentralSolver().solve(small)
-    cost = None if answer.cost is None else told_cost(small, answer.cost)
+    cost = None if answer.cost is None else user_cost(small, answer.cost)
     return answer.verdict is not Verdict.NO_SOLUTION, None if cost is None else int(cost)
 
 

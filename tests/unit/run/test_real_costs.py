@@ -14,7 +14,7 @@ from robochoc.communication.kill_schedule import Kill
 from robochoc.formats import read_team, write_team
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.assembly import Extras, assemble
-from robochoc.model.costs import normalized, told_cost
+from robochoc.model.costs import normalized, user_cost
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import (
@@ -219,16 +219,16 @@ def test_who_was_lost_counts_values_that_are_still_to_come(tmp_path: Path) -> No
     journey = ScenarioRun(team, None, CompiledTeam, lambda: None, spares=1)
     *_, last = (played.team for played in journey.epochs(Losing(journey.team, ["b"]), lambda _: None))
     assert journey.failed_returns == []
-    assert told_cost(last, assignment_cost(last, {"x": 9, "y": 2})) == Decimal(18)
+    assert user_cost(last, assignment_cost(last, {"x": 9, "y": 2})) == Decimal(18)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
         ('objective="maximize"', "", "another objective"),
-        ('scale="0.1"', 'scale="0.01"', "finer costs"),
+        ('scale="0.1"', 'scale="0.01"', "more decimal places"),
         ('nbValues="3">0..2', ">0..7", "y has new values"),
-        ('<domain name="E" nbValues="3">0..2', '<domain name="E" type="symbolic">u v', "'u' is new to the team"),
+        ('<domain name="E" nbValues="3">0..2', '<domain name="E" type="symbolic">u v', "the team has no symbol 'u'"),
     ],
 )
 def test_who_reads_costs_otherwise_stays_away(old: str, new: str, why: str, tmp_path: Path) -> None:

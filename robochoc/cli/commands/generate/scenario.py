@@ -76,6 +76,6 @@ def scenario(
     folder = output or Path("instances") / changing.name
     ground = team / GROUND_FILE
     beside = {GROUND_FILE: ground.read_bytes()} if ground.is_file() else {}
-    write_team(changing, folder, replace=force, beside=beside)
+    write_team(changing, folder, replace=force, extra_files=beside)
     changes = sum(len(event.changes) for event in changing.scenario)
     click.echo(f"{folder}: {events} events, {changes} changes; next: robochoc solve {folder}")

@@ -44,15 +44,15 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     for element, name in zip(root.iterfind("variables/var"), names, strict=False):
         element.set("note", f"{name} of {team.owner[name]}")
     for objective in root.iterfind("objectives/minimize"):
-        objective.tag = "maximize" if team.told_in.maximize else "minimize"
-        if team.told_in.places:
-            objective.set("note", f"in units of {Decimal(1).scaleb(-team.told_in.places):f}")
+        objective.tag = "maximize" if team.user_units.maximize else "minimize"
+        if team.user_units.places:
+            objective.set("note", f"in units of {Decimal(1).scaleb(-team.user_units.places):f}")
     return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")
 
 
 def _as_told(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes]:
     """Return a network of normalised costs with the user's costs: negated if maximised, and with their constant."""
-    sign = -1 if team.told_in.maximize else 1
+    sign = -1 if team.user_units.maximize else 1
     constant = flat_units(team).constant
     if team.kind != ProblemKind.DISWCSP or (sign == 1 and not constant):
         return network, costs

@@ -92,5 +92,5 @@ def test_all_dialects_have_their_names() -> None:
 def test_names_that_are_none(content: bytes, tmp_path: Path) -> None:
     assert original_names(tmp_path) == {}
     (tmp_path / NAMES_FILE).write_bytes(content)
-    with pytest.raises(InvalidInputError, match="does not hold the original names of a team"):
+    with pytest.raises(InvalidInputError, match="does not contain the original names of a team"):
         original_names(tmp_path)

@@ -17,7 +17,7 @@ from robochoc.formats.dialects.dialect import ExportOptions, ImportOptions, Impo
 from robochoc.formats.dialects.registry import recognise
 from robochoc.formats.dialects.xcsp3 import DIALECT
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.costs import normalized, told_cost
+from robochoc.model.costs import normalized, user_cost
 from robochoc.model.problem import Team
 from robochoc.model.team_edits import without_robots
 from robochoc.solver.central import CentralSolver
@@ -114,7 +114,7 @@ def test_objectives_are_split_and_keep_the_optimum(kind: str, tmp_path: Path) ->
     best = (min if "minimize" in xml else max)(Fraction(value(*r)) for r in rows() if r[0] != r[1] and r[0] + r[2] > 1)
     answer = CentralSolver().solve(team)
     assert answer.cost is not None
-    assert told_cost(team, answer.cost) == best
+    assert user_cost(team, answer.cost) == best
 
 
 def test_a_wide_maximum_becomes_a_bound_that_is_a_variable(tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_the_number_of_values_of_many_variables_gets_auxiliary_variables(tmp_pat
             truth = [len(set(row)) for row in allowed]
             assert (answer.cost is None) == (not truth), seed
             if answer.cost is not None:
-                assert told_cost(normalized(found.team), answer.cost) == best(truth), (seed, direction)
+                assert user_cost(normalized(found.team), answer.cost) == best(truth), (seed, direction)
 
 
 def test_large_circuits_get_auxiliary_variables_that_are_determined(tmp_path: Path) -> None:
@@ -369,7 +369,7 @@ def test_teams_written_and_read_again_have_the_same_optimum(batch: int, tmp_path
         first, second = CentralSolver().solve(team), CentralSolver().solve(again)
         assert first.verdict is second.verdict or team.kind is not again.kind, seed
         if first.cost is not None and second.cost is not None:
-            assert told_cost(again, second.cost) == first.cost == cost_of(first.assignment, list(team.constraints())), (
+            assert user_cost(again, second.cost) == first.cost == cost_of(first.assignment, list(team.constraints())), (
                 seed
             )
 
@@ -395,5 +395,5 @@ def test_units_directions_and_constants_are_written(batch: int, tmp_path: Path) 
         first, second = CentralSolver().solve(small), CentralSolver().solve(again)
         assert first.verdict is second.verdict, seed
         if first.cost is not None and second.cost is not None:
-            scale = 10**small.told_in.places
-            assert told_cost(again, second.cost) == told_cost(small, first.cost) * scale, seed
+            scale = 10**small.user_units.places
+            assert user_cost(again, second.cost) == user_cost(small, first.cost) * scale, seed
