@@ -40,7 +40,7 @@ class Act(NamedTuple):
     why: str
 
 
-INFORM = Act(Performative.INFORM, "every message tells the receiver something")
+INFORM = Act(Performative.INFORM, "every message informs the receiver")
 """The act of a message whose class declares no other."""
 
 TELL_VALUE = Act(Performative.INFORM, "the receiver learns the sender's value")

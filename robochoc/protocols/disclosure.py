@@ -1,14 +1,14 @@
-"""The statements about robots' problems in which a message's rule (`Message.proves`) is written.
+"""The statements about robots' problems with which messages declare what their receivers learn (`Message.proves`).
 
-A rule stands with its message (`Message.proves`). Its proofs are true statements, each on its own: about the problem,
-which does not change during a run, and about the value that a robot has taken. `robochoc/privacy` adds up what follows.
-In all of them the *own cost* of a robot's value, in a view of other robots' values, is what the robot's private
-constraints charge for the value, and every constraint between this robot and robots of the view whose other robots are
-all in the view. `INFINITE` is a hard constraint that is broken, or a value that the robot cannot take.
+Each message type declares its own rule. Its proofs are true statements, each on its own: about the problem, which does
+not change during a run, and about the value that a robot has chosen. `robochoc/privacy` adds up the consequences.
+In all of them the *own cost* of a robot's value, in a view of other robots' values, is the cost of this value in the
+robot's private constraints, plus that of every constraint between this robot and robots of the view whose other robots
+are all in the view. `INFINITE` is a broken hard constraint, or a value that is not possible for the robot.
 
-The observer is taken to know, from the start: its own problem; the constraints that it shares, but for other robots'
-parts of partially known ones; the declared domains of all variables that neighbours see; the order; who shares a
-constraint with whom.
+The observer is assumed to know, from the start: its own problem; the constraints that it shares, except other robots'
+parts of partially known ones; the declared domains of all variables that neighbours see; the order; and which robots
+share constraints with each other.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ View = Mapping[str, Value]
 
 
 class StandsAt(NamedTuple):
-    """`robot` has taken `value`, and keeps it until the observer hears otherwise.
+    """`robot` has chosen `value`, and keeps it until the observer receives another value.
 
     Of several such statements about a robot the one with the largest `stamp` counts, and the last of these.
     """
@@ -38,11 +38,11 @@ class StandsAt(NamedTuple):
 
 
 class StandsWhere(NamedTuple):
-    """`robot` has taken a value that goes with exactly the values of `other` whose bits are set in `allowed`.
+    """`robot` has chosen a value that is compatible with exactly the values of `other` whose bits are set in `allowed`.
 
     The bits are in the order of `other`'s declared values. Only constraints between these two robots that `robot` knows
-    count; with `parts_only` its parts of partially known ones. The statement stands until the observer hears otherwise,
-    as in `StandsAt`.
+    count; with `parts_only` its parts of partially known ones. The statement is valid until the observer receives
+    another one, as in `StandsAt`.
     """
 
     robot: str
@@ -52,7 +52,7 @@ class StandsWhere(NamedTuple):
 
 
 class HasOnly(NamedTuple):
-    """`robot` can take these values, and no others; the observer then knows them by their places."""
+    """These values, and no others, are possible for `robot`; the observer then knows them by their places."""
 
     robot: str
     values: tuple[Value, ...]
@@ -95,7 +95,7 @@ class SomeValuePays(NamedTuple):
 
 
 class Total(NamedTuple):
-    """The values of all robots in `view` charge, and all constraints among them cost, `cost` together."""
+    """The values of all robots in `view`, with all constraints among them, cost `cost` together."""
 
     view: View
     cost: float
@@ -109,24 +109,24 @@ class Clash(NamedTuple):
 
 Proof = StandsAt | StandsWhere | HasOnly | Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash
 NOTHING: tuple[Proof, ...] = ()
-"""The proofs of a message that gives none here. It has a rule, unlike a message whose `proves` returns None."""
+"""The proofs of a message without any. It has a rule, unlike a message whose `proves` returns None."""
 AT_THE_END = (2**62,)
-"""The stamp of a value that is not changed any more."""
+"""The stamp of a final value."""
 FINITE = float(2**53)
-"""The upper bound of a cost of which no more is known than that it is not infinite: above all costs of a problem."""
+"""The upper bound of a cost that is only known to be finite: above all costs of a problem."""
 
 
 class Hearing(ABC):
-    """A message as its receiver, the observer, hears it: from whom, and what it knows by then.
+    """A received message in its context: its sender, and the knowledge of its receiver, the observer.
 
     Attributes:
-        sender: Who sent the message.
+        sender: The sender of the message.
         receiver: The observer.
         order: All robots, the highest priority first.
-        branch: The robots whose values a partial assignment of the sender holds, the highest first.
+        branch: The robots whose values are in a partial assignment of the sender, the highest first.
         fixed_holders: Each constraint is checked by the lowest robot of its scope, and the order does not change.
-        minimises: Something is minimised, costs or robots that withdraw.
-        max_cost: No finite cost of a secret is higher.
+        minimises: The run minimises costs, or the number of robots that withdraw.
+        max_cost: The highest finite cost of a secret.
     """
 
     sender: str
@@ -143,7 +143,7 @@ class Hearing(ABC):
 
     @abstractmethod
     def values(self, robot: str) -> Sequence[Value] | None:
-        """Return the values that `robot` can take, in its own order, if the observer knows them by now."""
+        """Return the possible values of `robot`, in its own order, if the observer already knows them."""
 
     @abstractmethod
     def width(self, robot: str) -> int:
@@ -151,7 +151,7 @@ class Hearing(ABC):
 
     @abstractmethod
     def last(self, kind: type[M], sender: str, receiver: str) -> M | None:
-        """Return the last message of this kind on a channel whose one end is the observer."""
+        """Return the last message of type `kind` on a channel with the observer at one end."""
 
     def is_lowest(self, robot: str) -> bool:
         """Return whether no robot has lower priority than `robot`."""
@@ -163,12 +163,12 @@ class Hearing(ABC):
 
 
 def can_take(robot: str, value: Value) -> Proof:
-    """Return that `robot` can take `value`."""
+    """Return the proof that `value` is possible for `robot`."""
     return Pays(robot, value, {}, 0, FINITE)
 
 
 def partial_assignment(robots: Sequence[str], values: Sequence[Value]) -> list[Proof]:
-    """Return what a consistent partial assignment proves: each value goes with those before it.
+    """Return the proofs of a consistent partial assignment: each value is compatible with those before it.
 
     Args:
         robots: The robots, the highest first; there may be more of them than values.
@@ -185,17 +185,17 @@ def partial_assignment(robots: Sequence[str], values: Sequence[Value]) -> list[P
 def table_proves(
     axes: Sequence[str], cells: Iterable[tuple[Sequence[int], float]], hearing: Hearing
 ) -> Sequence[Proof]:
-    """Return what `cells` of the sender's table prove: places on its axes, and the least cost with these values.
+    """Return the proofs of `cells` of the sender's table: places on its axes, and the least cost with these values.
 
-    Robots whose values the receiver does not know are left out of the views: what some value of the sender costs at
-    most with one of their values, it costs at most without them.
+    Robots whose values the receiver does not know are left out of the views: an upper bound on the cost of some value
+    of the sender with one of their values is also one without them.
     """
     sender = hearing.sender
     near = [(robot, hearing.values(robot)) for robot in hearing.neighbours(sender) if robot not in axes]
     single = {robot: values[0] for robot, values in near if values is not None and len(values) == 1}
-    nobody_below = {*axes, *single} >= set(hearing.neighbours(sender))
+    none_below = {*axes, *single} >= set(hearing.neighbours(sender))
     least: dict[tuple[tuple[str, Value], ...], float] = {}
-    whole = all(hearing.values(robot) is not None for robot in axes)
+    all_known = all(hearing.values(robot) is not None for robot in axes)
     for places, cost in cells:
         known = zip(axes, places, strict=True)
         view = tuple([(robot, values[at]) for robot, at in known if (values := hearing.values(robot)) is not None])
@@ -203,6 +203,6 @@ def table_proves(
     found: list[Proof] = []
     for view, cost in least.items():
         found.append(SomeValuePays(sender, {**single, **dict(view)}, cost))
-        if nobody_below and whole:
+        if none_below and all_known:
             found.append(EveryValuePays(sender, {**single, **dict(view)}, cost))
     return found

@@ -50,13 +50,13 @@ class Protocol(ABC):
         """For each message in the outbox: `problem.checks` at the time of sending. The host computes the message's
         clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
         self.value: int | None = None
-        """This robot's value, as its place in the compiled domain; None: unassigned."""
+        """This robot's value, as its place in `problem.values`; None: unassigned. Messages contain the value itself."""
         self.verdict: Verdict | None = None
         """Set when this robot alone can decide the result of the search, for example by deriving the empty nogood."""
 
     @abstractmethod
     def start(self) -> None:
-        """Begin the search; called once, before any message."""
+        """Start the search; called once, before any message."""
 
     @abstractmethod
     def receive(self, sender: str, message: Message) -> None:
@@ -66,7 +66,7 @@ class Protocol(ABC):
         """Decide on the whole view; called when the inbox has been drained."""
 
     def miss(self, sender: str) -> None:  # noqa: B027 - optional
-        """Note that a message of `sender` is lost; its next message follows the lost one."""
+        """Record that a message of `sender` is lost; its next message follows the lost one."""
 
     def go_on(self) -> bool:
         """Continue without the awaited messages, as no more will arrive. Return False if that is impossible.

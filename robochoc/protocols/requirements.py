@@ -1,6 +1,6 @@
 """Requirements of a problem on a protocol: costs, and the kinds of constraints that a robot has.
 
-A run checks all robots before it begins (`run/compatibility`). Across machines only the robot itself knows its
+A run checks all robots before it starts (`run/compatibility`). Across machines only the robot itself knows its
 constraints, so each robot checks its own. Both import this module.
 """
 

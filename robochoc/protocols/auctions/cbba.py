@@ -75,7 +75,7 @@ class Bundles(wire.Message, frozen=True):
     standings: list[WinningBid]
     stamps: list[int]
 
-    act = Act(Performative.INFORM, "the receiver comes to set_standing who has which task as far as the sender knows")
+    act = Act(Performative.INFORM, "the receiver learns which robot has which task as far as the sender knows")
     shareable = True
 
     def in_words(self, words: Wording) -> str:
@@ -230,8 +230,8 @@ class CBBA(Auction):
         if standing != self.standings[task]:
             self.standings[task] = standing
             self._news.add(task)
-            for rival, said in zip(self.market.rivals[task], self._last_standings[task], strict=True):
-                if said == standing:
+            for rival, sent in zip(self.market.rivals[task], self._last_standings[task], strict=True):
+                if sent == standing:
                     self._differing[rival].discard(task)
                 else:
                     self._differing[rival].add(task)
@@ -340,12 +340,12 @@ class CBBA(Auction):
         """Send each rival the news, and a correction where the rival is wrong about this robot's tasks."""
         own = self.problem.agent
         number = self.s[own] + 1
-        said: dict[int, Bundles | None] = {}
+        messages: dict[int, Bundles | None] = {}
         for rival, rivalry in self.rivalries.items():
             key = id(rivalry)
-            if key not in said:
-                said[key] = self._message(rivalry, self._unknown(rivalry), number)
-            message = said[key]
+            if key not in messages:
+                messages[key] = self._message(rivalry, self._unknown(rivalry), number)
+            message = messages[key]
             if message is None and rival in self._acknowledged:
                 message = self._message(rivalry, self._mistaken(rival), number)
             if message is not None:
@@ -355,7 +355,7 @@ class CBBA(Auction):
         self._acknowledged.clear()
 
     def _unknown(self, rivalry: Rivalry) -> list[int]:
-        """Return the tasks whose standings these rivals do not set_standing; mark them as sent."""
+        """Return the tasks whose standings these rivals do not know; mark them as sent."""
         sent = rivalry.sent
         tasks = [task for task in self._news & rivalry.tasks if self.standings[task] != sent.get(task, NOBODY)]
         sent.update({task: self.standings[task] for task in tasks})

@@ -67,7 +67,7 @@ class Partition(wire.Message, frozen=True):
     mover: str
     coalitions: dict[str, Lot]
 
-    act = Act(Performative.INFORM, "the receiver learns who does what as far as the sender knows")
+    act = Act(Performative.INFORM, "the receiver learns which robots do which tasks as far as the sender knows")
 
     def in_words(self, words: Wording) -> str:
         who = [f"{robot} does {lot_in_words(words, robot, lot)}" for robot, lot in self.coalitions.items()]
@@ -136,8 +136,8 @@ class GRAPE(Auction):
             self.partition, self.satisfied = newest, False
         if not self.satisfied:
             moved = self._decide()
-            told = {rival for rival, heard in self._received.items() if heard == self.partition and not moved}
-            self._send_partition(told)
+            informed = {rival for rival, known in self._received.items() if known == self.partition and not moved}
+            self._send_partition(informed)
         self._received.clear()
 
     def _age(self, partition: Partition) -> tuple[int, int, int]:

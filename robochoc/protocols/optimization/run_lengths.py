@@ -29,12 +29,12 @@ def expanded(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
 
 
 def fits(kinds: int, runs: Sequence[Run], robots: int) -> bool:
-    """Return whether `runs` over `kinds` distinct items describe exactly so many robots."""
+    """Return whether `runs` over `kinds` distinct items describe exactly `robots` robots."""
     return sum(count for _, count in runs) == robots and all(0 <= at < kinds and count > 0 for at, count in runs)
 
 
 def cut_off(runs: Iterable[Run], robots: int) -> list[Run]:
-    """Return `runs`, cut off after so many robots."""
+    """Return `runs`, cut off after `robots` robots."""
     cut: list[Run] = []
     for place, count in runs:
         taken = max(0, min(count, robots))

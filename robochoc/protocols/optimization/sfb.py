@@ -403,10 +403,10 @@ class SFB(Protocol):
         """Process one message. Raises `ValueError` for a message that is not possible at this point."""
         if self.verdict is not None:
             return
-        heard = cast("Above | Below | CPAs | Explored | Solution", message)
-        if not self._expects(sender, heard):
+        received = cast("Above | Below | CPAs | Explored | Solution", message)
+        if not self._expects(sender, received):
             raise ValueError(f"unexpected {type(message).__name__} from {sender}")
-        match heard:
+        match received:
             case Above(domains, runs):
                 self._send_domains(expanded(domains, runs))
             case Below() as below:

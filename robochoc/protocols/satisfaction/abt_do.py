@@ -97,7 +97,7 @@ class ABTDORetro(Backtracking):
 
     - `left`: the numbers of remaining values that other robots sent.
     - `higher`: robots that send this one their values while they have higher priority.
-    - `tells`: robots to which this one sends its value while they have lower priority.
+    - `listeners`: robots to which this one sends its value while they have lower priority.
     - `owed`: robots that must be sent the value after the packet, even if it has not changed.
     """
 
@@ -115,7 +115,7 @@ class ABTDORetro(Backtracking):
         super().__init__(problem, self._newest)
         self.left: dict[str, int] = {}
         self.higher = set(problem.neighbours)
-        self.tells = list(problem.neighbours)
+        self.listeners = list(problem.neighbours)
         self.owed: set[str] = set()
         self._checked: dict[str, Value] | None = None
 
@@ -186,8 +186,8 @@ class ABTDORetro(Backtracking):
             self.store.forget(name)
 
     def _set_link(self, sender: str) -> None:
-        if sender not in self.tells:
-            self.tells.append(sender)
+        if sender not in self.listeners:
+            self.listeners.append(sender)
         self.owed.add(sender)
 
     # The search
@@ -224,7 +224,7 @@ class ABTDORetro(Backtracking):
         if current is None:
             return  # the search is over
         ok = Ok(current, self._left())
-        for name in self.tells:
+        for name in self.listeners:
             if name in self.owed:
                 self.send(name, ok)
         self.owed.clear()
@@ -249,7 +249,7 @@ class ABTDORetro(Backtracking):
 
     def _lower(self) -> list[str]:
         """Return the robots that are sent the value under the current order."""
-        return [name for name in self.tells if not self._is_higher(name)]
+        return [name for name in self.listeners if not self._is_higher(name)]
 
     def _left(self) -> int:
         """Return the number of this robot's values that no stored nogood rules out."""

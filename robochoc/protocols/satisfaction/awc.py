@@ -101,12 +101,12 @@ class NogoodList:
     def applicable(self, view: LeftSide) -> list[StoredNogood]:
         """Return the nogoods that apply in `view`: their other assignments all hold."""
         awake = []
-        for kept in self._awake:
-            missing = next((agent for agent, value in kept.others.items() if not agrees(value, view.get(agent))), None)
+        for one in self._awake:
+            missing = next((agent for agent, value in one.others.items() if not agrees(value, view.get(agent))), None)
             if missing is None:
-                awake.append(kept)
+                awake.append(one)
             else:
-                self._waiting.setdefault(missing, {}).setdefault(kept.others[missing], []).append(kept)
+                self._waiting.setdefault(missing, {}).setdefault(one.others[missing], []).append(one)
         self._awake = awake
         return awake
 

@@ -56,14 +56,14 @@ class Backtracking(Protocol):
 
     def _assume(self, lhs: Mapping[str, Value]) -> list[str]:
         """Assume the values in `lhs`; return the robots that do not send this one their values yet."""
-        strangers = [agent for agent in lhs if agent not in self.higher]
-        self.higher.update(strangers)
+        new = [agent for agent in lhs if agent not in self.higher]
+        self.higher.update(new)
         for agent, value in lhs.items():
             known = self.view.get(agent)
             more = joined(known, value)
             if more != known:
                 self._update(agent, more)
-        return strangers
+        return new
 
     def _current(self) -> Value | None:
         """Return this robot's value as others see it; None while unassigned."""

@@ -185,7 +185,7 @@ class Assign(Message, frozen=True):
     place: int
     changes: Changes
 
-    act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
+    act = Act(Performative.REQUEST, "the receiver chooses the value in the message")
 
     def in_words(self, _: Wording) -> str:
         return f"the mediation is over: take your value number {self.place + 1}{_shown(self.changes)}"
@@ -202,7 +202,7 @@ class Release(Message, frozen=True):
 
     changes: Changes
 
-    act = Act(Performative.INFORM, "the receiver need not keep its value any more")
+    act = Act(Performative.INFORM, "the receiver may change its value again")
 
     def in_words(self, words: Wording) -> str:
         return f"the mediation is over: {words.variables(words.receiver)} may change again{_shown(self.changes)}"

@@ -86,7 +86,7 @@ class Improve(wire.Message, frozen=True):
     weight: Count
     counter: Count
 
-    act = Act(Performative.INFORM, "the receiver learns what the sender's move would save")
+    act = Act(Performative.INFORM, "the receiver learns the saving by the sender's move")
 
     def in_words(self, _: Wording) -> str:
         if not self.weight:

@@ -1,8 +1,8 @@
 """Distributed arc consistency (DisAC-9), which `--preprocess ac` runs before any protocol.
 
 A robot removes each of its values that has no support: some constraint allows it with none of the others' remaining
-values, so it is in no solution. It sends its removals to its neighbours, who remove values in turn. The result is that
-of a central algorithm: the largest arc consistent domains. A robot without a value left proves that there is no
+values, so it is in no solution. It sends its removals to its neighbours, which remove values in turn. The result is
+that of a central algorithm: the largest arc consistent domains. A robot without a value left proves that there is no
 solution.
 
 This is not a search: at the end each robot has a reduced domain, not one value. The run then continues with the

@@ -146,33 +146,35 @@ class BreadthFirstTree:
             sent += self._round({name: places.popleft() for name, places in self._waiting.items()})
         return sent
 
-    def _round(self, told: dict[str, Place]) -> Sent:
-        """Process one round, with the places of all neighbours."""
-        heights = [place.height for place in told.values() if place.height is not None]
+    def _round(self, others: dict[str, Place]) -> Sent:
+        """Process one round, with the others of all neighbours."""
+        heights = [place.height for place in others.values() if place.height is not None]
         if heights:
             self.height = heights[0]
         else:
-            self._adopt(told)
-        self.children = tuple(name for name, place in told.items() if self._is_child(place))
-        below = self._depth_below(told)
+            self._adopt(others)
+        self.children = tuple(name for name, place in others.items() if self._is_child(place))
+        below = self._depth_below(others)
         if self._root == self._agent and self.height is None:
             self.height = below
         return self._place_messages(below)
 
-    def _adopt(self, told: dict[str, Place]) -> None:
+    def _adopt(self, others: dict[str, Place]) -> None:
         """Adopt the best root of all, and the neighbour nearest to it as the parent."""
-        name, place = min(told.items(), key=lambda one: (self._rank[one[1].root], one[1].distance, self._rank[one[0]]))
+        name, place = min(
+            others.items(), key=lambda one: (self._rank[one[1].root], one[1].distance, self._rank[one[0]])
+        )
         if self._rank[place.root] < self._rank[self._root]:
             self._root, self._distance, self.parent = place.root, place.distance + 1, name
 
     def _is_child(self, place: Place) -> bool:
         return place.root == self._root and place.parent == self._agent
 
-    def _depth_below(self, told: dict[str, Place]) -> int | None:
+    def _depth_below(self, others: dict[str, Place]) -> int | None:
         """Return the height of this robot's subtree; None while it may still grow."""
-        if any(place.root != self._root for place in told.values()):
+        if any(place.root != self._root for place in others.values()):
             return None
-        depths = [told[name].below for name in self.children]
+        depths = [others[name].below for name in self.children]
         return 1 + max((depth for depth in depths if depth is not None), default=-1) if None not in depths else None
 
     def _place_messages(self, below: int | None) -> Sent:
@@ -206,8 +208,8 @@ class Anytime:
     def record(self, step: int, index: int) -> Sent:
         """Record this robot's value of a step; return the messages with it."""
         self._values[step] = index
-        told = Step(self._problem.values[index])
-        return [*((name, told) for name in self._below), *self._report()]
+        message = Step(self._problem.values[index])
+        return [*((name, message) for name in self._below), *self._report()]
 
     def receive(self, sender: str, message: AnytimeMessage) -> Sent:
         """Process a message; return the answers.

@@ -5,7 +5,7 @@ waits for one, then waits for one from each robot that it listens to, and contin
 need no number, as those of a robot arrive in the order of their phases. A message from a neighbour that is ahead is
 stored until its phase.
 
-Where a message is lost, the next one of the same robot shows the gap; where none follows, a robot continues once no
+If a message is lost, the next one of the same robot shows the gap; if none follows, a robot continues once no
 more messages arrive. In both cases it executes the phase with the messages that it has. From a message that arrives
 after its phase, a robot only stores the new information. So phases stay in step, and the search continues after each
 silence.
@@ -126,8 +126,8 @@ class CycleProtocol(Protocol):
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
-            burdens = self.problem.lexicographic_costs({})
-            self.choose(burdens.index(min(burdens)))
+            costs = self.problem.lexicographic_costs({})
+            self.choose(costs.index(min(costs)))
             self.cycle = self.settings.cycles
         elif isinstance(self.settings, CycleSettings) and self.settings.anytime == "yes":
             self._anytime = Anytime(self.problem, self.order, self.settings.cycles)
@@ -189,10 +189,10 @@ class CycleProtocol(Protocol):
     def settle(self) -> None:
         """Execute all phases whose messages have arrived."""
         while self._then and not self._missing and self.verdict is None and not self._is_ahead:
-            heard = self.next_messages()
-            if heard is None:
+            arrived = self.next_messages()
+            if arrived is None:
                 return
-            messages = {name: message for name, message in heard if message is not None}
+            messages = {name: message for name, message in arrived if message is not None}
             then, self._then = self._then, None
             then(messages)
 
@@ -209,9 +209,9 @@ class CycleProtocol(Protocol):
 
     def multicast(self, names: Iterable[str], message: wire.Message) -> None:
         """Send the same message to several robots."""
-        said = [(name, message) for name in names]
-        self.outbox += said
-        self.checks_at_send += [self.problem.checks] * len(said)
+        sent = [(name, message) for name in names]
+        self.outbox += sent
+        self.checks_at_send += [self.problem.checks] * len(sent)
 
     def exchange_values(self, then: Then) -> None:
         """Send this robot's value to all neighbours, wait for theirs, then call `then`."""

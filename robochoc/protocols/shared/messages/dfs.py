@@ -37,7 +37,7 @@ class Token(Message, frozen=True):
 
     visited: Visited
 
-    act = Act(Performative.REQUEST, "the receiver is to go on with the tree")
+    act = Act(Performative.REQUEST, "the receiver continues the tree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
@@ -49,7 +49,7 @@ class Back(Message, frozen=True):
 
     visited: Visited
 
-    act = Act(Performative.INFORM, "what `Token` asked for is done")
+    act = Act(Performative.INFORM, "the request of `Token` is done")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
