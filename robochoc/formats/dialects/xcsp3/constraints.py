@@ -1,8 +1,8 @@
-"""The constraint kinds of XCSP3-core, each as what we have: small predicates where it can be split, else tables.
+"""Translate the constraints of XCSP3-core, other than tables and scheduling, to predicates with small scopes.
 
-What a kind means is told in "XCSP3-core" (Boussemart, Lecoutre, Audemard, Piette, arXiv 2009.00514). A split is exact:
-it has the same solutions, and no further variables. All of them are over few variables where that can be had, as what
-a protocol pays for is the size of scopes.
+The meaning of each constraint is defined in "XCSP3-core" (Boussemart, Lecoutre, Audemard, Piette, arXiv 2009.00514). A
+translation has the same solutions. It splits a constraint into predicates over few variables if possible, since the
+work of a protocol grows with the size of scopes. Only large `circuit` constraints get auxiliary variables.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from robochoc.formats.dialects.xcsp3.variables import lists, values_of
 from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Name, names
 
 Vector = tuple[Expression, ...]
-"""The members of a list, compared as a whole."""
+"""The members of a list that is compared as a unit."""
 Row = tuple[int, ...]
-"""Values of a vector of the same length."""
+"""The values of a vector."""
 _PLACES = "the place of a node on the circle of a <circuit>"
 _START = "the first node on the circle of a <circuit>"
 ORDERS = ("lt", "le", "ge", "gt")
 
 
 def intension(element: Element, posting: Posting) -> None:
-    """A Boolean expression is true."""
+    """Post that a Boolean expression is true."""
     text = element.text("function") if element.has("function") else element.text()
     posting.post(posting.expression(text))
 
 
 def all_different(element: Element, posting: Posting) -> None:
-    """All values of a list differ, or lists do; of a matrix those of each row and each column."""
+    """Post that all values of a list differ, or all lists, or the values of each row and column of a matrix."""
     if element.has("matrix"):
         rows = [as_integers(posting.item(word) for word in row) for row in element.matrix("matrix")]
         groups = [vectors_of([group]) for group in (*rows, *map(list, zip(*rows, strict=True)))]
@@ -61,7 +61,7 @@ def all_different(element: Element, posting: Posting) -> None:
 
 
 def all_equal(element: Element, posting: Posting) -> None:
-    """All values of a list are equal, or all lists are."""
+    """Post that all values of a list are equal, or all lists."""
     members = vectors(element, posting)
     excepted = excepted_rows(element, [members])
     for one, other in itertools.combinations(members, 2) if excepted else itertools.pairwise(members):
@@ -69,7 +69,7 @@ def all_equal(element: Element, posting: Posting) -> None:
 
 
 def ordered(element: Element, posting: Posting) -> None:
-    """Values of a list follow each other in an order, with given distances; lists follow in the lexicographic order."""
+    """Post that values of a list are ordered, at given distances, or that lists are in lexicographic order."""
     operator = order_of(element)
     members = vectors(element, posting)
     if not element.has("lengths") or any(len(member) > 1 for member in members):
@@ -77,13 +77,14 @@ def ordered(element: Element, posting: Posting) -> None:
         return
     lengths = as_integers(items(element.words("lengths"), posting))
     if len(lengths) != len(members) - 1:
-        raise MistakeError(f"{len(lengths)} lengths for {len(members)} values", f"write {len(members) - 1} lengths")
+        what = f"<ordered> has {len(lengths)} lengths for {len(members)} values"
+        raise MistakeError(what, f"write {len(members) - 1} lengths")
     for ((one,), (other,)), length in zip_equal(list(itertools.pairwise(members)), lengths):
         posting.post(compare(operator, plus(one, length), other))
 
 
 def lex(element: Element, posting: Posting) -> None:
-    """Lists follow each other in the lexicographic order; of a matrix rows and columns do."""
+    """Post that lists, or the rows and the columns of a matrix, are in lexicographic order."""
     operator = order_of(element)
     if element.has("matrix"):
         rows = [tuple(as_integers(posting.item(word) for word in row)) for row in element.matrix("matrix")]
@@ -98,12 +99,12 @@ def lex(element: Element, posting: Posting) -> None:
 
 
 def sum_of(element: Element, posting: Posting) -> None:
-    """A condition on a sum of products."""
+    """Post a condition on a sum of products."""
     posting.post(posting.condition(element.text("condition")).on(weighted(element, posting)))
 
 
 def weighted(element: Element, posting: Posting) -> Expression:
-    """Return the sum that `<list>` and `<coeffs>` mean."""
+    """Return the sum of the members of `<list>`, multiplied by `<coeffs>`."""
     members = as_integers(items(element.words("list"), posting))
     if not element.has("coeffs"):
         return total(members)
@@ -112,7 +113,7 @@ def weighted(element: Element, posting: Posting) -> Expression:
 
 
 def count(element: Element, posting: Posting) -> None:
-    """A condition on how many of a list have one of some values."""
+    """Post a condition on the number of members of a list with one of the given values."""
     members = as_integers(items(element.words("list"), posting))
     values = [posting.item(word) for word in element.words("values")]
     hits = [as_integer(_one_of(member, values)) for member in members]
@@ -120,7 +121,7 @@ def count(element: Element, posting: Posting) -> None:
 
 
 def n_values(element: Element, posting: Posting) -> None:
-    """A condition on how many different values a list has, or how many lists differ."""
+    """Post a condition on the number of different values of a list, or of different lists."""
     members = vectors(element, posting)
     excepted = excepted_rows(element, [members])
     posting.post(posting.condition(element.text("condition")).on(_distinct(members, excepted)))
@@ -132,7 +133,7 @@ def distinct(members: Sequence[Expression]) -> Expression:
 
 
 def _distinct(members: Sequence[Vector], excepted: Sequence[Row]) -> Expression:
-    """Return the number of different `members` that are not `excepted`: each counts unless an earlier one is equal."""
+    """Return the number of different `members` outside `excepted`: each counts unless an earlier one is equal."""
     _limit_pairs(members)
     first = []
     for number, member in enumerate(members):
@@ -144,7 +145,7 @@ def _distinct(members: Sequence[Vector], excepted: Sequence[Row]) -> Expression:
 
 
 def cardinality(element: Element, posting: Posting) -> None:
-    """How often each of some values occurs in a list."""
+    """Post conditions on the number of occurrences of each of the given values in a list."""
     members = as_integers(items(element.words("list"), posting))
     values = [posting.term(word) for word in element.words("values")]
     for value, word in zip_equal(values, element.words("occurs"), what="<values> and <occurs>"):
@@ -159,7 +160,7 @@ def cardinality(element: Element, posting: Posting) -> None:
 
 
 def extremum(operator: str) -> Callable[[Element, Posting], None]:
-    """Return the kind: a condition on the least, or the greatest, value of a list, and perhaps on its place."""
+    """Return the function for a condition on the least or greatest value of a list, or on its index, or on both."""
     easy = {"max": {"lt", "le"}, "min": {"gt", "ge"}}[operator]
 
     def post(element: Element, posting: Posting) -> None:
@@ -180,7 +181,7 @@ def extremum(operator: str) -> Callable[[Element, Posting], None]:
 
 
 def place_of_extremum(operator: str) -> Callable[[Element, Posting], None]:
-    """Return the kind: a condition on the place of the least, or the greatest, value of a list."""
+    """Return the function for a condition on the index of the least or greatest value of a list."""
 
     def post(element: Element, posting: Posting) -> None:
         members = as_integers(items(element.only_list(), posting))
@@ -191,18 +192,18 @@ def place_of_extremum(operator: str) -> Callable[[Element, Posting], None]:
 
 
 def best(operator: str, members: Sequence[Expression]) -> Expression:
-    """Return the least, or the greatest, of some integers. Raises `MistakeError` where there are none."""
+    """Return the least or greatest of `members`. Raises `MistakeError` if there are none."""
     if not members:
-        raise MistakeError("the extremum of an empty list", "name its members")
+        raise MistakeError("the list of a minimum or maximum is empty", "name its members")
     return members[0] if len(members) == 1 else Apply(operator, tuple(members))
 
 
 def _post_place(
     operator: str, members: Sequence[Expression], condition: Xcsp3Condition, start: int, rank: str, posting: Posting
 ) -> None:
-    """Post that `condition` holds for a place of the extremum: any of them, the first or the last one."""
+    """Post that `condition` holds for an index of the extremum: for any, for the first, or for the last one."""
     if rank not in {"", "any", "first", "last"}:
-        raise MistakeError(f'rank="{shortened(rank)}"', "expected any, first or last")
+        raise MistakeError(f'rank="{shortened(rank)}" is not valid', "write any, first or last")
     weak, strict = {"max": ("ge", "gt"), "min": ("le", "lt")}[operator]
 
     def beats(here: int, there: int) -> Expression:
@@ -227,12 +228,15 @@ def _post_place(
 
 
 def channel(element: Element, posting: Posting) -> None:
-    """Two lists are inverse functions: `x[i] = j` if and only if `y[j] = i`; or one list has a single 1, at a value."""
+    """Post that two lists are inverse functions, or that the only 1 of a list is at the index `<value>`.
+
+    Two lists `x` and `y` are inverse functions if `x[i] = j` exactly where `y[j] = i`.
+    """
     both = [as_integers(items(words, posting)) for words in element.lists()]
     starts = [first_index(one) for one in element.view.children("list")] or [0]
     if element.has("value"):
         if len(both) > 1:
-            raise MistakeError("a <channel> of two lists with a <value>", "write one <list>")
+            raise MistakeError("<channel> has two lists and a <value>", "write one <list>")
         (members,), (start,) = both, starts
         chosen = posting.term(element.text("value"))
         posting.post(is_one_of(chosen, range(start, start + len(members))))
@@ -241,10 +245,10 @@ def channel(element: Element, posting: Posting) -> None:
             posting.post(is_one_of(member, (0, 1)))
         return
     if len(both) > 2:  # noqa: PLR2004 - one for each direction
-        raise MistakeError(f"a <channel> of {len(both)} lists", "write one or two")
+        raise MistakeError(f"<channel> has {len(both)} lists", "write one or two lists")
     here, there = both[0], both[-1]
     if len(here) > len(there):
-        raise MistakeError("a <channel> whose first list is the longer one", "exchange the lists")
+        raise MistakeError("the first list of <channel> is longer than the second", "exchange the lists")
     first, second = starts[0], starts[-1]
     for member in here:
         posting.post(is_one_of(member, range(second, second + len(there))))
@@ -257,7 +261,7 @@ def channel(element: Element, posting: Posting) -> None:
 
 
 def instantiation(element: Element, posting: Posting) -> None:
-    """Variables have given values."""
+    """Post that variables have given values."""
     members, values = items(element.words("list"), posting), element.words("values")
     for member, word in zip_equal(members, values, what="<list> and <values>"):
         if word != "*":
@@ -265,12 +269,12 @@ def instantiation(element: Element, posting: Posting) -> None:
 
 
 def clause(element: Element, posting: Posting) -> None:
-    """One of some literals is true."""
+    """Post that at least one literal is true."""
     posting.post(disjunction([as_boolean(member) for member in items(element.only_list(), posting)]))
 
 
 def precedence(element: Element, posting: Posting) -> None:
-    """Each of some values occurs in a list only behind the value before it."""
+    """Post that each of the given values occurs in a list only after the value before it."""
     members = as_integers(items(element.only_list(), posting))
     if element.has("values"):
         numbers = values_of(element.words("values"))
@@ -287,20 +291,21 @@ def precedence(element: Element, posting: Posting) -> None:
 
 
 def knapsack(element: Element, posting: Posting) -> None:
-    """Conditions on the weight and on the profit of a list of numbers."""
+    """Post conditions on the weight and on the profit of a list of numbers."""
     members = as_integers(items(element.words("list"), posting))
     conditions = [posting.condition(text) for text in element.texts("condition")]
     if element.has("limit"):
         conditions.insert(0, Xcsp3Condition("le", posting.term(element.text("limit"))))
     if len(conditions) != 2:  # noqa: PLR2004 - of weight and profit
-        raise MistakeError(f"a <knapsack> with {len(conditions)} conditions", "write one for weights, one for profits")
+        what = f"<knapsack> has {len(conditions)} conditions"
+        raise MistakeError(what, "write one condition for weights and one for profits")
     for kind, condition in zip(("weights", "profits"), conditions, strict=True):
         factors = [posting.term(word) for word in element.words(kind)]
         posting.post(condition.on(total(_products(factors, members, f"<{kind}> and <list>"))))
 
 
 def bin_packing(element: Element, posting: Posting) -> None:
-    """Conditions on the load of each bin."""
+    """Post conditions on the load of each bin."""
     bins = as_integers(items(element.words("list"), posting))
     sizes = [posting.term(word) for word in element.words("sizes")]
     start = element.start()
@@ -318,17 +323,17 @@ def bin_packing(element: Element, posting: Posting) -> None:
 
 
 def _conditions_of_bins(element: Element, posting: Posting) -> list[Xcsp3Condition]:
-    """Return the condition on the load of each bin, in their order."""
+    """Return the condition on the load of each bin, in the order of the bins."""
     if element.has("conditions"):
         return posting.conditions(element.text("conditions"))
     for kind, operator in (("limits", "le"), ("loads", "eq")):
         if element.has(kind):
             return [Xcsp3Condition(operator, posting.term(word)) for word in element.words(kind)]
-    raise MistakeError("a <binPacking> without a condition", "write <condition>, <conditions>, <limits> or <loads>")
+    raise MistakeError("<binPacking> has no condition", "write <condition>, <conditions>, <limits> or <loads>")
 
 
 def circuit(element: Element, posting: Posting) -> None:
-    """The values of a list are successors: all nodes but those that follow themselves lie on one circle."""
+    """Post that the values of a list are successors of nodes on one circle, except nodes that follow themselves."""
     scope = items(element.only_list(), posting)
     starts = [first_index(one) for one in element.view.children("list")] or [0]
     size = Xcsp3Condition("eq", posting.term(element.text("size"))) if element.has("size") else None
@@ -348,7 +353,7 @@ def circuit(element: Element, posting: Posting) -> None:
 
 
 def _circle(successors: Sequence[int]) -> int:
-    """Return the length of the one circle among `successors`; 0 where there is none, or several."""
+    """Return the length of the only circle in `successors`; 0 if there is none, or several."""
     places = range(len(successors))
     moving = [place for place in places if successors[place] != place]
     if not moving or any(value not in places for value in successors):
@@ -362,10 +367,10 @@ def _circle(successors: Sequence[int]) -> int:
 
 
 def _post_with_places(members: Sequence[Expression], start: int, size: Xcsp3Condition | None, posting: Posting) -> None:
-    """Post that `members`, which differ, have one circle, by auxiliary variables that they determine.
+    """Post that `members`, which all differ, have one circle, with auxiliary variables determined by them.
 
     These are the place of each node on the circle, counted from its first node (0 for nodes that follow themselves),
-    and that first node, unless all circles have the same one.
+    and this first node, unless it is the same for all circles.
     """
     nodes = range(start, start + len(members))
     values = {node: set(posting.domain(member)) & set(nodes) for node, member in zip(nodes, members, strict=True)}
@@ -400,29 +405,29 @@ def _post_with_places(members: Sequence[Expression], start: int, size: Xcsp3Cond
 
 
 def _compare(operator: str, expression: Expression, value: int) -> Expression:
-    """Return a comparison with `value`; TRUE or FALSE where `expression` is a constant, too."""
+    """Return a comparison with `value`; TRUE or FALSE if `expression` is a constant."""
     if isinstance(expression, Constant):
         return TRUE if OPERATORS[operator].meaning(expression.value, value) else FALSE
     return compare(operator, expression, Constant(value))
 
 
 def vectors(element: Element, posting: Posting) -> list[Vector]:
-    """Return the members that a constraint compares: those of its only list, one by one, or several lists as wholes."""
+    """Return the vectors that a constraint compares: the single members of its only list, or several lists."""
     return vectors_of([as_integers(items(words, posting)) for words in element.lists()])
 
 
 def vectors_of(lists: Sequence[Sequence[Expression]]) -> list[Vector]:
-    """Return the members of the only list, one by one, or several lists as wholes. Raises `MistakeError`."""
+    """Return the single members of the only list, or several lists, as vectors. Raises `MistakeError`."""
     if len(lists) == 1:
         return [(member,) for member in lists[0]]
     found: list[Vector] = list(zip(*zip_equal(*lists), strict=True))
     if not found:
-        raise MistakeError("empty lists", "name their members")
+        raise MistakeError("the lists are empty", "name their members")
     return found
 
 
 def excepted_rows(element: Element, groups: Sequence[Sequence[Vector]]) -> list[Row]:
-    """Return the rows of values that `<except>` names. Raises `MistakeError`."""
+    """Return the rows of values in `<except>`. Raises `MistakeError`."""
     if not element.has("except"):
         return []
     width = max((len(member) for group in groups for member in group), default=1)
@@ -434,22 +439,22 @@ def excepted_rows(element: Element, groups: Sequence[Sequence[Vector]]) -> list[
     )
     for row in rows:
         if len(row) != width:
-            raise MistakeError(f"{len(row)} values in <except>", f"write tuples of {width} values")
+            raise MistakeError(f"a tuple in <except> has {len(row)} values", f"write tuples of {width} values")
     return rows
 
 
 def same(one: Vector, other: Vector) -> Expression:
-    """Return the expression that two rows have the same values."""
+    """Return an expression that is true if two vectors are equal."""
     return conjunction([compare("eq", *pair) for pair in zip(one, other, strict=True)])
 
 
 def differ(one: Vector, other: Vector) -> Expression:
-    """Return the expression that two rows have different values."""
+    """Return an expression that is true if two vectors differ."""
     return disjunction([compare("ne", *pair) for pair in zip(one, other, strict=True)])
 
 
 def items(words: Iterable[str], posting: Posting) -> list[Item]:
-    """Return what the words of a list stand for."""
+    """Return the members named by the words of a list."""
     return [posting.item(word) for word in words]
 
 
@@ -462,16 +467,16 @@ def order_of(element: Element) -> str:
     """Return the operator of an ordered constraint. Raises `MistakeError`."""
     operator = element.text("operator")
     if operator not in ORDERS:
-        raise MistakeError(f"the operator '{shortened(operator)}'", f"expected one of {' '.join(ORDERS)}")
+        raise MistakeError(f"the operator '{shortened(operator)}' is not valid", f"write one of {' '.join(ORDERS)}")
     return operator
 
 
 def _limit_pairs(members: Sequence[object]) -> None:
-    """Raise `MistakeError` where one expression over all pairs of `members` would be too large, before it is built."""
+    """Raise `MistakeError` if one expression over all pairs of `members` would be too large, before it is built."""
     pairs = len(members) * (len(members) - 1) // 2
     if pairs > MAX_NODES:
-        message = f"a constraint that compares {len(members):,} members of a list in pairs"
-        raise MistakeError(message, f"{pairs:,} comparisons exceed the limit of {MAX_NODES:,}: split it")
+        message = f"the constraint compares {len(members):,} members of a list in pairs: {pairs:,} comparisons"
+        raise MistakeError(message, f"split it into constraints of at most {MAX_NODES:,} comparisons")
 
 
 def _products(factors: Sequence[Expression], members: Sequence[Expression], what: str) -> list[Expression]:
@@ -479,7 +484,7 @@ def _products(factors: Sequence[Expression], members: Sequence[Expression], what
 
 
 def _is_one_of(member: Vector, rows: Sequence[Row]) -> list[Expression]:
-    """Return the cases in which `member` is one of `rows`, one expression for each."""
+    """Return expressions of which one is true if `member` is one of `rows`."""
     if len(member) == 1:
         return [is_one_of(member[0], [value for (value,) in rows])] if rows else []
     return [same(member, tuple(map(Constant, row))) for row in rows]
@@ -489,7 +494,7 @@ def _one_of(member: Expression, values: Sequence[Expression]) -> Expression:
     constants = [value.value for value in values if isinstance(value, Constant)]
     others = [compare("eq", member, value) for value in values if isinstance(value, Name)]
     if len(constants) + len(others) != len(values):
-        raise MistakeError("an expression among values", "write integers or variables")
+        raise MistakeError("the values contain an expression", "write integers or variables")
     return disjunction([*([is_one_of(member, constants)] if constants else []), *others])
 
 
@@ -499,14 +504,14 @@ def _sum_with_constants(parts: Sequence[Expression]) -> Expression:
 
 
 def _post_chain(operator: str, members: Sequence[Vector], posting: Posting) -> None:
-    """Post that `members` follow each other in the lexicographic order."""
+    """Post that `members` are in lexicographic order."""
     for one, other in itertools.pairwise(members):
         posting.post(_lexicographic(operator, list(zip_equal(one, other))))
 
 
 def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]) -> Expression:
     if not pairs:
-        raise MistakeError("an empty list", "name its members")
+        raise MistakeError("a list is empty", "name its members")
     _limit_pairs(pairs)
     strict = {"le": "lt", "ge": "gt"}.get(operator, operator)
     *before, last = pairs
@@ -519,5 +524,5 @@ def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]
 
 
 def rows_of(text: str) -> list[list[str]]:
-    """Return the words of lists in parentheses, without blanks."""
+    """Return the words of each list in parentheses, without blanks."""
     return [[word.strip() for word in row] for row in lists(text)]

@@ -1,4 +1,4 @@
-"""The objective of an XCSP3 instance, split into one cost function for each scope of its terms."""
+"""Translate the objective of an XCSP3 instance, split into one cost function for each scope of its terms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.formats.element_view import ElementView
 from robochoc.model.expression import Apply, Constant, Expression, names
 
 MAX_TOGETHER = 10_000
-"""The extremum, or the number of values, of a list with more combinations of values gets auxiliary variables."""
+"""The combinations of values of a list from which on its extremum or number of values gets auxiliary variables."""
 
 _BOUND = "the bound that the objective minimises or maximises"
 _USED = "whether a value is used; the objective minimises the number of used values"
@@ -22,10 +22,10 @@ _NEW = "whether a variable has a value that no variable before it has; the objec
 
 
 def post_objective(objectives: ElementView, posting: Posting) -> bool:
-    """Post the costs that `<objectives>` asks to minimise or to maximise. Return whether to maximise.
+    """Post the costs in `<objectives>`. Return whether they are maximised.
 
     Raises:
-        MistakeError: if there are several, or one that is not supported.
+        MistakeError: if there are several objectives, or an unsupported one.
     """
     ignore_remarks(objectives)
     view = objectives.one_of("minimize", "maximize")
@@ -43,7 +43,7 @@ def post_objective(objectives: ElementView, posting: Posting) -> bool:
 
 
 def _bounded_by(worst: Apply, posting: Posting) -> Expression:
-    """Return a variable that is no better than any argument of `worst`, and in the best solution equal to it."""
+    """Return a variable no better than any argument of `worst`, and equal to `worst` in an optimal solution."""
     values: set[int] = set()
     for member in worst.arguments:
         values.update(posting.values_of(member))
@@ -54,7 +54,7 @@ def _bounded_by(worst: Apply, posting: Posting) -> Expression:
 
 
 def _objective(element: Element, posting: Posting, *, maximize: bool) -> Expression:
-    """Return what is minimised or maximised, as one expression."""
+    """Return the objective as one expression."""
     kind = element.attribute("type") or "expression"
     if kind == "expression":
         return as_integer(posting.term(element.text()))
@@ -62,7 +62,7 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
         return weighted(element, posting)
     members = as_integers(items(element.only_list(), posting))
     if not members:
-        raise MistakeError("an objective without variables", "name them")
+        raise MistakeError("the objective has no variables", "name them")
     match kind:
         case "sum":
             return total(members)
@@ -77,9 +77,9 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
 
 
 def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximize: bool) -> Expression:
-    """Return the number of different values of `members`; of many, as a sum of auxiliary variables.
+    """Return the number of different values of `members`; for many members, as a sum of auxiliary variables.
 
-    In an optimal solution the sum equals that number; in other solutions the sum is no better.
+    In an optimal solution the sum equals this number; in other solutions the sum is no better.
     """
     if posting.size({name for member in members for name in names(member)}) <= MAX_TOGETHER:
         return distinct(members)
@@ -108,9 +108,9 @@ def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximi
 
 
 def split(expression: Expression) -> list[Expression]:
-    """Return terms whose sum is `expression`, one for each set of variables of its terms.
+    """Split `expression` into a sum of terms, one for each set of variables.
 
-    The last one is the sum of the terms without variables.
+    The last term is the sum of the terms without variables, if there are any.
     """
     by_scope: dict[frozenset[str], list[Expression]] = {}
     for factor, term in _terms(as_integer(expression), 1):

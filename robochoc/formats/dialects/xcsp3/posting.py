@@ -1,4 +1,4 @@
-"""What has been read so far of an instance: constraints and costs over its variables."""
+"""The constraints and costs read from an instance, over the variables of the team."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ MAX_NODES = 9_000
 MAX_NESTING = 60
 """The maximum depth of the expression of one constraint."""
 MAX_ENUMERATED = 200_000
-"""The maximum number of combinations of values that a constraint is tried on to make it a table."""
+"""The maximum number of combinations of values of a constraint that is tabulated by enumeration."""
 MAX_COST_ENUMERATED = 1_000_000
-"""The maximum number of combinations of values of the variables of one cost."""
+"""The maximum number of combinations of values of the variables of one cost function."""
 MAX_WORK = 5_000_000
-"""The maximum number of all operators, terms and values of an instance."""
+"""The maximum number of operators, terms and values of an instance."""
 
 Test = Callable[[Sequence[int]], bool]
 Item = Expression
@@ -57,7 +57,7 @@ Item = Expression
 
 
 class Auxiliary(NamedTuple):
-    """A variable that is not in the instance: its values, its purpose, and the variable whose robot owns it, if any."""
+    """A variable that is not in the instance; `same_robot_as` is a variable whose robot owns it, if any."""
 
     values: tuple[int, ...]
     purpose: str
@@ -66,20 +66,20 @@ class Auxiliary(NamedTuple):
 
 @dataclass
 class Posting:
-    """The variables of an instance, and what has been posted on them.
+    """The variables of an instance, and the constraints and costs posted on them.
 
     Attributes:
-        variables: The variables as they are declared.
-        values: The values of each variable, ascending; of a symbolic one the places in `symbols`.
-        symbols: All symbols of the instance.
-        names: Our name of each variable.
-        constraints: The constraints, over our names.
-        costs: The costs, over our names.
+        variables: The variables as declared.
+        values: The values of each variable, ascending; for a symbolic variable, the indexes in `symbols`.
+        symbols: All symbols of the instance, with their indexes.
+        names: The name in the team of each variable.
+        constraints: The constraints, over names in the team.
+        costs: The cost functions, over names in the team.
         constant: The constant part of the costs.
-        auxiliaries: Auxiliary variables, which are not in the instance, by our names.
-        line: The line of the element that is read.
-        title: The name of the constraint that is read.
-        work: The operators, terms and values so far.
+        auxiliaries: The auxiliary variables, which are not in the instance, by their names in the team.
+        line: The line of the current element.
+        title: The name of the current constraint.
+        work: The number of operators, terms and values so far.
     """
 
     variables: Variables
@@ -102,7 +102,7 @@ class Posting:
     # Terms
 
     def leaf(self, word: str) -> tuple[Expression, bool]:
-        """Return the variable, integer or symbol that a word stands for, and whether it is symbolic."""
+        """Return the variable, integer or symbol named by a word, and whether it is symbolic."""
         if word in self.names:
             return Name(self.names[word]), self.variables.is_symbolic(word)
         if word in self.symbols:
@@ -112,16 +112,17 @@ class Posting:
         raise MistakeError(f"there is no variable '{shortened(word)}'", suggestion(word, self.names, "variables"))
 
     def term(self, word: str) -> Expression:
-        """Return the expression, variable or integer that a word stands for."""
+        """Return the expression, variable or integer in a word. Raises `MistakeError` for a symbol."""
         if "(" in word:
             return self.expression(word)
         found, is_symbolic = self.leaf(word)
         if is_symbolic:
-            raise MistakeError(f"the symbolic '{shortened(word)}'", "symbols stand in tables, eq, ne, in, allDifferent")
+            what = f"'{shortened(word)}' is symbolic"
+            raise MistakeError(what, "use symbols only in tables, eq, ne, in and allDifferent")
         return found
 
     def item(self, word: str) -> Expression:
-        """Return what a word stands for, which may be symbolic, too."""
+        """Return the expression, variable, integer or symbol in a word."""
         return self.expression(word) if "(" in word else self.leaf(word)[0]
 
     def expression(self, text: str) -> Expression:
@@ -137,34 +138,35 @@ class Posting:
         return read_conditions(text, self.term, MAX_VALUES)
 
     def domain(self, item: Expression) -> Sequence[int]:
-        """Return the values that a variable or an integer may have. Raises `MistakeError` for an expression."""
+        """Return the possible values of a variable or an integer. Raises `MistakeError` for an expression."""
         match item:
             case Constant(value):
                 return (value,)
             case Name(name):
                 return self._values(name)
             case _:
-                raise MistakeError("an expression where a variable or an integer should stand", "use a variable")
+                raise MistakeError("expected a variable or an integer, found an expression", "use a variable")
 
     def values_of(self, expression: Expression) -> Sequence[int]:
-        """Return integers among which all values of `expression` are. Raises `MistakeError` for too many."""
+        """Return integers that include all values of `expression`. Raises `MistakeError` for too many."""
         if not isinstance(expression, Apply):
             return self.domain(expression)
         limits = {name: Interval(min(self._values(name)), max(self._values(name))) for name in names(expression)}
         low, high = bounds(expression, limits)
         if high - low >= MAX_VALUES:
-            raise MistakeError(f"an expression from {low:,} to {high:,}", f"{MAX_VALUES:,} values are supported")
+            what = f"the values of an expression are from {low:,} to {high:,}"
+            raise MistakeError(what, f"use an expression of at most {MAX_VALUES:,} values")
         return range(int(low), int(high) + 1)
 
     def is_symbolic(self, name: str) -> bool:
-        """Return whether the values of our variable `name` are symbols."""
+        """Return whether the values of the team's variable `name` are symbols."""
         return name in self._original and self.variables.is_symbolic(self._original[name])
 
     def add_variable(self, name: str, values: Iterable[int], purpose: str, same_robot_as: str | None = None) -> Name:
         """Return a new auxiliary variable.
 
         Args:
-            name: The name of the variable; a suffix is added if it is not free.
+            name: The name of the variable; a suffix is added if the name is in use.
             values: The values of the variable.
             purpose: The purpose of the variable, for messages.
             same_robot_as: The name in the team of a variable; its robot owns the new variable. None: a new robot does.
@@ -174,9 +176,10 @@ class Posting:
         """
         found = tuple(sorted(set(values)))
         if len(found) > MAX_VALUES:
-            raise MistakeError(f"an auxiliary variable of {len(found):,} values", f"{MAX_VALUES:,} are supported")
+            what = f"an auxiliary variable has {len(found):,} values"
+            raise MistakeError(what, f"use domains of at most {MAX_VALUES:,} values")
         if len(self.auxiliaries) == MAX_VARIABLES:
-            raise MistakeError(f"more than {MAX_VARIABLES:,} auxiliary variables", "import a smaller problem")
+            raise MistakeError(f"there are more than {MAX_VARIABLES:,} auxiliary variables", "import a smaller problem")
         while name in self._original or name in self.auxiliaries:
             name += "_"
         self.auxiliaries[name] = Auxiliary(found, purpose, same_robot_as)
@@ -186,13 +189,13 @@ class Posting:
         return self.auxiliaries[name].values if name in self.auxiliaries else self.values[self._original[name]]
 
     def size(self, items: Iterable[str]) -> int:
-        """Return the number of combinations of values of variables."""
+        """Return the number of combinations of values of the variables `items`."""
         return math.prod(len(self._values(name)) for name in items)
 
     # Constraints
 
     def post(self, expression: Expression) -> None:
-        """Post that a Boolean or an integer expression is true. A conjunction is posted part by part."""
+        """Post that a Boolean or an integer expression is true. The parts of a conjunction are posted one by one."""
         for part in _conjuncts(as_boolean(expression)):
             self._check_size(part)
             scope = names(part)
@@ -206,14 +209,14 @@ class Posting:
     def post_table(self, scope: Sequence[Item], rows: Iterable[Sequence[int]], *, allowed: bool) -> None:
         """Post that `scope` has one of the values in `rows`, or none of them."""
         if any(isinstance(item, Apply) for item in scope):
-            raise MistakeError("an expression in the scope of a table", "use variables and integers")
+            raise MistakeError("the scope of a table contains an expression", "use variables and integers")
         own = [item.name for item in scope if isinstance(item, Name)]
         if len(own) != len(scope) or len(set(own)) != len(own):
             own = list(dict.fromkeys(own))
             rows = _matching_rows(scope, own, rows)
         found = tuple(sorted({tuple(row) for row in rows}))
         if len(found) > MAX_TUPLES:
-            raise MistakeError(f"a table of {len(found):,} tuples", f"{MAX_TUPLES:,} are allowed")
+            raise MistakeError(f"the table has {len(found):,} tuples", f"use at most {MAX_TUPLES:,} tuples")
         if not own:
             self.post(TRUE if bool(found) == allowed else FALSE)
             return
@@ -228,11 +231,11 @@ class Posting:
         self._add(relation, own)
 
     def post_enumerated(self, kind: str, scope: Sequence[Item], test: Test) -> None:
-        """Post what `test` says of the values of `scope`, which are all tried."""
+        """Post the table of all combinations of values of `scope` for which `test` returns True."""
         own = list(dict.fromkeys(name for item in scope for name in names(item)))
         if self.size(own) > MAX_ENUMERATED:
             message = f"<{kind}> has {readable_number(self.size(own))} combinations of values"
-            raise MistakeError(message, f"it becomes a table of at most {MAX_ENUMERATED:,}")
+            raise MistakeError(message, f"use at most {MAX_ENUMERATED:,}, since it becomes a table")
         domains = [self.domain(Name(name)) for name in own]
         place = {name: index for index, name in enumerate(own)}
 
@@ -242,7 +245,7 @@ class Posting:
         self.post_table([Name(name) for name in own], filter(holds, itertools.product(*domains)), allowed=True)
 
     def post_cost(self, expression: Expression) -> None:
-        """Post that an integer expression is a part of the costs."""
+        """Add an integer expression to the costs."""
         expression = as_integer(expression)
         self._check_size(expression)
         scope = names(expression)
@@ -254,10 +257,8 @@ class Posting:
                 self.constant += value
             return
         if self.size(scope) > MAX_COST_ENUMERATED:
-            message = (
-                f"the cost of {len(scope)} variables together has {readable_number(self.size(scope))} combinations"
-            )
-            raise MistakeError(message, f"at most {MAX_COST_ENUMERATED:,} are supported; a sum is split into its terms")
+            message = f"a cost of {len(scope)} variables has {readable_number(self.size(scope))} combinations of values"
+            raise MistakeError(message, f"use at most {MAX_COST_ENUMERATED:,}, or a sum, which is split into its terms")
         formal, body = self._with_formals(expression, scope)
         function = self._shared(("function", body), lambda name: Function(name, formal, body), "f")
         self.costs.append(Constraint(self.title, function, scope, scope, line=self.line))
@@ -272,14 +273,14 @@ class Posting:
         return tuple(formal.values()), rename_variables(expression, formal)
 
     def _shared(self, key: object, make: Callable[[str], Definition], letter: str) -> Definition:
-        """Return the definition for `key`: constraints that say the same share one."""
+        """Return the definition for `key`, which equal constraints share."""
         if key not in self._definitions:
             self._definitions[key] = make(f"{letter}{len(self._definitions)}")
         return self._definitions[key]
 
     def _add(self, definition: Definition, scope: Sequence[str]) -> None:
         if len(self.constraints) == MAX_CONSTRAINTS:
-            raise MistakeError(f"more than {MAX_CONSTRAINTS:,} constraints", "import a smaller problem")
+            raise MistakeError(f"there are more than {MAX_CONSTRAINTS:,} constraints", "import a smaller problem")
         self.constraints.append(Constraint(self.title, definition, tuple(scope), tuple(scope), line=self.line))
 
     def _check_size(self, expression: Expression) -> None:
@@ -292,33 +293,34 @@ class Posting:
                 waiting += [(argument, depth + 1) for argument in node.arguments]
         self._count_work(nodes)
         if nodes > MAX_NODES or deepest > MAX_NESTING:
-            message = f"a constraint of {nodes:,} operators and terms, {deepest} levels deep"
-            raise MistakeError(message, f"{MAX_NODES:,} and {MAX_NESTING} are allowed: split it")
+            message = f"the constraint has {nodes:,} operators and terms, {deepest} levels deep"
+            raise MistakeError(message, f"split it: use at most {MAX_NODES:,}, at most {MAX_NESTING} levels deep")
 
     def _count_work(self, work: int) -> None:
         self.work += work
         if self.work > MAX_WORK:
-            raise MistakeError(f"the problem has more than {MAX_WORK:,} operators and values", "import a smaller one")
+            what = f"the problem has more than {MAX_WORK:,} operators and values"
+            raise MistakeError(what, "import a smaller problem")
 
 
 def _constant(expression: Expression) -> int | None:
-    """Return the value of an expression without variables, if it has one. Raises `MistakeError` beyond 64 bits."""
+    """Return the value of an expression without variables, None if undefined. Raises `MistakeError` beyond 64 bits."""
     try:
         return evaluate(expression, {})
     except ExcessiveValueError:
-        message = f"the constant '{shortened(expression_text(expression))}' lies beyond the limit of 2^63"
+        message = f"the constant '{shortened(expression_text(expression))}' is beyond the limit of 2^63"
         raise MistakeError(message, "use smaller numbers") from None
     except UndefinedValueError:
         return None
 
 
 def readable_number(number: int) -> str:
-    """Return a number as it may stand in a message, however large it is."""
+    """Return a number as text for a message, short even for very large numbers."""
     return f"{number:,}" if number < 10**15 else f"10^{int(number.bit_length() * 0.30103)}"
 
 
 def rename_variables(expression: Expression, names_for: Mapping[str, str]) -> Expression:
-    """Return `expression` with other names."""
+    """Return `expression` with each name replaced by the one in `names_for`."""
     match expression:
         case Name(name):
             return Name(names_for[name])
@@ -343,7 +345,7 @@ def _unsatisfiable(name: str) -> Expression:
 def _matching_rows(
     scope: Sequence[Item], own: Sequence[str], rows: Iterable[Sequence[int]]
 ) -> Iterator[tuple[int, ...]]:
-    """Yield `rows` as values of the variables `own`: those that fit the integers and the repetitions of `scope`."""
+    """Yield the values of the variables `own` in the rows that match the integers and repetitions in `scope`."""
     for row in rows:
         bound: dict[str, int] = {}
         for item, value in zip(scope, row, strict=True):

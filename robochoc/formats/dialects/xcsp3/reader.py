@@ -53,11 +53,11 @@ KINDS: Mapping[str, Kind] = {
     "noOverlap": scheduling.no_overlap,
     "cumulative": scheduling.cumulative,
 }
-"""What is read of XCSP3-core, besides `extension`; other kinds are refused by name."""
+"""The supported constraints of XCSP3-core, besides `extension`; others are refused by name."""
 
 _SYMBOLIC = {"intension", "extension", "allDifferent", "allEqual", "instantiation"}
 _WIDE = 4_000_000
-"""A constraint with more combinations of values than these is told: the central solver makes tables of no more."""
+"""The combinations of values from which on a constraint is reported: the central solver makes no larger tables."""
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
@@ -65,13 +65,14 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
 
     Args:
         paths: The file.
-        options: `owner` says which variables belong to one robot; without it each has a robot of its own.
+        options: The options; without `owner` each variable gets its own robot.
 
     Raises:
         InvalidInputError: with all mistakes and unsupported parts, each with its line.
     """
     if len(paths) != 1:
-        raise invalid_input(paths[0], f"{len(paths)} files", "an XCSP3 instance is one file: import them one by one")
+        what = f"and {len(paths) - 1} more: an XCSP3 instance is one file"
+        raise invalid_input(paths[0], what, "import one file at a time")
     (path,) = paths
     with open_xml(path, MAX_FILE, long_texts=True) as root:
         check_root(root)
@@ -87,7 +88,7 @@ def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imp
     symbols = {symbol: number for number, symbol in enumerate(variables.symbols)}
     domains = {name: domain_of(values, symbols, f"d_{ids[name]}") for name, values in variables.domains.items()}
     if sum(map(len, domains.values())) > 10 * MAX_VALUES:
-        raise MistakeError(f"domains with more than {10 * MAX_VALUES:,} values together", "make them smaller")
+        raise MistakeError(f"the domains have more than {10 * MAX_VALUES:,} values together", "use smaller domains")
     posting = Posting(variables, {name: tuple(domain) for name, domain in domains.items()}, symbols, ids)
     constraints = root.child("constraints")
     if constraints is not None:
@@ -146,7 +147,7 @@ class _ConstraintReader:
         arguments = group.children("args")
         template = self._template(group)
         if not arguments:
-            raise MistakeError("a <group> without <args>", "write the arguments of each constraint")
+            raise MistakeError("<group> has no <args>", "write <args> with the arguments of each constraint")
         for one in arguments:
             words = list(self.posting.variables.expand(one.text()))
             self._post(template.with_arguments(words))
@@ -178,7 +179,7 @@ class _ConstraintReader:
 
 
 def _names(variables: Variables) -> dict[str, str]:
-    """Return our name of each variable: `x_1_2` for `x[1][2]`, unless that is another one's."""
+    """Return the name in the team of each variable: `x_1_2` for `x[1][2]`, unless another variable has this name."""
     names = NameMap()
     plain = {name: names.allowed(name) for name in variables.domains if "[" not in name}
     for name in variables.domains:
@@ -198,21 +199,22 @@ def _robots(own: Mapping[str, Variable], owner: str | None, path: Path) -> dict[
         pattern = re.compile(owner) if owner is not None else None
     except re.error as error:
         raise invalid_input(
-            path, f"--owner {owner} is not a valid regular expression: {error}", "write x\\[(\\d+)\\]"
+            path, f"--owner {owner} is not a valid regular expression: {error}", "correct it: x\\[(\\d+)\\]"
         ) from None
     names = NameMap()
     robots: dict[str, list[Variable]] = {}
     for original, variable in own.items():
         match = pattern.search(original) if pattern else None
         if pattern and not match:
-            raise invalid_input(path, f"--owner {owner} fits no part of '{original}'", "let it fit all variables")
+            what = f"--owner {owner} does not match the variable '{original}'"
+            raise invalid_input(path, what, "use a regular expression that matches the name of every variable")
         word = variable.name if match is None else match[1] if match.re.groups and match[1] else match[0]
         robots.setdefault(names.allowed(word if word[:1].isalpha() else f"r{word}"), []).append(variable)
     return robots
 
 
 def _add_auxiliaries(robots: dict[str, list[Variable]], posting: Posting) -> None:
-    """Add auxiliary variables to the robots of the variables that they belong to; others get robots of their own."""
+    """Add auxiliary variables to the robots named by `same_robot_as`; others get their own robots."""
     owner = {variable.name: robot for robot, variables in robots.items() for variable in variables}
     for name, (values, _, same_robot_as) in posting.auxiliaries.items():
         domain = Domain(f"d_{name}", tuple(range(value, value + 1) for value in values))
@@ -243,7 +245,7 @@ def _notes(posting: Posting, root: ElementView, changed: Mapping[str, str]) -> l
                 ConversionNote("auxiliary", f"{span} are {len(added)} additional variables: each is {purpose}")
             )
     if root.has("annotations"):
-        notes.append(ConversionNote("annotations", "advice to solvers is left out"))
+        notes.append(ConversionNote("annotations", "annotations for solvers are left out"))
     wide = [one for one in posting.constraints if posting.size(one.variables) > _WIDE]
     notes += [
         ConversionNote(

@@ -1,4 +1,4 @@
-"""The constraint kinds of XCSP3-core about tasks in time: cumulative and noOverlap."""
+"""Translate the constraints of XCSP3-core on tasks in time: cumulative and noOverlap."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from robochoc.formats.dialects.xcsp3.terms import (
 from robochoc.model.expression import Constant, Expression
 
 MAX_COVERS = 5_000
-"""The maximum number of sets of tasks that are too much together."""
+"""The maximum number of minimal sets of tasks that together exceed the capacity."""
 
 
 class ScheduledTask(NamedTuple):
-    """A task: when it begins, how long it takes, and how much it needs."""
+    """A task: its start, its duration, and the amount of the resource that it requires."""
 
     start: Expression
     length: Expression
@@ -36,7 +36,7 @@ class ScheduledTask(NamedTuple):
 
 
 def no_overlap(element: Element, posting: Posting) -> None:
-    """Tasks, or boxes, do not overlap."""
+    """Post that tasks, or boxes, do not overlap."""
     origins, lengths = (_points(element, child, posting) for child in ("origins", "lengths"))
     excepted = element.is_true("zeroIgnored", default=True)
     boxes = [
@@ -52,7 +52,7 @@ def no_overlap(element: Element, posting: Posting) -> None:
 
 
 def cumulative(element: Element, posting: Posting) -> None:
-    """At no time do tasks need more than there is."""
+    """Post that at any time the sum of the heights of the running tasks meets the condition."""
     children = ["origins", "lengths", "heights", *(["ends"] if element.has("ends") else [])]
     columns = [as_integers(items(element.words(child), posting)) for child in children]
     tasks = []
@@ -61,7 +61,9 @@ def cumulative(element: Element, posting: Posting) -> None:
         for end in ends:
             posting.post(compare("eq", plus(start, length), end))
     if any(min(posting.domain(one), default=0) < 0 for task in tasks for one in (task.length, task.height)):
-        raise MistakeError("tasks with negative lengths or heights are not supported", "they are 0 or more")
+        raise MistakeError(
+            "negative lengths or heights of tasks are not supported", "use lengths and heights from 0 on"
+        )
     condition = posting.condition(element.text("condition"))
     if condition.operator not in {"lt", "le"}:
         raise MistakeError(f"<cumulative> with {condition.operator} is not supported", "write (le,10)")
@@ -69,7 +71,7 @@ def cumulative(element: Element, posting: Posting) -> None:
 
 
 def post_tasks(every_task: Sequence[ScheduledTask], condition: Xcsp3Condition, posting: Posting) -> None:
-    """Post that what the tasks that run at one time need, together, meets `condition`: at most something."""
+    """Post that at any time the sum of the heights of the running tasks meets `condition`, an upper bound."""
     nothing = Constant(0)
     tasks = [task for task in every_task if nothing not in (task.length, task.height)]
     covers = _covers(tasks, condition)
@@ -96,9 +98,9 @@ def _apart(one: ScheduledTask, other: ScheduledTask) -> list[Expression]:
 
 
 def _covers(tasks: Sequence[ScheduledTask], condition: Xcsp3Condition) -> list[tuple[ScheduledTask, ...]] | None:
-    """Return the smallest sets of tasks that are too much together; None where there are many, or heights vary.
+    """Return the minimal sets of tasks that together exceed the capacity; None if there are many, or heights vary.
 
-    Tasks that overlap in pairs overlap all at one time, so that in each set two must be apart.
+    Tasks that overlap in pairs all overlap at some time, so two tasks of each set must not overlap.
     """
     if condition.with_constant(0) is None or not all(isinstance(task.height, Constant) for task in tasks):
         return None
@@ -111,7 +113,7 @@ def _covers(tasks: Sequence[ScheduledTask], condition: Xcsp3Condition) -> list[t
 
 
 class _TooManySetsError(Exception):
-    """There are too many sets of tasks."""
+    """There are more than `MAX_COVERS` sets of tasks."""
 
 
 def _minimal(tasks: Sequence[ScheduledTask], condition: Xcsp3Condition) -> Iterator[tuple[ScheduledTask, ...]]:
@@ -125,7 +127,7 @@ def _minimal(tasks: Sequence[ScheduledTask], condition: Xcsp3Condition) -> Itera
             if steps > 20 * MAX_COVERS:
                 raise _TooManySetsError
             larger, sum_of_heights = (*chosen, tasks[place]), height + _height(tasks[place])
-            # the last is the lowest: the set is minimal, as without it nothing is violated
+            # The set is minimal: the last task has the least height, and the set without it meets the condition.
             if not condition.with_constant(sum_of_heights):
                 yield larger
             else:
@@ -139,7 +141,7 @@ def _height(task: ScheduledTask) -> int:
 def _load_at(
     task: ScheduledTask, tasks: Sequence[ScheduledTask], condition: Xcsp3Condition, posting: Posting
 ) -> Expression:
-    """Return that when `task` begins, those that run do not need too much."""
+    """Return an expression that is true if the running tasks meet `condition` at the start of `task`."""
     running = [task.height]
     for other in tasks:
         if other is not task:
@@ -160,7 +162,7 @@ def _may_be_zero(length: Expression, posting: Posting) -> bool:
 
 
 def _points(element: Element, child: str, posting: Posting) -> list[list[Expression]]:
-    """Return the coordinates of tasks, which have several where one of the two lists is one of lists."""
+    """Return the coordinates of each task: several if one of the two elements contains lists in parentheses."""
     if any(element.text(name).startswith("(") for name in ("origins", "lengths")):
         return [as_integers(posting.term(word) for word in row) for row in element.matrix(child)]
     return [[member] for member in as_integers(items(element.words(child), posting))]

@@ -1,4 +1,4 @@
-"""The constraint kinds of XCSP3-core that become tables: extension, element, regular, mdd."""
+"""Translate the constraints of XCSP3-core that become tables: extension, element, regular, mdd."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from robochoc.formats.dialects.xcsp3.terms import (
 from robochoc.model.expression import Apply, Constant, Expression
 
 MAX_WRITTEN_OUT = 100_000
-"""The maximum number of tuples that a table with `*` is written out to; with more it becomes an expression."""
+"""The maximum number of tuples of the expansion of a table with `*`; a larger one becomes an expression."""
 MAX_CASES = 9_000
-"""The maximum number of tuples of a table with `*` that is not written out."""
+"""The maximum number of tuples of a table with `*` that is not expanded."""
 
 Row = tuple[int, ...]
 Arcs = Mapping[str, Mapping[int, set[str]]]
-"""From a state, by a value, to other states."""
+"""The successors of each state by value."""
 
 
 class Extensions:
@@ -62,15 +62,15 @@ class Extensions:
 
 
 class _TooWideError(Exception):
-    """A table with `*` has too many tuples when it is written out."""
+    """The expansion of a table with `*` has too many tuples."""
 
 
 def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
-    """Yield the tuples in a text; `*` is any value of its variable, `1..3` each of three."""
+    """Yield the tuples in a text; `*` is any value of its variable, `1..3` one of three values."""
     if not text.startswith("("):
         if text and len(scope) != 1:
             raise MistakeError(
-                f"single values for {len(scope)} variables", "expected tuples in parentheses: (1,2)(3,4)"
+                f"the table has single values for {len(scope)} variables", "write tuples in parentheses: (1,2)(3,4)"
             )
         for word in text.split():
             yield from ((value,) for value in _cell(word, scope[0], posting))
@@ -95,23 +95,24 @@ def _cells(text: str, scope: Sequence[Item]) -> Iterator[list[str]]:
     for row in _without_blanks(text).removeprefix("(").removesuffix(")").split(")("):
         words = row.split(",")
         if len(words) != len(scope):
-            raise MistakeError(f"the tuple ({shortened(row)}) of {len(words)}", f"{len(scope)} values are expected")
+            what = f"the tuple ({shortened(row)}) has {len(words)} values"
+            raise MistakeError(what, f"write {len(scope)} values")
         yield words
 
 
 def _without_blanks(text: str) -> str:
-    """Return `text` without blanks around commas and parentheses. Raises `MistakeError` for other blanks."""
+    """Return `text` without blanks around commas and parentheses."""
     return re.sub(r"\s*([(),])\s*", r"\1", text)
 
 
 def _post_cases(text: str, scope: Sequence[Item], posting: Posting, *, allowed: bool) -> None:
-    """Post a table with `*` as it stands: one of its tuples fits, or none of them."""
+    """Post a table with `*` as an expression: one of its tuples matches, or none of them."""
     cases = []
     for words in _cells(text, scope):
         cells = zip(words, as_integers(scope), strict=True)
         cases.append(conjunction([is_one_of(item, _cell(word, item, posting)) for word, item in cells if word != "*"]))
         if len(cases) > MAX_CASES:
-            raise MistakeError(f"a table with * of more than {MAX_CASES:,} tuples", "write it without")
+            raise MistakeError(f"a table with * has more than {MAX_CASES:,} tuples", "write it without *")
     if allowed:
         posting.post(disjunction(cases))
         return
@@ -131,7 +132,7 @@ def _cell(word: str, item: Item, posting: Posting) -> Sequence[int]:
 
 
 def element(element: Element, posting: Posting) -> None:
-    """A condition on the member of a list, or of a matrix, that an index chooses."""
+    """Post a condition on the member of a list or matrix at an index."""
     condition = (
         posting.condition(element.text("condition"))
         if element.has("condition")
@@ -145,7 +146,7 @@ def element(element: Element, posting: Posting) -> None:
         posting.post(disjunction([condition.on(member) for member in members]))
         return
     if element.attribute("rank", "index") not in {"", "any"}:
-        raise MistakeError("an <element> of a given rank is not supported", "leave rank out")
+        raise MistakeError("the attribute rank of <element> is not supported", "delete it")
     start = element.start()
     index = posting.term(element.text("index"))
     choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
@@ -157,7 +158,7 @@ def _element_of_matrix(element: Element, posting: Posting, condition: Xcsp3Condi
     across = element.start("startColIndex", "matrix")
     indexes = items(element.words("index"), posting)
     if len(indexes) != 2:  # noqa: PLR2004 - of row and column
-        raise MistakeError("a matrix without two indexes", "write <index> i j </index>")
+        raise MistakeError(f"the matrix has {len(indexes)} indexes", "write two: <index> i j </index>")
     cells: dict[Row, Expression] = {
         (down + i, across + j): member for i, row in enumerate(rows) for j, member in enumerate(row)
     }
@@ -167,9 +168,9 @@ def _element_of_matrix(element: Element, posting: Posting, condition: Xcsp3Condi
 def choose(
     posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Xcsp3Condition
 ) -> None:
-    """Post `condition` on the cell that `indexes` choose: a table where all cells are integers, else cell by cell.
+    """Post `condition` on the cell at `indexes`: as a table if all cells are integers, else cell by cell.
 
-    A table has no column for an expression, with which the cell is compared.
+    The comparison with an expression is posted cell by cell, too, since a table has no column for an expression.
     """
     operand = condition.operand
     if not isinstance(operand, Apply) and all(isinstance(cell, Constant) for cell in cells.values()):
@@ -185,7 +186,7 @@ def choose(
                 if fixed.with_constant(value):
                     rows.append((*place, *row))
             if len(rows) > MAX_TUPLES:
-                raise MistakeError(f"an <element> of more than {MAX_TUPLES:,} tuples", "split it")
+                raise MistakeError(f"<element> has more than {MAX_TUPLES:,} tuples", "split it")
         posting.post_table([*indexes, *others], rows, allowed=True)
         return
     for axis, index in enumerate(indexes):
@@ -196,7 +197,7 @@ def choose(
 
 
 def regular(element: Element, posting: Posting) -> None:
-    """A list is a word that an automaton accepts."""
+    """Post that an automaton accepts a list as a word."""
     start, final = element.text("start"), element.text("final").split()
     arcs = _arcs(element)
     states = {*arcs, *(state for by_value in arcs.values() for targets in by_value.values() for state in targets)}
@@ -209,12 +210,14 @@ def regular(element: Element, posting: Posting) -> None:
 
 
 def mdd(element: Element, posting: Posting) -> None:
-    """A list is a path through a decision diagram, from its root to its end."""
+    """Post that a list is a path through a decision diagram from its root to an end."""
     arcs = _arcs(element)
     reached = {state for by_value in arcs.values() for states in by_value.values() for state in states}
     roots, ends = set(arcs) - reached, reached - set(arcs)
     if len(roots) != 1 or not ends:
-        raise MistakeError("a decision diagram without one root", "expected one, and an end")
+        raise MistakeError(
+            f"the decision diagram has {len(roots)} roots and {len(ends)} ends", "write one root and an end"
+        )
     _post_paths(element, posting, arcs, roots.pop(), ends)
 
 
@@ -222,14 +225,15 @@ def _arcs(element: Element) -> Arcs:
     arcs: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
     for row in rows_of(element.text("transitions")):
         if len(row) != 3:  # noqa: PLR2004 - from, value, to
-            raise MistakeError(f"the transition ({shortened(','.join(row))})", "write (state,value,state)")
+            what = f"the transition ({shortened(','.join(row))}) is not valid"
+            raise MistakeError(what, "write (state,value,state)")
         for value in span(row[1]):
             arcs[row[0]][value].add(row[2])
     return arcs
 
 
 def _post_paths(element: Element, posting: Posting, arcs: Arcs, start: str, final: set[str]) -> None:
-    """Post the words that lead from `start` to a state in `final`, as a table."""
+    """Post the paths from `start` to a state in `final` as a table."""
     scope = items(element.words("list"), posting)
     domains = [set(posting.domain(item)) for item in scope]
     useful = [final]
@@ -247,6 +251,6 @@ def _post_paths(element: Element, posting: Posting, arcs: Arcs, start: str, fina
                         longer.setdefault((*word, value), set()).update(going)
             if len(longer) > MAX_WRITTEN_OUT:
                 kind = element.kind
-                raise MistakeError(f"<{kind}> has more than {MAX_WRITTEN_OUT:,} words", "it becomes a table: split it")
+                raise MistakeError(f"<{kind}> has more than {MAX_WRITTEN_OUT:,} tuples", "split it")
         words = longer
     posting.post_table(scope, [word for word, states in words.items() if states], allowed=True)

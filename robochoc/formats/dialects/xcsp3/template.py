@@ -1,4 +1,4 @@
-"""One constraint element, also of a group or a slide: then `%0`, `%1`, `%...` stand for arguments."""
+"""A constraint element; in a group or a slide, with the arguments for its parameters `%0`, `%1`, `%...`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _PARAMETER = re.compile(r"%([0-9]{1,6}|\.\.\.)")
 
 @dataclass(frozen=True)
 class Element:
-    """A constraint element and the arguments that its parameters stand for.
+    """A constraint element and the arguments for its parameters.
 
     Attributes:
         view: The element.
         variables: The variables of the instance.
-        arguments: The arguments. None: the element is not in a template.
+        arguments: The arguments. None: the element is not a template.
     """
 
     view: ElementView
@@ -40,7 +40,7 @@ class Element:
         return self.view.has(child)
 
     def text(self, child: str = "") -> str:
-        """Return the text of a child, or of the element itself. Raises `MistakeError` where there is no such child."""
+        """Return the text of a child, or of the element itself. Raises `MistakeError` if there is no such child."""
         return self._substituted(self.view.required(child) if child else self.view)
 
     def texts(self, child: str) -> list[str]:
@@ -48,29 +48,29 @@ class Element:
         return [self._substituted(found) for found in self.view.children(child)]
 
     def words(self, child: str) -> list[str]:
-        """Return the words of a child; compact forms are written out. Raises `MistakeError`."""
+        """Return the words of a child; compact forms are expanded. Raises `MistakeError`."""
         return list(self.variables.expand(self.text(child)))
 
     def lists(self) -> list[list[str]]:
-        """Return the words of each `<list>`; where the element has no children, of its own text."""
+        """Return the words of each `<list>`; if the element has no children, the words of its text."""
         if not self.view.has_children:
             return [list(self.variables.expand(self.text()))]
         texts = self.texts("list") or [self.text("list")]
         return [list(self.variables.expand(text)) for text in texts]
 
     def only_list(self) -> list[str]:
-        """Return the words of the only `<list>`, or of the element where it has no children."""
+        """Return the words of the only `<list>`; if the element has no children, the words of its text."""
         return self.words("list") if self.view.has_children else self.lists()[0]
 
     def matrix(self, child: str) -> list[list[str]]:
         """Return the rows of a child that is a matrix. Raises `MistakeError`."""
         rows = self.variables.matrix(self.text(child))
         if not rows or any(len(row) != len(rows[0]) for row in rows):
-            raise MistakeError("a matrix whose rows have different lengths", "give them one length")
+            raise MistakeError("the rows of the matrix have different lengths", "write rows of one length")
         return rows
 
     def attribute(self, name: str, child: str = "") -> str:
-        """Return an attribute of the element, or of one of its children; empty where there is none."""
+        """Return an attribute of the element or of a child; empty if it is missing."""
         return (self.view.required(child) if child else self.view).attribute(name)
 
     def start(self, name: str = "startIndex", child: str = "list") -> int:
@@ -78,7 +78,7 @@ class Element:
         return first_index(self.view.required(child), name) if self.has(child) else 0
 
     def is_true(self, name: str, child: str = "", *, default: bool = False) -> bool:
-        """Return the truth value of an attribute of the element, or of one of its children. Raises `MistakeError`."""
+        """Return the truth value of an attribute of the element or of a child. Raises `MistakeError`."""
         return flag(self.view.required(child) if child else self.view, name, default=default)
 
     @cached_property
@@ -91,7 +91,7 @@ class Element:
         return _PARAMETER.findall(self.view.all_text())
 
     def with_arguments(self, arguments: Sequence[str]) -> Element:
-        """Return the constraint of a template with `arguments`. Raises `MistakeError` where some are not used."""
+        """Return the template with `arguments`. Raises `MistakeError` if some are unused."""
         if len(arguments) > self.arity and "..." not in self._parameters:
             what = f"{len(arguments)} arguments for a template of {self.arity} parameters"
             raise MistakeError(what, "write one for each parameter")
@@ -103,13 +103,14 @@ class Element:
             return text
         arguments = self.arguments
         if arguments is None:
-            raise MistakeError("a parameter outside <group> and <slide>", "name the variable", view.line)
+            raise MistakeError("there is a parameter outside <group> and <slide>", "name the variable", view.line)
 
         def argument(match: re.Match[str]) -> str:
             if match[1] == "...":
                 return " ".join(arguments[self.arity :])
             if int(match[1]) >= len(arguments):
-                raise MistakeError(f"%{match[1]} of only {len(arguments)} arguments", "add the others to <args>")
+                what = f"there is no argument for %{match[1]}, since <args> has only {len(arguments)}"
+                raise MistakeError(what, "add the missing arguments to <args>")
             return arguments[int(match[1])]
 
         return _PARAMETER.sub(argument, text)
@@ -124,7 +125,7 @@ def slide_scopes(slide: ElementView, variables: Variables, arity: int) -> Iterat
     """Yield the arguments of each constraint of a `<slide>`, whose template has `arity` parameters.
 
     Raises:
-        MistakeError: if its attributes are wrong.
+        MistakeError: if the attributes of the slide are invalid.
     """
     lists = slide.children("list")
     members = [list(variables.expand(one.text())) for one in lists]
@@ -132,7 +133,8 @@ def slide_scopes(slide: ElementView, variables: Variables, arity: int) -> Iterat
     collects = [_positive(one, "collect", arity if len(lists) == 1 else 1) for one in lists]
     circular = flag(slide, "circular")
     if not lists or (circular and len(lists) > 1):
-        raise MistakeError("a <slide> without one <list>", "write one <list>, or delete circular", slide.line)
+        what = f"<slide> has {len(lists)} elements <list>"
+        raise MistakeError(what, "write one or more; with circular, write one", slide.line)
     number = 0
     while True:
         starts = [number * offset for offset in offsets]
@@ -155,5 +157,5 @@ def _positive(view: ElementView, name: str, default: int) -> int:
     if not word:
         return default
     if not word.isdecimal() or not 0 < len(word) < 7 or int(word) == 0:  # noqa: PLR2004 - digits
-        raise MistakeError(f'{name}="{shortened(word)}"', "expected a number of 1 or more", view.line)
+        raise MistakeError(f'{name}="{shortened(word)}" is not valid', "write an integer of 1 or more", view.line)
     return int(word)

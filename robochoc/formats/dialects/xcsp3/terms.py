@@ -1,7 +1,7 @@
-"""XCSP3's functional expressions as ours, and conditions such as `(le,10)`.
+"""Translate XCSP3's functional expressions to robochoc's, and conditions such as `(le,10)`.
 
-XCSP3 (Boussemart, Lecoutre, Audemard, Piette, "XCSP3-core", arXiv 2009.00514) knows no Booleans: 0 is false, anything
-else is true. Ours have types, so that conversions are put between them.
+XCSP3 (Boussemart, Lecoutre, Audemard, Piette, "XCSP3-core", arXiv 2009.00514) has no Booleans: 0 is false, any other
+integer is true. robochoc's expressions are typed, so the translation inserts conversions.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TRUE: Expression = Apply("eq", (Constant(0), Constant(0)))
 FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
 
 _LARGEST_SET = 64
-"""Larger sets are written as the ranges in them."""
+"""The maximum size of a set that is written as a set; larger sets are written as ranges."""
 _TOKEN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*|[+-]?[0-9]{1,18}(?![0-9.])|%[0-9]{1,6}|[(),])")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _RANGE = re.compile(r"([+-]?[0-9]{1,18})\.\.([+-]?[0-9]{1,18})")
@@ -40,14 +40,14 @@ RELATIONS = frozenset(INVERSE)
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A name, an integer or a parameter `%0` in an expression, as it is written."""
+    """A name, an integer or a parameter `%0` in an expression, as text."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """An operator with its arguments, as they are written."""
+    """An operator with its arguments, before their translation."""
 
     operator: str
     arguments: tuple[Tree, ...]
@@ -55,7 +55,7 @@ class Call:
 
 Tree = Leaf | Call
 Resolve = Callable[[str], tuple[Expression, bool]]
-"""Returns what a leaf stands for, and whether that is symbolic: a symbol, or a variable over symbols."""
+"""Returns the expression for a leaf, and whether it is symbolic: a symbol, or a variable over symbols."""
 
 
 def type_of(expression: Expression) -> Type:
@@ -64,14 +64,14 @@ def type_of(expression: Expression) -> Type:
 
 
 def as_integer(expression: Expression) -> Expression:
-    """Return `expression` as an integer: 1 where it is true."""
+    """Return `expression` as an integer: 1 for true, 0 for false."""
     if type_of(expression) == Type.INTEGER:
         return expression
     return Apply("if", (expression, Constant(1), Constant(0)))
 
 
 def as_boolean(expression: Expression) -> Expression:
-    """Return `expression` as a Boolean: true unless it is 0."""
+    """Return `expression` as a Boolean: true for any integer except 0."""
     if type_of(expression) == Type.BOOLEAN:
         return expression
     if isinstance(expression, Apply) and expression.operator == "if":
@@ -120,34 +120,34 @@ def compare(operator: str, left: Expression, right: Expression) -> Expression:
 
 
 def is_one_of(expression: Expression, values: Collection[int]) -> Expression:
-    """Return that `expression` is one of `values`."""
+    """Return an expression that is true if `expression` has one of `values`."""
     runs: list[tuple[int, int]] = []
     for value in sorted(set(values)):
         if runs and runs[-1][1] == value - 1:
             runs[-1] = runs[-1][0], value
         else:
             runs.append((value, value))
-    if len(runs) > 1 and len(values) <= _LARGEST_SET:  # one operation: alike in each term of an aggregate
+    if len(runs) > 1 and len(values) <= _LARGEST_SET:  # one operation has the same form in each term of an aggregate
         return Apply("in", (expression, *(Constant(value) for value in sorted(set(values)))))
     return disjunction([_between(expression, low, high) for low, high in runs])
 
 
 @dataclass(frozen=True)
 class Xcsp3Condition:
-    """A comparison with something: `(le,10)`, `(eq,x)`, `(in,1..3)`, `(notin,{1,2})`."""
+    """A comparison without its left side: `(le,10)`, `(eq,x)`, `(in,1..3)`, `(notin,{1,2})`."""
 
     operator: str
     operand: Expression | tuple[int, ...]
 
     def on(self, expression: Expression) -> Expression:
-        """Return that the condition holds for the integer `expression`."""
+        """Return an expression that is true if the condition holds for the integer `expression`."""
         if isinstance(self.operand, tuple):
             found = is_one_of(expression, self.operand)
             return found if self.operator == "in" else Apply("not", (found,))
         return compare(self.operator, expression, self.operand)
 
     def with_constant(self, value: int) -> bool | None:
-        """Return whether it holds for `value`; None where that depends on variables."""
+        """Return whether the condition holds for `value`; None if this depends on variables."""
         if isinstance(self.operand, tuple):
             return (value in self.operand) == (self.operator == "in")
         if not isinstance(self.operand, Constant):
@@ -168,11 +168,11 @@ def read_condition(text: str, term: Callable[[str], Expression], max_values: int
 
     Args:
         text: The text.
-        term: Returns the variable or integer that a word stands for.
+        term: Returns the variable or integer named by a word.
         max_values: The maximum number of values of a set.
 
     Raises:
-        MistakeError: if it is none.
+        MistakeError: if the text is not a condition.
     """
     match = _CONDITION.fullmatch(text)
     if match and match[1] in RELATIONS:
@@ -183,11 +183,11 @@ def read_condition(text: str, term: Callable[[str], Expression], max_values: int
 
 
 def zip_equal(*lists: Sequence[Any], what: str = "") -> Iterator[tuple[Any, ...]]:
-    """Return an iterator over the members of lists at the same places, as `zip` does.
+    """Iterate over lists in parallel, like `zip`.
 
     Args:
         lists: The lists.
-        what: Their names, for a message.
+        what: The names of the lists, for a message.
 
     Raises:
         MistakeError: if the lists have different lengths.
@@ -195,12 +195,12 @@ def zip_equal(*lists: Sequence[Any], what: str = "") -> Iterator[tuple[Any, ...]
     lengths = [len(one) for one in lists]
     if len(set(lengths)) > 1:
         found = f"lists of different lengths: {' and '.join(map(str, lengths))}"
-        raise MistakeError(f"{found} members{what and f' in {what}'}", "give them one length")
+        raise MistakeError(f"{found} members{what and f' in {what}'}", "write lists of one length")
     return zip(*lists, strict=True)
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a list; an expression is one, whatever blanks are in it."""
+    """Return the words of a list; an expression is one word, even with blanks in it."""
     if "(" not in text:
         return text.split()
     words, depth, begun = [], 0, ""
@@ -216,7 +216,9 @@ def words_of(text: str) -> list[str]:
 def integer(text: str) -> int:
     """Return the integer in a text. Raises `MistakeError`."""
     if not _INTEGER.fullmatch(text):
-        raise MistakeError(f"'{shortened(text)}' is not a valid integer", "at most 18 digits, and a sign")
+        raise MistakeError(
+            f"'{shortened(text)}' is not a valid integer", "write at most 18 digits, with or without a sign"
+        )
     return int(text)
 
 
@@ -234,13 +236,13 @@ def span(text: str) -> range:
 
 @lru_cache(maxsize=4096)
 def read_tree(text: str) -> Tree:
-    """Return the functional expression in a text, as it is written.
+    """Return the syntax tree of the functional expression in a text.
 
     Raises:
-        MistakeError: if it is none.
+        MistakeError: if the text is not an expression.
     """
     if len(text) > MAX_TEXT:
-        raise MistakeError(f"an expression of {len(text):,} characters", f"{MAX_TEXT:,} are allowed")
+        raise MistakeError(f"an expression has {len(text):,} characters", f"write at most {MAX_TEXT:,}")
     tokens: list[str] = []
     place = 0
     stripped = text.rstrip()
@@ -257,10 +259,10 @@ def read_tree(text: str) -> Tree:
 
 
 def resolve_tree(tree: Tree, resolve: Resolve, max_values: int) -> Expression:
-    """Return `tree` as an expression of ours.
+    """Translate `tree` to robochoc's expressions.
 
     Raises:
-        MistakeError: if it has an unsupported operator, or wrong arguments.
+        MistakeError: if it has an unsupported operator, or invalid arguments.
     """
     return _resolve(tree, resolve, max_values)[0]
 
@@ -274,18 +276,18 @@ def _resolve(tree: Tree, resolve: Resolve, max_values: int) -> tuple[Expression,
     symbolic = [is_symbolic for _, is_symbolic in found]
     if any(symbolic) and (tree.operator not in {"eq", "ne"} or not all(symbolic)):
         raise MistakeError(
-            f"{tree.operator} of symbols", "of symbols, only eq, ne and in among themselves are supported"
+            f"{tree.operator} of symbols is not supported", "compare symbols only with symbols, by eq, ne or in"
         )
     return _apply(tree.operator, [expression for expression, _ in found]), False
 
 
 def _membership(tree: Call, resolve: Resolve, max_values: int) -> Expression:
     if len(tree.arguments) != 2 or not isinstance(tree.arguments[1], Call) or tree.arguments[1].operator != "set":  # noqa: PLR2004
-        raise MistakeError(f"{tree.operator} without a set", "write in(x,set(1,2))")
+        raise MistakeError(f"{tree.operator} has no set", f"write {tree.operator}(x,set(1,2))")
     what, is_symbolic = _resolve(tree.arguments[0], resolve, max_values)
     members = [_resolve(member, resolve, max_values) for member in tree.arguments[1].arguments]
     if any(symbol is not is_symbolic for _, symbol in members):
-        raise MistakeError("a set of symbols and integers", "write values of one kind")
+        raise MistakeError("a set contains symbols and integers", "write values of one kind")
     value = as_integer(what)
     constants = [member.value for member, _ in members if isinstance(member, Constant)]
     others = [compare("eq", value, as_integer(member)) for member, _ in members if not isinstance(member, Constant)]
@@ -294,13 +296,14 @@ def _membership(tree: Call, resolve: Resolve, max_values: int) -> Expression:
 
 
 def _apply(operator: str, arguments: list[Expression]) -> Expression:
-    """Return XCSP3's `operator`, applied. Raises `MistakeError`."""
+    """Return the expression for XCSP3's `operator` with `arguments`. Raises `MistakeError`."""
     least, most, make = _MEANINGS.get(operator, (0, -1, None))
     if make is None:
         hint = suggestion(operator, _MEANINGS.keys(), "operators")
         raise MistakeError(f"the operator '{shortened(operator)}' is not supported", hint)
     if not least <= len(arguments) <= most:
-        raise MistakeError(f"{operator} with {len(arguments)} arguments", "see XCSP3-core, 'intension'")
+        number = f"at least {least}" if most == _MANY else f"{least}"
+        raise MistakeError(f"{operator} has {len(arguments)} arguments", f"write {number}")
     return make(arguments)
 
 
@@ -363,7 +366,7 @@ _MEANINGS: dict[str, tuple[int, int, Callable[[list[Expression]], Expression] | 
     "imp": (2, 2, lambda parts: disjunction([Apply("not", (as_boolean(parts[0]),)), as_boolean(parts[1])])),
     "if": (3, 3, _conditional),
 }
-"""The least and the greatest number of arguments, and what is made of them."""
+"""The minimum and maximum number of arguments of each operator, and its translation."""
 
 
 def _fold(operator: str, parts: list[Expression], nothing: Expression) -> Expression:
@@ -383,13 +386,15 @@ def _values(text: str, max_values: int) -> Iterable[int]:
         return [integer(word.strip()) for word in text[1:-1].split(",") if word.strip()]
     values = span(text)
     if len(values) > max_values:
-        raise MistakeError(f"the set {shortened(text)} has {len(values):,} values", f"{max_values:,} are allowed")
+        raise MistakeError(
+            f"the set {shortened(text)} has {len(values):,} values", f"write at most {max_values:,} values"
+        )
     return values
 
 
 def _tree(tokens: Sequence[str], place: int, depth: int, text: str) -> tuple[Tree, int]:
     if depth > MAX_DEPTH:
-        raise MistakeError("an expression that is nested too deeply", f"{MAX_DEPTH} levels are allowed")
+        raise MistakeError("an expression is nested too deeply", f"write at most {MAX_DEPTH} levels")
     if place >= len(tokens) or tokens[place] in "(),":
         raise _unreadable(text, tokens[place] if place < len(tokens) else "its end")
     word = tokens[place]

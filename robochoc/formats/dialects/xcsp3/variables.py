@@ -1,4 +1,4 @@
-"""The variables of an XCSP3 instance: single ones, arrays, their domains, and the compact lists `x[][1..2]`."""
+"""The variables of an XCSP3 instance: single ones, arrays, their domains, and compact lists such as `x[][1..2]`."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _BRACKETS = re.compile(r"\[([0-9.]*)\]")
 _MANY_TIMES = re.compile(r"([+-]?[0-9]{1,18})x([0-9]{1,9})")
 
 Values = tuple[range, ...] | tuple[str, ...]
-"""A domain as it is written: ranges of integers, or symbols."""
+"""A domain as in the file: ranges of integers, or symbols."""
 _Domains = Mapping[str, Values]
-"""The domains of a variable or an array, by the text that names the variables; an empty text names all."""
+"""The domains of a variable or an array, by the text of the attribute `for`; an empty text means all variables."""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Variables:
     """All variables of an instance.
 
     Attributes:
-        domains: Their domains by id, in the order in which they are declared.
+        domains: Their domains by id, in the order of their declarations.
         shapes: The sizes of arrays, by id.
     """
 
@@ -46,7 +46,7 @@ class Variables:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """All symbols, in the order in which they are first written."""
+        """All symbols, in the order of their first occurrence."""
         all_symbols = (symbol for domain in self.domains.values() for symbol in domain if isinstance(symbol, str))
         return tuple(dict.fromkeys(all_symbols))
 
@@ -55,17 +55,17 @@ class Variables:
         return isinstance(self.domains[name][0], str)
 
     def expand(self, words: str) -> Iterator[str]:
-        """Yield the variables that a list of words means, and the other words as they are; `2x3` is `2 2 2`.
+        """Yield the words of a list with compact forms expanded: `x[]` to its variables, `2x3` to `2 2 2`.
 
         Raises:
-            MistakeError: if there is no such variable, or too many.
+            MistakeError: if there is no such variable, or the list is too long.
         """
         number = 0
         for word in words_of(words):
             for one in self._expand_word(word):
                 number += 1
                 if number > MAX_VARIABLES:
-                    raise MistakeError(f"a list of more than {MAX_VARIABLES:,}", "split it")
+                    raise MistakeError(f"a list has more than {MAX_VARIABLES:,} members", "split it")
                 yield one
 
     def matrix(self, text: str) -> list[list[str]]:
@@ -78,7 +78,7 @@ class Variables:
         indexes = self._indexes(match[1], match[2])
         wide = [place for place, values in enumerate(indexes) if len(values) != 1]
         if len(wide) != 2:  # noqa: PLR2004 - rows and columns
-            raise MistakeError(f"'{shortened(text)}' is not a valid matrix", "two of its indexes must be open")
+            raise MistakeError(f"'{shortened(text)}' is not a valid matrix", "write two open indexes, such as x[][]")
         row, column = wide
         found = []
         for one in indexes[row]:
@@ -86,21 +86,31 @@ class Variables:
             chosen[row] = range(one, one + 1)
             found.append(self._cells(match[1], chosen))
             if len(indexes[column]) != len(found[-1]):
-                raise MistakeError(f"'{shortened(text)}' has holes", "name its variables one by one")
+                raise MistakeError(f"'{shortened(text)}' has cells without a domain", "name its variables one by one")
         return found
 
     def add(self, name: str, domain: Values) -> None:
         """Declare a variable. Raises `MistakeError`."""
         if name in self.domains:
-            raise MistakeError(f"a second variable '{shortened(name)}'", "ids are unique")
+            raise MistakeError(f"duplicate variable '{shortened(name)}'", "change the id of one of them")
         if len(self.domains) == MAX_VARIABLES:
-            raise MistakeError(f"more than {MAX_VARIABLES:,} variables", "import a smaller problem")
+            raise MistakeError(f"there are more than {MAX_VARIABLES:,} variables", "import a smaller problem")
         self.domains[name] = domain
 
     def add_array(self, name: str, shape: tuple[int, ...], domains: Sequence[tuple[str, Values]]) -> None:
-        """Declare the variables of an array; `domains` says for which of them, or `others`. Raises `MistakeError`."""
+        """Declare the variables of an array.
+
+        Args:
+            name: The id of the array.
+            shape: Its sizes.
+            domains: The domains, each with the text of its attribute `for`.
+
+        Raises:
+            MistakeError: if the array is too large, or a domain is invalid.
+        """
         if math.prod(shape) > MAX_VARIABLES:
-            raise MistakeError(f"an array of {math.prod(shape):,} variables", f"{MAX_VARIABLES:,} are allowed")
+            what = f"the array {name} has {math.prod(shape):,} variables"
+            raise MistakeError(what, f"use at most {MAX_VARIABLES:,} variables")
         self.shapes[name] = shape
         cells = self._cells(name, [range(size) for size in shape], declared=False)
         known: dict[str, Values] = {}
@@ -114,7 +124,7 @@ class Variables:
                     raise MistakeError(f"'{shortened(word)}' is not in the array {name}", 'write for="x[0][] x[1][2]"')
                 for cell in self._cells(name, self._indexes(name, match[2]), declared=False):
                     if known.setdefault(cell, domain) is not domain:
-                        raise MistakeError(f"two domains for {cell}", "write one of them")
+                        raise MistakeError(f"{cell} has two domains", "delete one of them")
         for cell in cells:
             if cell in known:
                 self.add(cell, known[cell])
@@ -137,7 +147,8 @@ class Variables:
         shape, written = self.shapes[name], _BRACKETS.findall(brackets)
         found = [span(part) if part else range(size) for part, size in zip(written, shape, strict=False)]
         if len(written) != len(shape) or any(part.stop > size for part, size in zip(found, shape, strict=False)):
-            raise MistakeError(f"{name}{shortened(brackets)} is not in the array {name}", f"its sizes are {shape}")
+            what = f"{name}{shortened(brackets)} is not in the array {name}"
+            raise MistakeError(what, f"write indexes within its sizes {shape}")
         return found
 
     def _cells(self, name: str, indexes: Sequence[range], *, declared: bool = True) -> list[str]:
@@ -146,7 +157,7 @@ class Variables:
 
 
 def lists(text: str) -> list[list[str]]:
-    """Return the words of `(1,2)(3,4)`, list by list. Raises `MistakeError`."""
+    """Return the words of each list in `(1,2)(3,4)`. Raises `MistakeError`."""
     text = text.strip()
     if not text.startswith("(") or not text.endswith(")"):
         raise MistakeError(f"'{shortened(text)}' is not a sequence of lists in parentheses", "write (1,2)(3,4)")
@@ -154,7 +165,7 @@ def lists(text: str) -> list[list[str]]:
 
 
 def read_variables(view: ElementView | None) -> Variables:
-    """Return the variables that `<variables>` declares; mistakes go into the report of the document."""
+    """Return the variables declared in `<variables>`; mistakes are added to the report of the document."""
     variables = Variables()
     if view is None:
         return variables
@@ -165,10 +176,10 @@ def read_variables(view: ElementView | None) -> Variables:
             ignore_remarks(child)
             name = child.attribute("id")
             if not _ID.fullmatch(name) or name in declared:
-                raise MistakeError(f"the id '{shortened(name)}' is not allowed", "ids are words, each used once")
+                raise MistakeError(f"the id '{shortened(name)}' is not valid or not unique", "write a word, used once")
             declared[name] = {}  # for `as`; invalid unless its domains are set below
             if declared.get(child.attribute("as")) == {} and child.attribute("as") != name:
-                continue  # a consequence of an error reported there
+                continue  # the error in the other declaration is already reported
             domains = _domains(child, name, declared)
             if child.tag == "var":
                 if list(domains) != [""]:
@@ -177,7 +188,8 @@ def read_variables(view: ElementView | None) -> Variables:
             else:
                 size = child.attribute("size")
                 if not _SIZE.fullmatch(size) or child.attribute("startIndex") not in {"", "0"}:
-                    raise MistakeError(f"an array of size '{shortened(size)}'", 'write size="[3][4]", from index 0')
+                    what = f"the size '{shortened(size)}' or the startIndex of the array {name} is not supported"
+                    raise MistakeError(what, 'write size="[3][4]", from index 0')
                 shape = tuple(int(part) for part in _BRACKETS.findall(size))
                 all_cells = name + "[]" * len(shape)
                 variables.add_array(name, shape, [(words or all_cells, values) for words, values in domains.items()])
@@ -186,18 +198,20 @@ def read_variables(view: ElementView | None) -> Variables:
 
 
 def _domains(child: ElementView, name: str, declared: Mapping[str, _Domains]) -> _Domains:
-    """Return the domains of a variable or an array; with `as`, those of one above. Raises `MistakeError`."""
+    """Return the domains of a variable or an array, copied from another for `as`. Raises `MistakeError`."""
     kind, other = child.attribute("type"), child.attribute("as")
     if kind not in {"", "integer", "symbolic"}:
-        raise MistakeError(f'variables of type="{shortened(kind)}" are not supported', "integer and symbolic are")
+        what = f'variables of type="{shortened(kind)}" are not supported'
+        raise MistakeError(what, "use integer or symbolic variables")
     if other:
         above = [known for known, domains in declared.items() if domains]
         if other not in above:
-            raise MistakeError(f'as="{shortened(other)}" names nothing above', suggestion(other, above, "ids above"))
+            what = f'as="{shortened(other)}" is not an id declared above'
+            raise MistakeError(what, suggestion(other, above, "ids above"))
         domains = declared[other]
         is_symbolic = isinstance(next(iter(domains.values()))[0], str)
         if kind and is_symbolic != (kind == "symbolic"):
-            raise MistakeError(f'type="{kind}" differs from the type of {other}', "leave it out")
+            raise MistakeError(f'type="{kind}" differs from the type of {other}', "delete the attribute type")
         return {re.sub(rf"\b{re.escape(other)}\[", f"{name}[", words): values for words, values in domains.items()}
     if child.tag == "var" or not child.has_children:
         return {"": _domain(child, kind)}
@@ -205,7 +219,7 @@ def _domains(child: ElementView, name: str, declared: Mapping[str, _Domains]) ->
     for part in child.children("domain"):
         words = part.attribute("for")
         if words in found:
-            raise part.mistake(f"a second domain for '{shortened(words)}'", "write one of them")
+            raise part.mistake(f"duplicate domain for '{shortened(words)}'", "delete one of them")
         found[words] = _domain(part, kind)
     return found
 
@@ -214,20 +228,20 @@ def _domain(view: ElementView, kind: str) -> Values:
     """Return the domain in the text of an element. Raises `MistakeError`."""
     words = view.text().split()
     if not words:
-        raise MistakeError("a variable without a domain", "only finite domains are supported: 1..4 7", view.line)
+        raise MistakeError("a variable has no domain", "write a finite domain: 1..4 7", view.line)
     for word in words:
         if "infinity" in word:
-            raise MistakeError("an infinite domain is not supported", "give it bounds", view.line)
+            raise MistakeError("an infinite domain is not supported", "write bounds", view.line)
         if kind == "symbolic" and not _SYMBOL.fullmatch(word):
             raise MistakeError(f"'{shortened(word)}' is not a valid symbol", "write words of letters", view.line)
         if kind != "symbolic" and not re.match("[+-]?[0-9]", word):
             hint = 'write integers or ranges; symbols require type="symbolic"'
-            raise MistakeError(f"'{shortened(word)}' in a domain of integers", hint, view.line)
+            raise MistakeError(f"a domain of integers contains '{shortened(word)}'", hint, view.line)
     if kind == "symbolic":
         return tuple(dict.fromkeys(words))
     parts = sorted((span(word) for word in words), key=lambda part: part.start)
     if sum(map(len, parts)) > MAX_VALUES:
-        raise MistakeError(f"a domain of more than {MAX_VALUES:,} values", "make it smaller")
+        raise MistakeError(f"a domain has more than {MAX_VALUES:,} values", "use a smaller domain")
     disjoint: list[range] = []
     for part in parts:
         start = max(part.start, disjoint[-1].stop) if disjoint else part.start
@@ -237,7 +251,7 @@ def _domain(view: ElementView, kind: str) -> Values:
 
 
 def domain_of(values: Values, symbols: Mapping[str, int], name: str) -> Domain:
-    """Return a domain as our model has it; `symbols` are all symbols with the integers that stand for them."""
+    """Return a domain of the team; `symbols` are all symbols with their integers."""
     codes = sorted(symbols[part] for part in values if isinstance(part, str))
     if codes:
         return Domain(name, tuple(range(code, code + 1) for code in codes), tuple(symbols))
@@ -245,11 +259,11 @@ def domain_of(values: Values, symbols: Mapping[str, int], name: str) -> Domain:
 
 
 def values_of(words: Iterable[str]) -> list[int]:
-    """Return the integers in a list of words, where `1..3` are three. Raises `MistakeError`."""
+    """Return the integers in a list of words, with ranges expanded. Raises `MistakeError`."""
     found: list[int] = []
     for word in words:
         part = span(word) if ".." in word else (integer(word),)
         if len(found) + len(part) > MAX_VALUES:
-            raise MistakeError(f"more than {MAX_VALUES:,} values", "shorten the list")
+            raise MistakeError(f"a list has more than {MAX_VALUES:,} values", "shorten the list")
         found += part
     return found
