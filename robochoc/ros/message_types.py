@@ -145,7 +145,7 @@ class Types:
         self._made(kind, name)
         return self._store.hash_rihs01(name)
 
-    def is_the_same(self, kind: str, text: str) -> bool:
+    def has_same_fields(self, kind: str, text: str) -> bool:
         """Return whether `text` defines the fields that `kind` has. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)
 

@@ -19,7 +19,7 @@ from robochoc.robots.mission_publisher import MissionPublisher, nanoseconds
 from robochoc.robots.sink import Fields, Sink, Waypoint
 from robochoc.robots.source import REPORTS
 from robochoc.ros.names import TEAM_TOPICS, TopicNames
-from robochoc.ros.team_topics import BODY, GOAL, WAYPOINTS_ALONE, PublishOptions, status, transform, transforms
+from robochoc.ros.team_topics import BODY, GOAL, WAYPOINTS_ONLY, PublishOptions, status, transform, transforms
 from robochoc.ros.waypoint_types import NoMappingError, WaypointMapping, mapping_of, point
 from robochoc.system.errors import RobochocError
 
@@ -53,7 +53,7 @@ class Publisher:
         drones: Sequence[Drone],
         sinks: Sequence[Sink],
         frame: str = "map",
-        options: PublishOptions = WAYPOINTS_ALONE,
+        options: PublishOptions = WAYPOINTS_ONLY,
     ) -> None:
         if all(drone.topic is None for drone in drones):
             problem = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
@@ -157,7 +157,7 @@ class SinkPublisher(MissionPublisher):
     """Publishes decisions, poses and reports of `drones` of `team` into one `sink`. Raises what `Publisher` raises."""
 
     def __init__(
-        self, team: str, drones: Sequence[Drone], sink: Sink, frame: str, options: PublishOptions = WAYPOINTS_ALONE
+        self, team: str, drones: Sequence[Drone], sink: Sink, frame: str, options: PublishOptions = WAYPOINTS_ONLY
     ) -> None:
         self._sink = sink
         self.live = sink.live

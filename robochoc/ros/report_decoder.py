@@ -32,7 +32,7 @@ class ReportDecoder:
     """The topics of reports and their types, both by their ROS names."""
     namespaces: Mapping[str, str]
     """The namespace of each drone's topics, by the drone's name."""
-    strange: dict[str, str]
+    other_frames: dict[str, str]
     """Topics with places in another frame, and the last one of these frames."""
 
     def __init__(self, drones: Sequence[Drone], frame: str) -> None:
@@ -45,7 +45,7 @@ class ReportDecoder:
         }
         self.namespaces = {drone.name: names.namespace(number) for number, drone in enumerate(drones)}
         self.topics = {topic: REPORTS[token] for topic, (_, token) in self._tokens.items()}
-        self.strange = {}
+        self.other_frames = {}
 
     def report(self, received: ReceivedMessage) -> Report | None:
         """Return what the message reports, at the time at which it was received; None where it reports nothing."""
@@ -72,7 +72,7 @@ class ReportDecoder:
         """Return the point at `path` in the message; None if it is not in our frame."""
         frame = _at(received.fields, ("header",)).get("frame_id")
         if isinstance(frame, str) and frame.removeprefix("/") not in {"", self._frame}:
-            self.strange[received.topic] = on_one_line(frame[:REASON_MAX])
+            self.other_frames[received.topic] = on_one_line(frame[:REASON_MAX])
             return None
         fields = _at(received.fields, path)
         x, y, z = (_number(fields, axis) for axis in "xyz")

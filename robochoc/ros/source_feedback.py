@@ -61,7 +61,7 @@ class SourceFeedback(Feedback):
         """Sentences about places in another frame, and about topics of a recording that could not be used."""
         frames = [
             f"places on {topic} are in the frame '{frame}', and were passed over (--frame says which is ours)"
-            for topic, frame in self._decoder.strange.items()
+            for topic, frame in self._decoder.other_frames.items()
         ]
         others = [*filter(None, starmap(self._unused, self._source.others.items()))]
         more = [f"and {len(others) - _NOTES_MAX:,} more topics were passed over"] * (len(others) > _NOTES_MAX)
@@ -90,7 +90,7 @@ class SourceFeedback(Feedback):
         deadline = time.monotonic() + self._patience_s
         while self._source.live and time.monotonic() < deadline:
             received = self._source.next(0 if clock.now_ns is not None else _SLICE_S)
-            if received is not None and not clock.takes(received):
+            if received is not None and not clock.update(received):
                 self._early.put(received, weight_of(received.fields))
             if clock.now_ns is None:
                 self._idle_now_and_then(received)
@@ -174,7 +174,7 @@ class SourceFeedback(Feedback):
                     return None
                 continue
             self._now_ns = received.at_ns
-            if self._sim is not None and self._sim.takes(received):
+            if self._sim is not None and self._sim.update(received):
                 continue
             report = self._decoder.report(received)
             if report is not None:
@@ -187,7 +187,7 @@ class SimClock:
     now_ns: int | None = None
     """In nanoseconds; None before the first message."""
 
-    def takes(self, received: ReceivedMessage) -> bool:
+    def update(self, received: ReceivedMessage) -> bool:
         """Return whether `received` came on `/clock`. What it says is the time now, unless it is no time."""
         if received.topic != CLOCK:
             return False

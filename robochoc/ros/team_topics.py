@@ -40,7 +40,7 @@ class PublishOptions:
         return {topic: kind for topic, kind in TEAM_TOPICS.items() if wanted[topic]}
 
 
-WAYPOINTS_ALONE = PublishOptions()
+WAYPOINTS_ONLY = PublishOptions()
 """Nothing else, and as the files have it."""
 
 

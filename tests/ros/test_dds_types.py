@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from robochoc.ros.live.dds_types import described, raw_type, topic_name
+from robochoc.ros.live.dds_types import dds_struct, raw_type, topic_name
 from robochoc.ros.message_types import types_of
 from tests.support.cases import looped
 
@@ -43,7 +43,7 @@ def value(field: Any, number: int) -> Any:  # noqa: ANN401 - of any type
 def test_the_description_of_a_type_is_that_of_its_bytes(kind: str) -> None:
     """The library, which knows the description alone, reads our bytes and writes the same."""
     content = types_of(2).encode(kind, filled(kind))
-    message = described(kind).deserialize(content)
+    message = dds_struct(kind).deserialize(content)
     assert message.serialize().rstrip(b"\0") == content.rstrip(b"\0")
     assert raw_type(kind)(content).content == content
 

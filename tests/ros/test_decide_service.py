@@ -264,7 +264,7 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(
     assert sorted(answer["seq"] for answer in answers) == [*range(1, asked + 1)]
     assert sorted(answer["message"] for answer in answers) == sorted(told)
     assert told.count("the service has ended") == WAITING_MAX
-    assert told.count(f"{WAITING_MAX} requests wait already; ask again later") == 3
+    assert told.count(f"{WAITING_MAX} requests are already waiting; try again later") == 3
 
 
 @looped("place", ["x", "233", "5?wait=1", "5?reliability=reliable", "5?partition="])
@@ -343,7 +343,7 @@ def test_a_signal_ends_it(how: signal.Signals, status: int) -> None:
 @looped(
     ("words", "told"),
     [
-        (["--ros", "rospy"], "--ros rospy"),
+        (["--ros", "rospy"], "--ros rospy: unknown middleware; use dds, "),
         (["--ros", "dds:x"], "'x' is not a DDS domain"),
         (["--timeout", "0"], "--timeout"),
     ],

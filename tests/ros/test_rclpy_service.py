@@ -76,7 +76,7 @@ def test_feedback_is_published(offered: RclpyServices) -> None:
     heard: list[bytes] = []
     text = rclpy_stand_in.message_class("std_msgs/String")
     with RclpyServices("", {}, refusal) as listener:
-        node, quality = listener._ros.node, listener._ros.for_services()  # noqa: SLF001 - the stand-in's
+        node, quality = listener._ros.node, listener._ros.service_quality()  # noqa: SLF001 - the stand-in's
         node.create_subscription(text, "/robochoc/feedback", heard.append, quality, raw=True)
         offered.announce("/robochoc/feedback", "std_msgs/String")
         offered.publish("/robochoc/feedback", "std_msgs/String", {"data": "{}"})

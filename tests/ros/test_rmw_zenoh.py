@@ -19,7 +19,7 @@ from robochoc.robots.sink import SinkError
 from robochoc.robots.source import SourceError
 from robochoc.ros.live import rmw_zenoh_session
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX, RmwZenohSink, RmwZenohSource
-from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment
+from robochoc.ros.live.rmw_zenoh_keys import RosNode, ZenohTopic, attachment
 from robochoc.ros.live.rmw_zenoh_session import RouterAddress
 from robochoc.ros.message_types import types_of
 from tests.support.cases import looped
@@ -80,7 +80,7 @@ def tokens(session: zenoh.Session) -> list[str]:
 
 def test_keys_and_tokens_have_the_form_of_rmw_zenoh() -> None:
     node = RosNode(7, "aac3178e146ba6f1fc6e6a4085e77f21")
-    topic = Topic.of("/drone1_1/waypoint1_1", POSE, "RIHS01_10f3")
+    topic = ZenohTopic.for_topic("/drone1_1/waypoint1_1", POSE, "RIHS01_10f3")
     assert topic.key(7) == "7/drone1_1/waypoint1_1/geometry_msgs::msg::dds_::PoseStamped_/RIHS01_10f3"
     assert str(node.token) == "@ros2_lv/7/aac3178e146ba6f1fc6e6a4085e77f21/0/0/NN/%/%/robochoc_aac3178e"
     assert node.entity_token(3, "MP", topic) == (
@@ -104,7 +104,7 @@ def test_an_attachment_is_33_bytes_in_little_endian() -> None:
     ],
 )
 def test_a_place(place: str, address: tuple[str, int]) -> None:
-    assert RouterAddress.of(place) == address
+    assert RouterAddress.parse(place) == address
 
 
 @looped("place", [":7447", "a:b", "a:0", "a:99999", "//a/b", "user@a", "[::1", "a?b", "\x1b[31m:b"])
@@ -174,7 +174,7 @@ def test_the_domain_is_heeded(router: Router, session: zenoh.Session, monkeypatc
         sink.publish("/far/waypoint", POSE, pose(1), STAMP)
     assert str(heard.wait_for(1)[0].key_expr) == f"42/far/waypoint/{POSE_KEY}"
     monkeypatch.setenv("ROS_DOMAIN_ID", "nonsense")
-    with pytest.raises(SourceError, match="ROS_DOMAIN_ID must be a whole number from 0 to 232, and is 'nonsense'"):
+    with pytest.raises(SourceError, match="ROS_DOMAIN_ID is 'nonsense': set it to a whole number from 0 to 232"):
         RmwZenohSource(router.place)
 
 
@@ -311,10 +311,10 @@ def test_a_configuration_of_the_users(router: Router, tmp_path: Path, monkeypatc
     with RmwZenohSink("") as sink:
         sink.publish("/a", POSE, pose(1), STAMP)
     file.write_text("{nonsense", encoding="utf-8")
-    with pytest.raises(SinkError, match="ZENOH_SESSION_CONFIG_URI names no zenoh configuration: "):
+    with pytest.raises(SinkError, match="ZENOH_SESSION_CONFIG_URI does not name a valid zenoh configuration: "):
         RmwZenohSink("")
     monkeypatch.setenv(rmw_zenoh_session.CONFIG_FILE, str(tmp_path / "none.json5"))
-    with pytest.raises(SourceError, match="ZENOH_SESSION_CONFIG_URI names no zenoh configuration: "):
+    with pytest.raises(SourceError, match="ZENOH_SESSION_CONFIG_URI does not name a valid zenoh configuration: "):
         RmwZenohSource("")
 
 
@@ -325,11 +325,13 @@ def test_the_router_dies(monkeypatch: pytest.MonkeyPatch) -> None:
         sink, source = RmwZenohSink(router.place), RmwZenohSource(router.place)
         sink.publish("/a", POSE, pose(1), STAMP)
         router.kill()
-        with pytest.raises(SinkError, match=rf"the zenoh router at {router.place} is gone; start one"):
+        with pytest.raises(
+            SinkError, match=rf"the connection to the zenoh router at {router.place} is lost; start one"
+        ):
             publish_until_it_fails(sink)
-        with pytest.raises(SourceError, match="is gone; start one"):
+        with pytest.raises(SourceError, match="is lost; start one"):
             source.next(HANG_S)
-        with pytest.raises(SinkError, match="is gone; start one"):
+        with pytest.raises(SinkError, match="is lost; start one"):
             sink.close()
         source.close()
 
@@ -363,7 +365,7 @@ def test_a_session_that_comes_too_late_is_closed(router: Router, monkeypatch: py
 
     monkeypatch.setattr(zenoh, "open", slowly)
     monkeypatch.setattr(rmw_zenoh_session, "LATE_S", -4.9)
-    monkeypatch.setattr(rmw_zenoh_session.RosSession, "_reach", lambda *_: None)
+    monkeypatch.setattr(rmw_zenoh_session.RosSession, "_check_listening", lambda *_: None)
     with pytest.raises(SinkError, match="does not answer as one"):
         RmwZenohSink(router.place)
     may_go.set()

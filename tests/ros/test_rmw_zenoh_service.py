@@ -20,7 +20,7 @@ from robochoc.robots.sink import SinkError
 from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
 from robochoc.ros.live import rmw_zenoh_session
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX
-from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, sender
+from robochoc.ros.live.rmw_zenoh_keys import RosNode, ZenohTopic, attachment, sender
 from robochoc.ros.live.rmw_zenoh_service import RmwZenohServices, service_hash
 from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.message_types import UnknownTypeError, types_of
@@ -107,7 +107,7 @@ def test_hashes_are_those_of_ros() -> None:
 
 
 def test_a_service_has_the_key_and_the_token_of_rmw_zenoh() -> None:
-    service = Topic.of_service("/robochoc/hangar/decide", TRIGGER, "RIHS01_10f3")
+    service = ZenohTopic.for_service("/robochoc/hangar/decide", TRIGGER, "RIHS01_10f3")
     assert service.key(7) == "7/robochoc/hangar/decide/std_srvs::srv::dds_::Trigger_/RIHS01_10f3"
     assert RosNode(7, "aac3178e146ba6f1fc6e6a4085e77f21").entity_token(3, "SS", service) == (
         "@ros2_lv/7/aac3178e146ba6f1fc6e6a4085e77f21/0/3/SS/%/%/robochoc_aac3178e/%robochoc%hangar%decide/"
@@ -207,7 +207,7 @@ def test_the_answer_names_the_request(offered: RmwZenohServices, session: zenoh.
         (b"\xff" * 3, f"the request cannot be read as one of {DECIDE}"),
         (request()[:-2], f"the request cannot be read as one of {DECIDE}"),
         (b"\0\1\0\0\xff\xff\xff\xff", f"the request cannot be read as one of {DECIDE}"),
-        (bytes(MESSAGE_BYTES_MAX + 1), "the request has 262,145 bytes, and at most 262,144 are read"),
+        (bytes(MESSAGE_BYTES_MAX + 1), "the request has 262,145 bytes; at most 262,144 are accepted"),
     ],
 )
 def test_what_is_no_request_is_refused(
@@ -234,7 +234,7 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(offered: RmwZenohServi
     offered.close()
     told = [str(one.fields()[0]["message"]) for one in asked]
     assert told.count("the service has ended") == WAITING_MAX
-    assert told.count(f"{WAITING_MAX} requests wait already; ask again later") == 3
+    assert told.count(f"{WAITING_MAX} requests are already waiting; try again later") == 3
 
 
 def test_a_client_that_is_gone_does_no_harm(offered: RmwZenohServices, router: Router) -> None:

@@ -22,7 +22,7 @@ def test_the_domain(monkeypatch: pytest.MonkeyPatch, given: str | None, domain: 
 @looped("given", ["-1", "233", "one", "1.0", "٣", "9" * 5000, "0\x1b[31m"])
 def test_a_domain_that_is_none(monkeypatch: pytest.MonkeyPatch, given: str) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", given)
-    with pytest.raises(SourceError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, and is '[^\x1b]*'$"):
+    with pytest.raises(SourceError, match=r"^ROS_DOMAIN_ID is '[^\x1b]*': set it to a whole number from 0 to 232$"):
         domain_id(SourceError)
 
 

@@ -147,7 +147,7 @@ def test_nobody_listens() -> None:
 @looped("answer", [b"", b"HTTP/1.1 404 Not Found\r\n\r\n", b"\xff" * 100_000])
 def test_what_listens_is_no_rosbridge(answer: bytes, impatient: Callable[..., None]) -> None:
     impatient("CONNECT_S", "CLOSE_S")
-    refusal = pytest.raises(SinkError, match="does not answer as a rosbridge does; start it")
+    refusal = pytest.raises(SinkError, match="does not answer as a rosbridge; start it")
     with fake_server(answer, hangs_up=False) as port, refusal:
         RosbridgeSink(f"//127.0.0.1:{port}")
 
@@ -178,7 +178,7 @@ def test_the_server_does_not_even_read_the_end(impatient: Callable[..., None]) -
     with Server(Manner(stalls=True)) as server:
         sink = RosbridgeSink(server.place)
         sink.publish("/a", POSE, pose(1), STAMP)
-        with pytest.raises(SinkError, match="has not said that it has read all"):
+        with pytest.raises(SinkError, match="has not confirmed that it has read all"):
             sink.close()
 
 
@@ -187,7 +187,7 @@ def test_the_server_complains() -> None:
     with Server(Manner(complains=complaint)) as server:
         sink = RosbridgeSink(server.place)
         sink.publish("/a", "moon_msgs/Rover", {}, STAMP)
-        with pytest.raises(SinkError, match=r"complains: Unable to import moon_msgs.msg\\x1b\[31m; see its log"):
+        with pytest.raises(SinkError, match=r"reports an error: Unable to import moon_msgs.msg\\x1b\[31m; see its log"):
             sink.close()
 
 
@@ -287,7 +287,7 @@ def test_a_program_whose_server_dies_ends_in_silence(tmp_path: Path) -> None:
     ],
 )
 def test_places(place: str, url: str) -> None:
-    assert RosbridgeAddress.of(place).url == url
+    assert RosbridgeAddress.parse(place).url == url
 
 
 @looped(

@@ -111,12 +111,12 @@ def test_without_a_clock_the_run_ends(waited: WaitedClock) -> None:
 def test_what_is_no_time_changes_none(clock: object) -> None:
     found = SimClock()
     nothing = ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": clock}, 0)
-    assert found.takes(nothing)
+    assert found.update(nothing)
     assert now_of(found) is None
-    assert found.takes(tick(2))
-    assert found.takes(nothing)
+    assert found.update(tick(2))
+    assert found.update(nothing)
     assert now_of(found) == 2 * SECOND
-    assert not found.takes(blocked())
+    assert not found.update(blocked())
 
 
 def now_of(clock: SimClock) -> int | None:
@@ -126,7 +126,7 @@ def now_of(clock: SimClock) -> int | None:
 @pytest.mark.parametrize("names", [("sec", "nanosec"), ("secs", "nsecs")])
 def test_a_time_of_a_rosbridge(names: tuple[str, str]) -> None:
     found = SimClock()
-    found.takes(ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": dict(zip(names, (3, 4), strict=True))}, 0))
+    found.update(ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": dict(zip(names, (3, 4), strict=True))}, 0))
     assert found.now_ns == 3 * SECOND + 4
 
 

@@ -160,11 +160,11 @@ def test_a_message_that_is_cut_or_lies_about_its_sizes_is_refused(size: int, pla
 
 
 def test_a_definition_that_has_the_same_fields_is_the_same() -> None:
-    assert types_of(2).is_the_same(POSE, ELSEWHERE)
-    assert types_of(2).is_the_same("geometry_msgs/msg/PoseStamped", types_of(2).definition(POSE).text)
-    assert not types_of(1).is_the_same(POSE, ELSEWHERE)
-    assert types_of(1).is_the_same(POSE, types_of(1).definition(POSE).text.replace("std_msgs/Header h", "Header h"))
-    assert types_of(2).is_the_same(BATTERY, types_of(2).definition(BATTERY).text + "\n# the end")
+    assert types_of(2).has_same_fields(POSE, ELSEWHERE)
+    assert types_of(2).has_same_fields("geometry_msgs/msg/PoseStamped", types_of(2).definition(POSE).text)
+    assert not types_of(1).has_same_fields(POSE, ELSEWHERE)
+    assert types_of(1).has_same_fields(POSE, types_of(1).definition(POSE).text.replace("std_msgs/Header h", "Header h"))
+    assert types_of(2).has_same_fields(BATTERY, types_of(2).definition(BATTERY).text + "\n# the end")
 
 
 @looped(
@@ -186,7 +186,7 @@ def test_a_definition_that_has_the_same_fields_is_the_same() -> None:
 def test_a_definition_with_other_fields_is_another(old: str, new: str) -> None:
     assert old in ELSEWHERE
     same = new.endswith("import os")  # what stands behind a field is its default value
-    assert types_of(2).is_the_same(POSE, ELSEWHERE.replace(old, new)) == same
+    assert types_of(2).has_same_fields(POSE, ELSEWHERE.replace(old, new)) == same
 
 
 @given(st.text(max_size=200) | st.text("/=[]<# \nMSG:uint8int_x9", max_size=200))

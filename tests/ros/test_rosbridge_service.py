@@ -107,7 +107,7 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(server: Server, offere
         for _ in range(WAITING_MAX + 3):
             client.ask(SERVICE)
         told = [answer["message"] for answer in client.wait_for(3)]
-        assert told == [f"{WAITING_MAX} requests wait already; ask again later"] * 3
+        assert told == [f"{WAITING_MAX} requests are already waiting; try again later"] * 3
         offered.close()
         told = [answer["message"] for answer in client.wait_for(WAITING_MAX + 3)]
         assert told.count("the service has ended") == WAITING_MAX
@@ -117,7 +117,7 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(server: Server, offere
 @pytest.mark.parametrize(
     ("args", "told"),
     [
-        ([1, 2], f"the request cannot be read as one of {DECIDE}: no object"),
+        ([1, 2], f"the request cannot be read as one of {DECIDE}: not an object"),
         ({"team": [[[[[[[[[[[[1]]]]]]]]]]]]}, f"the request cannot be read as one of {DECIDE}: nested"),
         ({"team": 5}, "team must be text, is 5"),
         ({"timeout": None}, "timeout must be seconds, or 0 for the longest, is nan"),
@@ -171,7 +171,7 @@ def test_a_client_that_is_gone_does_no_harm(server: Server, offered: RosbridgeSe
 def test_a_server_that_is_gone_ends_it(server: Server, offered: RosbridgeServices) -> None:
     server.die()
     connection = offered._connection  # noqa: SLF001 - its end
-    wait_until(connection.over.is_set, "the end of the connection is not seen")
+    wait_until(connection.ended.is_set, "the end of the connection is not seen")
     with pytest.raises(SinkError, match="has closed the connection"):
         offered.next(0)
 
@@ -180,7 +180,7 @@ def test_a_server_that_does_not_know_the_type_is_told() -> None:
     with Server(Manner(complains="Unable to load robochoc_msgs")) as server:
         done = CliRunner().invoke(cli, ["serve", HANGAR, "--ros", f"rosbridge:{server.place}"], catch_exceptions=False)
     assert done.exit_code == 1
-    assert "complains: Unable to load robochoc_msgs; see its log" in done.stderr
+    assert "reports an error: Unable to load robochoc_msgs; see its log" in done.stderr
 
 
 def test_the_command_answers(server: Server) -> None:

@@ -18,7 +18,7 @@ from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, in
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
-    from robochoc.ros.live.services import AtOnce, Refuse, Request, Services
+    from robochoc.ros.live.services import ImmediateServices, Refuse, ServiceRequest, Services
 
 _SERVICE, _CANCEL, _FEEDBACK = "/robochoc/decide", "/robochoc/cancel", "/robochoc/feedback"
 _TEXT = "std_msgs/String"
@@ -124,7 +124,7 @@ def serve(
             click.echo(f"{request.name}: {answer['message']}", err=True)
 
 
-def _requests(offered: Services, most: int | None) -> Iterator[Request]:
+def _requests(offered: Services, most: int | None) -> Iterator[ServiceRequest]:
     """Yield requests as they arrive, up to `most` of them."""
     yielded = 0
     while yielded != most:
@@ -134,13 +134,15 @@ def _requests(offered: Services, most: int | None) -> Iterator[Request]:
             yielded += 1
 
 
-def _opened(kind: str, place: str, services: Mapping[str, str], refuse: Refuse, at_once: AtOnce) -> Services:
+def _opened(
+    kind: str, place: str, services: Mapping[str, str], refuse: Refuse, immediate: ImmediateServices
+) -> Services:
     """Return the services, offered by the middleware `kind`. Raises `SinkError`."""
     module, name = _MIDDLEWARES[kind]
-    factory: Callable[[str, Mapping[str, str], Refuse, AtOnce], Services] = getattr(
+    factory: Callable[[str, Mapping[str, str], Refuse, ImmediateServices], Services] = getattr(
         import_module(f"robochoc.ros.live.{module}"), name
     )
-    return factory(place, services, refuse, at_once)
+    return factory(place, services, refuse, immediate)
 
 
 def _teams(paths: Sequence[Path]) -> list[Team]:

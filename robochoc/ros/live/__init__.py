@@ -1,1 +1,4 @@
-"""A ROS that runs: by DDS, rmw_zenoh or rosbridge, or by rospy or rclpy where these are installed."""
+"""Connections to a running ROS: DDS, rmw_zenoh and rosbridge, and rospy or rclpy where these are installed.
+
+Sinks and sources do not import `services`, which needs rosbags: so each connection's services have their own module.
+"""

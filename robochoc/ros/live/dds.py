@@ -1,4 +1,4 @@
-"""DDS: topics of ROS 2 as its nodes have them, so that ROS 2 has to be nowhere but in the robots.
+"""Sinks and sources of ROS 2 topics over DDS. No ROS 2 is required on this machine.
 
 A place is `dds:DOMAIN?OPTION=VALUE&...` (`dds_place.py`). Messages carry the bytes that ROS 2 would send.
 """
@@ -29,13 +29,13 @@ _CDR = (b"\0\0", b"\0\1")
 
 
 class DdsSink(LiveSink):
-    """Publishes in a domain of DDS. Topics are latched, unless the place says otherwise.
+    """Publishes in a domain of DDS. Topics are latched, unless an option of the place changes that.
 
-    Messages begin to leave when each waypoint's topic has a subscriber, or when the wait for that is over.
+    The first message is sent when each waypoint's topic has a subscriber, or after the longest wait.
     """
 
     def __init__(self, place: str) -> None:
-        self._place = DdsPlace.of(place, _PUBLISHED, (*_OPTIONS, "wait"), SinkError)
+        self._place = DdsPlace.parse(place, _PUBLISHED, (*_OPTIONS, "wait"), SinkError)
         super().__init__(f"domain {self._place.domain} of DDS")
         self._participant = Participant(self._place, SinkError)
 
@@ -43,17 +43,17 @@ class DdsSink(LiveSink):
         """Announce `topics`, and wait for the subscribers of waypoints."""
         for topic, kind in topics.items():
             self._participant.announce(topic, kind)
-        self._gather([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
+        self._await_subscribers([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
-        """Send a message. Waits while a subscriber is far behind."""
+        """Send a message. Wait while a subscriber is far behind."""
         try:
             content = types_of(2).encode(kind, fields)
         except (UnknownTypeError, FieldsError) as error:
             raise SinkError(f"{topic} cannot be published: {error}") from error
         if len(content) > MESSAGE_BYTES_MAX:
             problem = f"a message on {topic} has {len(content):,} bytes"
-            raise SinkError(f"{problem}, and at most {MESSAGE_BYTES_MAX:,} are sent in DDS")
+            raise SinkError(f"{problem}: DDS messages may have at most {MESSAGE_BYTES_MAX:,}")
         if not self._participant.write(topic, kind, content, STUCK_S):
             self._stuck()
 
@@ -74,8 +74,8 @@ class DdsSink(LiveSink):
         """Leave the domain."""
         self._participant.close()
 
-    def _gather(self, topics: Collection[str]) -> None:
-        """Wait until each of `topics` has a subscriber and no more come; no longer than the place says."""
+    def _await_subscribers(self, topics: Collection[str]) -> None:
+        """Wait until each of `topics` has a subscriber and no more join, up to the place's `wait`."""
         if topics:
             await_subscribers(lambda: self._participant.subscribers(topics), self._place.quality.wait_s)
 
@@ -87,15 +87,14 @@ class DdsSink(LiveSink):
 
 
 class DdsSource(LiveSource):
-    """Receives in a domain of DDS. Messages that are none of their type are ignored.
+    """Receives in a domain of DDS. Messages that do not match their type are ignored.
 
-    Its readers are as those of ROS 2 for sensors, if the place does not say otherwise: they take reliable messages and
-    others.
+    By default its readers have ROS 2's quality of service for sensors: they accept reliable and best-effort messages.
     """
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._participant = Participant(DdsPlace.of(place, _RECEIVED, _OPTIONS, SourceError), SourceError)
+        self._participant = Participant(DdsPlace.parse(place, _RECEIVED, _OPTIONS, SourceError), SourceError)
         self._subscription = self._participant.subscribe({}, self._receive)
 
     def listen(self, topics: Mapping[str, str]) -> None:

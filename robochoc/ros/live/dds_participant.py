@@ -1,6 +1,6 @@
-"""A participant of a DDS domain. This module and `dds_types` alone know Cyclone DDS (cyclonedds).
+"""A participant of a DDS domain. Only this module and `dds_types` use Cyclone DDS (cyclonedds).
 
-A process has each domain once. A sink and a source of the same domain share it; the last that leaves closes it.
+A process opens each domain once. A sink and a source of the same domain share it; the last one to leave closes it.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from cyclonedds.topic import Topic
 
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.dds_types import raw_service_type, raw_type, topic_name
-from robochoc.ros.live.transport import Failed
+from robochoc.ros.live.transport import ErrorClass
 from robochoc.ros.message_types import UnknownTypeError, types_of
 
 END_S = 5.0
-"""The longest wait for the thread, in seconds."""
+"""The longest wait for the end of a subscription's thread, in seconds."""
 _TAKEN = 100
-"""Messages taken of a topic at a time."""
+"""The number of messages read from a topic at a time."""
 _WAIT_NS = 1_000_000_000
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
 MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages are neither sent nor received: waypoints and reports are short."""
 BLOCKED_S = 0.2
-"""The time after which a call that waits for others comes back, so that a signal is heard."""
+"""The longest time that a blocking call lasts, in seconds, so that signals are handled."""
 REQUESTS_MAX = 256
-"""Requests of a service, and answers of it, that are kept in DDS until they are read."""
+"""The number of unread requests, and of unread answers, that DDS stores per service."""
 _SECOND_NS = 1_000_000_000
 _LIMIT = (
     "<CycloneDDS><Domain><Internal>"
@@ -57,25 +57,25 @@ _LIMIT = (
 
 
 class _Domains:
-    """The domains of this process that are in use, and by how many."""
+    """The open domains of this process, with the number of their users."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._open: dict[int, tuple[Domain, int]] = {}
 
     def enter(self, number: int) -> None:
-        """Open the domain if it is not. Raises `DDSException`, `UnicodeEncodeError`."""
+        """Open the domain, or count one more user of it. Raises `DDSException`, `UnicodeEncodeError`."""
         with self._lock:
             domain, users = self._open.get(number, (None, 0))
             if domain is None:
                 given = os.environ.get(CONFIGURATION_VARIABLE, "")
                 domain = Domain(number, f"{given},{_LIMIT}" if given else _LIMIT)
-                # It writes on standard error, a line for each message of a stranger that it does not like.
+                # Otherwise it writes a line on standard error for each invalid message of an unknown participant.
                 load_cyclonedds().dds_set_log_mask(0)
             self._open[number] = domain, users + 1
 
     def leave(self, number: int) -> None:
-        """Close the domain if nobody else uses it."""
+        """Count one user less of the domain; close it after the last."""
         with self._lock:
             domain, users = self._open.pop(number)
             if users > 1:
@@ -86,9 +86,9 @@ _domains = _Domains()
 
 
 class Participant:
-    """A participant of the domain of `place`. Raises `failed`, as its methods do."""
+    """A participant of the domain of `place`. The constructor and the methods raise `failed`."""
 
-    def __init__(self, place: DdsPlace, failed: Failed) -> None:
+    def __init__(self, place: DdsPlace, failed: ErrorClass) -> None:
         self.domain, self._quality, self._failed = place.domain, place.quality, failed
         self._writers: dict[str, Any] = {}
         self._publisher: Any = None
@@ -106,7 +106,7 @@ class Participant:
             raise
 
     def announce(self, topic: str, kind: str) -> None:
-        """Make a writer for `topic`."""
+        """Create a writer for `topic`."""
         with self._reported(f"{topic} cannot be announced in DDS"):
             if self._publisher is None:
                 self._publisher = Publisher(self._participant, qos=_partitions(self._quality))
@@ -114,19 +114,19 @@ class Participant:
                 self._publisher, self._topic(topic, kind), qos=_of_writer(self._quality, kind)
             )
 
-    def subscribe(self, topics: Mapping[str, str], take: Callable[[str, str, bytes], None]) -> Subscription:
-        """Return a subscription to `topics` with these types. It calls `take` with each message, in its own thread."""
+    def subscribe(self, topics: Mapping[str, str], receive: Callable[[str, str, bytes], None]) -> Subscription:
+        """Subscribe to `topics`, given with their types. Each message is passed to `receive`, in a thread."""
         with self._reported("the topics cannot be subscribed to in DDS"):
             subscriber = Subscriber(self._participant, qos=_partitions(self._quality))
             readers = [
                 (DataReader(subscriber, self._topic(topic, kind), qos=_of_reader(self._quality, kind)), topic, kind)
                 for topic, kind in topics.items()
             ]
-            return Subscription(self._participant, readers, take)
+            return Subscription(self._participant, readers, receive)
 
     def serve(self, name: str, kind: str) -> ServiceEnd:
-        """Return this end of a service of the type `kind`, such as `std_srvs/Trigger`."""
-        # Both of its topics have the same mark, by which clients know that they belong together.
+        """Return the server's end of a service of the type `kind`, such as `std_srvs/Trigger`."""
+        # Clients match the two topics of a service by this common mark.
         mark = ".".join(f"{byte:x}" for byte in secrets.token_bytes(16))
         quality = Qos(
             Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS)),
@@ -142,7 +142,7 @@ class Participant:
             told: Any = Topic(self._participant, f"rr{name}Reply", response)
             partitions = _partitions(self._quality)
             writer = DataWriter(Publisher(self._participant, qos=partitions), told, qos=quality)
-            # A request that came is never displaced by a later one: the writer waits until there is room.
+            # A later request never displaces an earlier one: its writer waits until there is room.
             others = Qos(
                 Policy.History.KeepAll,
                 Policy.ResourceLimits(REQUESTS_MAX, REQUESTS_MAX, REQUESTS_MAX),
@@ -156,7 +156,7 @@ class Participant:
         return Topic(self._participant, topic_name(topic), raw_type(kind))
 
     def write(self, topic: str, kind: str, content: bytes, patience_s: float) -> bool:
-        """Publish a message; return False if a subscriber is behind, and stays so for `patience_s`."""
+        """Publish a message; return False if a subscriber cannot accept it within `patience_s` seconds."""
         message = raw_type(kind)(content)
         until = time.monotonic() + patience_s
         while True:
@@ -170,13 +170,13 @@ class Participant:
                 return True
 
     def subscribers(self, topics: Iterable[str]) -> list[int]:
-        """Return how many subscribers each of `topics` has now."""
+        """Return the present number of subscribers of each of `topics`."""
         with self._reported("the subscribers in DDS cannot be counted"):
             return [int(self._writers[topic].get_publication_matched_status().current_count) for topic in topics]
 
     def is_acknowledged(self, topic: str) -> bool:
-        """Return whether all reliable subscribers of `topic` have its messages. Waits for it, up to `BLOCKED_S`."""
-        with self._reported("DDS does not tell who has received what"):
+        """Return whether all reliable subscribers acknowledge the messages of `topic` within `BLOCKED_S`."""
+        with self._reported("DDS cannot report which messages were acknowledged"):
             try:
                 return bool(self._writers[topic].wait_for_acks(round(BLOCKED_S * _SECOND_NS)))
             except AttributeError:  # cyclonedds 11.0.1 does not find its own constant when the time is over
@@ -192,7 +192,7 @@ class Participant:
 
     @contextmanager
     def _reported(self, what: str, hint: str = "") -> Iterator[None]:
-        """Raise what fails in DDS as `failed`, and `TimeoutError` where time is over."""
+        """Raise errors of DDS as `failed`, and its timeouts as `TimeoutError`."""
         try:
             yield
         except DDSException as error:
@@ -207,41 +207,43 @@ class Participant:
 
 
 class ServiceEnd:
-    """The end of a service that answers: bytes of requests come, bytes of answers go."""
+    """The server's end of a service: it receives the bytes of requests and sends the bytes of answers."""
 
     def __init__(self, participant: Any, name: str, kind: str, reader: Any, writer: Any) -> None:  # noqa: ANN401 - the library's
         self._participant, self._name, self._kind = participant, name, kind
         self._reader, self._writer = reader, writer
         self._subscription: Subscription | None = None
 
-    def listen(self, take: Callable[[str, str, bytes], None]) -> None:
-        """Call `take` with the service's name, its type and the bytes of each request, in a thread of its own."""
-        self._subscription = Subscription(self._participant, [(self._reader, self._name, self._kind)], take)
+    def listen(self, receive: Callable[[str, str, bytes], None]) -> None:
+        """Call `receive` in a separate thread with the service's name, its type and the bytes of each request."""
+        self._subscription = Subscription(self._participant, [(self._reader, self._name, self._kind)], receive)
 
     def write(self, content: bytes) -> None:
-        """Send an answer. One that no client reads is lost."""
+        """Send an answer. It is lost if no client reads it."""
         with suppress(DDSException):
             self._writer.write(raw_service_type(f"{self._kind}_Response")(content))
 
     def has_clients(self) -> bool:
-        """Return whether somebody listens for answers."""
+        """Return whether a client listens for answers."""
         return bool(self._writer.get_publication_matched_status().current_count)
 
     def is_acknowledged(self) -> bool:
-        """Return whether all clients have their answers. Waits for it, up to `BLOCKED_S`."""
+        """Return whether all clients acknowledge their answers within `BLOCKED_S`."""
         try:
             return bool(self._writer.wait_for_acks(round(BLOCKED_S * _SECOND_NS)))
         except (AttributeError, DDSException):  # cyclonedds 11.0.1 does not find its own constant when the time is over
             return False
 
     def stop(self) -> None:
-        """Take no more requests."""
+        """Stop accepting requests."""
         if self._subscription is not None:
             self._subscription.close()
 
 
 class Subscription:
-    """Takes messages from `readers`, each with its topic and its type, and hands over their bytes, until it is closed.
+    """Reads messages in a thread of its own, so that few wait in DDS, and passes their bytes to `receive`.
+
+    `readers` are given with their topics and types.
 
     Raises:
         DDSException: The participant cannot wait for messages.
@@ -251,10 +253,10 @@ class Subscription:
         self,
         participant: DomainParticipant,
         readers: Sequence[tuple[DataReader[Any], str, str]],
-        take: Callable[[str, str, bytes], None],
+        receive: Callable[[str, str, bytes], None],
     ) -> None:
-        self._take = take
-        self._over = threading.Event()
+        self._receive = receive
+        self._ended = threading.Event()
         self._wakes: Any = GuardCondition(participant)
         self._waits: Any = WaitSet(participant)
         self._waits.attach(self._wakes)
@@ -265,29 +267,29 @@ class Subscription:
         self._thread.start()
 
     def _run(self) -> None:
-        while not self._over.is_set():
+        while not self._ended.is_set():
             with suppress(DDSException):
                 self._waits.wait(_WAIT_NS)
             for reader, topic, kind in self._readers:
-                if self._over.is_set():
+                if self._ended.is_set():
                     return
-                self._take_from(reader, topic, kind)
+                self._read(reader, topic, kind)
 
-    def _take_from(self, reader: DataReader[Any], topic: str, kind: str) -> None:
-        while not self._over.is_set():
+    def _read(self, reader: DataReader[Any], topic: str, kind: str) -> None:
+        while not self._ended.is_set():
             try:
                 found = reader.take(_TAKEN)
             except DDSException:
                 return
             for message in found:
                 if message.sample_info.valid_data:
-                    self._take(topic, kind, message.content)
+                    self._receive(topic, kind, message.content)
             if len(found) < _TAKEN:
                 return
 
     def close(self) -> None:
         """End the thread and the subscription."""
-        self._over.set()
+        self._ended.set()
         with suppress(DDSException):
             self._wakes.set(True)
         self._thread.join(END_S)
@@ -300,7 +302,7 @@ def _partitions(quality: Quality) -> Any:  # noqa: ANN401 - the library's
 
 
 def _of_writer(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the library's
-    """Return the quality of a writer. All that subscribers have not acknowledged is kept, `depth` for later ones."""
+    """Return the quality of a writer. It stores unacknowledged messages, and `depth` messages for later subscribers."""
     return Qos(
         *_common(quality, kind),
         Policy.History.KeepAll,
@@ -310,7 +312,7 @@ def _of_writer(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the librar
 
 
 def _of_reader(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the library's
-    """Return the quality of a reader. Names of fields are not compared: some definitions write `x_` for `x`."""
+    """Return the quality of a reader. Field names are not compared, as some definitions write `x_` for `x`."""
     return Qos(
         *_common(quality, kind),
         Policy.History.KeepLast(quality.depth),
@@ -319,7 +321,7 @@ def _of_reader(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the librar
 
 
 def _common(quality: Quality, kind: str) -> Iterator[Any]:
-    """Yield what readers and writers have in common. The hash of the type is where ROS 2 looks for it."""
+    """Yield the policies common to readers and writers. The hash of the type is in the user data, as in ROS 2."""
     blocked = Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS))
     yield blocked if quality.reliable else Policy.Reliability.BestEffort
     yield Policy.Durability.TransientLocal if quality.latched else Policy.Durability.Volatile

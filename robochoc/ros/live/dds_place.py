@@ -1,4 +1,4 @@
-"""Places of DDS: `dds:DOMAIN?OPTION=VALUE&...`, with the options that ROS 2 calls quality of service."""
+"""Places in DDS: `dds:DOMAIN?OPTION=VALUE&...`. The options are ROS 2's quality of service."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.ros2_names import DOMAIN_MAX, domain_id
-from robochoc.ros.live.transport import Failed
+from robochoc.ros.live.transport import ErrorClass
 
 DEPTHS = range(1, 1001)
 WAIT_S_MAX = 600.0
@@ -24,14 +24,14 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality of service, as far as a place can choose it."""
+    """The part of quality of service that a place can choose."""
 
     reliable: bool
-    """False: messages that are lost on the way are not sent again, and who asks for reliable ones gets none."""
+    """False: lost messages are not sent again, and subscribers that require reliable ones receive none."""
     latched: bool
-    """True: transient local. Who subscribes later receives the last messages."""
+    """True: transient local. Later subscribers receive the last messages."""
     depth: int
-    """The number of messages that are kept of each topic: for those that subscribe later, or until they are read."""
+    """The number of messages stored per topic, for later subscribers or until they are read."""
     wait_s: float = 0.0
     """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
     partitions: tuple[str, ...] = ()
@@ -39,24 +39,24 @@ class Quality:
 
 @dataclass(frozen=True)
 class DdsPlace:
-    """A domain, and the quality of service there."""
+    """A domain and the quality of service in it."""
 
     domain: int
     quality: Quality
 
     @classmethod
-    def of(cls, place: str, usual: Quality, options: Collection[str], failed: Failed) -> DdsPlace:
-        """Return what `place` names, with `options` that it may give; others are as `usual`. Raises `failed`.
+    def parse(cls, place: str, default: Quality, options: Collection[str], failed: ErrorClass) -> DdsPlace:
+        """Parse `place`, in which only `options` may be given; the others have their `default`. Raises `failed`.
 
         >>> from robochoc.robots.sink import SinkError
-        >>> usual = Quality(reliable=True, latched=True, depth=1)
-        >>> DdsPlace.of("5?partition=hall&depth=3", usual, ("partition", "depth"), SinkError)
+        >>> default = Quality(reliable=True, latched=True, depth=1)
+        >>> DdsPlace.parse("5?partition=hall&depth=3", default, ("partition", "depth"), SinkError)
         DdsPlace(domain=5, quality=Quality(reliable=True, latched=True, depth=3, wait_s=0.0, partitions=('hall',)))
         """
         number, _, rest = place.partition("?")
         try:
             domain = _domain(number) if number else domain_id(failed)
-            quality = usual
+            quality = default
             for name, value in _pairs(rest):
                 if name not in options:
                     raise _wrong(f"{name!r} is not an option of this place", f"known are {', '.join(options)}")

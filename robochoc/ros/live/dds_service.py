@@ -1,8 +1,8 @@
-"""Services of ROS 2 in DDS, in the form that Cyclone DDS's middleware (rmw_cyclonedds_cpp) has.
+"""Services of ROS 2 over DDS, in the form of Cyclone DDS's middleware (rmw_cyclonedds_cpp).
 
-A request travels on `rq/NAMERequest`, its answer on `rr/NAMEReply`. Before the fields of both there are 16 bytes: who
-asks, and the number of the request. The answer repeats them, so that clients know theirs. Requests come from outside:
-each that can be told from others is answered, also one whose fields cannot be read.
+A request is sent on `rq/NAMERequest`, its answer on `rr/NAMEReply`. Both begin with 16 bytes: the client's id and the
+number of the request. Clients find their answers by them. Requests are untrusted: each one with a valid header is
+answered, even if its fields cannot be read.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from collections.abc import Mapping
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant, ServiceEnd
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.services import WAITING_MAX, AtOnce, Refuse, Request, Services, known_fields
+from robochoc.ros.live.services import WAITING_MAX, ImmediateServices, Refuse, ServiceRequest, Services, known_fields
 from robochoc.ros.message_types import FieldsError, types_of
 
 MATCH_S = 1.0
-"""The longest wait for the client's reader of answers, in seconds: it may be found after its request has come."""
+"""The longest wait for the client's reader of answers, in seconds. It may be discovered after its request."""
 END_S = 2.0
 """The longest wait for clients to acknowledge the last answers, in seconds."""
 _HEADER = 16
@@ -27,18 +27,22 @@ _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 
 
 class DdsServices(Services):
-    """Offers services in a domain of DDS. The client of a request is the 16 bytes of its header.
+    """Offers services in a domain of DDS. A request's `client` is the 16 bytes of its header.
 
     Args:
         place: As for the sink `dds`; only the domain and partitions may be given.
         services: The type of each service, such as `std_srvs/Trigger`.
-        refuse: Makes the fields of an answer that refuses, for a reason in words.
-        at_once: Those of the services that do not wait for their turn.
+        refuse: Returns the fields of an answer that refuses a request for a given reason.
+        immediate: The services that are answered without a queue.
     """
 
-    def __init__(self, place: str, services: Mapping[str, str], refuse: Refuse, at_once: AtOnce | None = None) -> None:
-        super().__init__(services, refuse, at_once)
-        found = DdsPlace.of(place, Quality(reliable=True, latched=False, depth=WAITING_MAX), ("partition",), SinkError)
+    def __init__(
+        self, place: str, services: Mapping[str, str], refuse: Refuse, immediate: ImmediateServices | None = None
+    ) -> None:
+        super().__init__(services, refuse, immediate)
+        found = DdsPlace.parse(
+            place, Quality(reliable=True, latched=False, depth=WAITING_MAX), ("partition",), SinkError
+        )
         self.domain = found.domain
         self.where = f"domain {found.domain} of DDS"
         self._ends: dict[str, ServiceEnd] = {}
@@ -52,7 +56,7 @@ class DdsServices(Services):
             self.close()
             raise
 
-    def reply(self, request: Request, fields: Fields) -> None:
+    def reply(self, request: ServiceRequest, fields: Fields) -> None:
         """Answer `request`."""
         end = self._ends[request.name]
         until = time.monotonic() + MATCH_S
@@ -65,11 +69,11 @@ class DdsServices(Services):
         self._participant.announce(topic, kind)
 
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
-        """Publish a message. One for which a subscriber has no room is left out."""
+        """Publish a message, or drop it if a subscriber has no room for it."""
         self._participant.write(topic, kind, types_of(2).encode(kind, fields), 0)
 
     def close(self) -> None:
-        """Refuse what still waits, and leave the domain."""
+        """Refuse the waiting requests, and leave the domain."""
         for end in self._ends.values():
             end.stop()
         self._refuse_waiting()
@@ -81,10 +85,10 @@ class DdsServices(Services):
         self._participant.close()
 
     def _receive(self, name: str, _: str, content: bytes) -> None:
-        """Take a request, in the subscription's thread."""
+        """Accept a request, in the subscription's thread."""
         order = _ORDERS.get(content[:2])
         if order is None or not _ENCAPSULATION + _HEADER <= len(content) <= MESSAGE_BYTES_MAX:
-            return  # nobody can be answered
+            return  # without a client id no answer is possible
         begin, end = _ENCAPSULATION, _ENCAPSULATION + _HEADER
         header = struct.pack("<Qq", *struct.unpack(f"{order}Qq", content[begin:end]))
         kind = self._kinds[name]
@@ -93,9 +97,9 @@ class DdsServices(Services):
         except FieldsError:
             self._write(name, header, self._refuse(f"the request cannot be read as one of {kind}"))
             return
-        self._take(Request(name, fields, header))
+        self._accept(ServiceRequest(name, fields, header))
 
-    def _refuse_now(self, request: Request, why: str) -> None:
+    def _refuse_now(self, request: ServiceRequest, why: str) -> None:
         self._write(request.name, request.client, self._refuse(why))
 
     def _write(self, name: str, header: bytes, fields: Fields) -> None:

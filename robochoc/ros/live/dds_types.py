@@ -1,8 +1,8 @@
-"""DDS types of ROS types. The bytes of messages are those of `message_types.py`: DDS only carries them.
+"""DDS types of ROS types. `message_types.py` encodes the messages: DDS only transports their bytes.
 
 ROS 2 publishes `/a/b` on the DDS topic `rt/a/b`, and `geometry_msgs/PoseStamped` as the DDS type
-`geometry_msgs::msg::dds_::PoseStamped_`. The description of a type is for those that ask for it, such as
-`cyclonedds subscribe`: its fields have the names that they have in ROS.
+`geometry_msgs::msg::dds_::PoseStamped_`. Tools such as `cyclonedds subscribe` request the description of a type; its
+fields have their ROS names.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from robochoc.ros.message_types import FieldType, types_of
 from robochoc.ros.waypoint_types import short_kind
 
 _idl: Any = idl_types
-"""Its generic types are none to mypy."""
+"""mypy does not accept its generic types."""
 _SCALARS: dict[str, Any] = {
     "bool": bool,
     "byte": _idl.byte,
-    "char": _idl.uint8,  # as ROS 2 has it
+    "char": _idl.uint8,  # as in ROS 2
     **{f"float{bits}": getattr(_idl, f"float{bits}") for bits in (32, 64)},
     **{f"{sign}int{bits}": getattr(_idl, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
 }
 _BOUND_MAX = 65_535
-"""A greater bound of a sequence cannot be described; the sequence is described without one."""
+"""Sequences with a greater bound are described as unbounded: DDS cannot express it."""
 
 
 class RawMessage(Protocol):
-    """A message of a DDS type as it travels: its bytes in CDR, with the header of four bytes."""
+    """A message as sent over DDS: its bytes in CDR, with the header of four bytes."""
 
     content: bytes
 
@@ -39,7 +39,7 @@ class RawMessage(Protocol):
 
 
 def topic_name(topic: str) -> str:
-    """Return the name in DDS of a topic of ROS 2."""
+    """Return the DDS name of a ROS 2 topic."""
     return f"rt{topic}"
 
 
@@ -47,16 +47,16 @@ def topic_name(topic: str) -> str:
 def raw_type(kind: str) -> type[RawMessage]:
     """Return the DDS type of `kind`, whose messages stay bytes. Raises `UnknownTypeError`.
 
-    It is the library's own way to a type, with the conversion to and from objects replaced.
+    The type is created by the library, and its conversion to and from objects is replaced.
     """
-    return _raw(_described(short_kind(kind)))
+    return _raw(_new_struct(short_kind(kind)))
 
 
 @cache
 def raw_service_type(kind: str) -> type[RawMessage]:
     """Return the DDS type of one half of a service, such as `std_srvs/Trigger_Request`. Raises `UnknownTypeError`.
 
-    Before its fields are those by which Cyclone DDS's middleware tells requests apart.
+    Its first fields identify the request in Cyclone DDS's middleware.
     """
     name = dds_type_name(kind).replace("::msg::", "::srv::")
     header = {"client_guid": _SCALARS["uint64"], "sequence_number": _SCALARS["int64"]}
@@ -64,32 +64,32 @@ def raw_service_type(kind: str) -> type[RawMessage]:
     return _raw(make_idl_struct(name.rpartition("::")[2], name, {**header, **fields}, dataclassify=True))
 
 
-def _raw(made: Any) -> type[RawMessage]:  # noqa: ANN401 - a class that was made here
-    """Return a described type whose messages stay bytes."""
+def _raw(made: Any) -> type[RawMessage]:  # noqa: ANN401 - a class created at run time
+    """Replace the conversions of a type, so that its messages stay bytes."""
 
-    def keep(self: Any, content: bytes) -> None:  # noqa: ANN401 - made above
+    def init(self: Any, content: bytes) -> None:  # noqa: ANN401
         self.content = content
 
-    def written(self: Any, *_: object, **__: object) -> bytes:  # noqa: ANN401 - made above
+    def serialize(self: Any, *_: object, **__: object) -> bytes:  # noqa: ANN401
         return cast("bytes", self.content)
 
-    def read(content: bytes, *_: object, **__: object) -> Any:  # noqa: ANN401 - made above
+    def deserialize(content: bytes, *_: object, **__: object) -> Any:  # noqa: ANN401
         return made(content)
 
-    for name, method in {"__init__": keep, "serialize": written, "serialize_key": written}.items():
+    for name, method in {"__init__": init, "serialize": serialize, "serialize_key": serialize}.items():
         setattr(made, name, method)
     for name in ("deserialize", "deserialize_key"):
-        setattr(made, name, staticmethod(read))
+        setattr(made, name, staticmethod(deserialize))
     return cast("type[RawMessage]", made)
 
 
 @cache
-def described(kind: str) -> Any:  # noqa: ANN401 - a class that is made here
-    """Return the description of `kind` as DDS has it: a class of the library. Raises `UnknownTypeError`."""
-    return _described(kind)
+def dds_struct(kind: str) -> Any:  # noqa: ANN401 - a class created at run time
+    """Return the DDS description of `kind`, a class of the library. Raises `UnknownTypeError`."""
+    return _new_struct(kind)
 
 
-def _described(kind: str) -> Any:  # noqa: ANN401 - see above
+def _new_struct(kind: str) -> Any:  # noqa: ANN401 - see above
     fields = {name: _field(field) for name, field in types_of(2).layout(kind)}
     name = dds_type_name(kind)
     return make_idl_struct(name.rpartition("::")[2], name, fields, dataclassify=True)
@@ -97,7 +97,7 @@ def _described(kind: str) -> Any:  # noqa: ANN401 - see above
 
 def _field(field: FieldType) -> Any:  # noqa: ANN401 - annotations of the library
     if "/" in field.name:
-        one: Any = described(field.name)
+        one: Any = dds_struct(field.name)
     elif field.name == "string":
         one = _idl.bounded_str[field.limit] if field.limit else str
     else:

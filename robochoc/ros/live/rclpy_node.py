@@ -1,8 +1,8 @@
-"""rclpy: a node of ROS 2 in this process, where rclpy can be imported: it comes with a ROS 2, for that ROS's Python.
+"""Sinks and sources as a ROS 2 node in this process. rclpy is part of an installed ROS 2, for its Python version.
 
-rclpy is untyped; this module and `rclpy_service` alone know it. Each sink and each source
-has a context and a node of its own, so that what else uses rclpy in this process is left alone. The domain, the
-middleware and its network are rclpy's own business: `ROS_DOMAIN_ID`, `RMW_IMPLEMENTATION` and the like.
+rclpy is untyped; only this module and `rclpy_service` use it. Each sink and each source has its own context and node,
+so that other users of rclpy in this process are not affected. Environment variables such as `ROS_DOMAIN_ID` and
+`RMW_IMPLEMENTATION` configure the domain, the middleware and its network.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from robochoc.ros.live.ros2_names import domain_id
 from robochoc.ros.live.transport import (
     LINGER_S,
     STUCK_S,
-    Failed,
+    ErrorClass,
     LiveSink,
     LiveSource,
     await_subscribers,
@@ -43,27 +43,27 @@ _ELEMENT = re.compile(r"(?:sequence<)?([\w/]+(?:<\d+>)?)")
 WAIT_S = 2.0
 """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
 BLOCKED_S = 0.2
-"""The time after which a call that waits for others comes back, so that a signal is heard."""
+"""The longest time that a blocking call lasts, in seconds, so that signals are handled."""
 END_S = 5.0
-"""The longest wait for the thread that spins, in seconds."""
+"""The longest wait for the end of the spinning thread, in seconds."""
 MESSAGE_BYTES_MAX = 256 * 1024
-"""A longer message is ignored: reports are short."""
+"""Longer messages are ignored: reports are short."""
 INSTALLED = Path("/opt/ros")
-"""Where a ROS 2 is installed by its packages."""
+"""The folder in which packages of ROS 2 install it."""
 OLDEST_PYTHON = (3, 11)
-"""robochoc runs on none that is older."""
+"""The oldest Python version on which robochoc runs."""
 _WRONG_FIELDS = (ValueError, TypeError, AttributeError, AssertionError, OverflowError)
 _PYTHON = re.compile(r"python(\d+\.\d+)")
 
 
 class RclpyNode:
-    """A node in a context of its own. Raises `failed`, as its methods do."""
+    """A node in a context of its own. The constructor and the methods raise `failed`."""
 
-    def __init__(self, place: str, failed: Failed) -> None:
+    def __init__(self, place: str, failed: ErrorClass) -> None:
         if place:
-            raise failed(f"rclpy takes no place, and got {shortened(place)!r}; say the domain in ROS_DOMAIN_ID")
+            raise failed(f"rclpy has no place, but {shortened(place)!r} was given; set the domain in ROS_DOMAIN_ID")
         self._failed = failed
-        domain_id(failed)  # middlewares do not say what is wrong with it
+        domain_id(failed)  # middlewares give no reason for an invalid one
         try:
             importlib.import_module("rclpy")
             made = importlib.import_module("rclpy.context").Context()
@@ -76,15 +76,17 @@ class RclpyNode:
         self._name = f"robochoc_{secrets.token_hex(4)}"
         self._others: list[Any] = []
         try:
-            # Neither its signals nor its log, which would be a file.
+            # Without rclpy's signal handlers and its log file.
             made.init([], initialize_logging=False)
-            self.node: Any = self._made(node, self._name)
+            self.node: Any = self._create_node(node, self._name)
         except Exception as error:
             made.try_shutdown()
-            raise failed(f"rclpy cannot make a node ({_said(error)}); see ROS_DOMAIN_ID, RMW_IMPLEMENTATION") from error
+            raise failed(
+                f"rclpy cannot make a node ({_error_text(error)}); see ROS_DOMAIN_ID, RMW_IMPLEMENTATION"
+            ) from error
 
     def quality(self, *, waypoints: bool) -> Any:  # noqa: ANN401 - rclpy is untyped
-        """Return the quality of service: reliable and latched for what is published, or as ROS 2 has it for sensors."""
+        """Return the quality of service of waypoints (reliable, latched), or ROS 2's quality for sensors."""
         qos = self._qos
         reliable, latched = qos.ReliabilityPolicy, qos.DurabilityPolicy
         return qos.QoSProfile(
@@ -94,8 +96,8 @@ class RclpyNode:
             durability=latched.TRANSIENT_LOCAL if waypoints else latched.VOLATILE,
         )
 
-    def for_services(self) -> Any:  # noqa: ANN401 - rclpy is untyped
-        """Return the quality of service of what is told while it happens: reliable, not latched."""
+    def service_quality(self) -> Any:  # noqa: ANN401 - rclpy is untyped
+        """Return the quality of service of topics beside services: reliable, not latched."""
         return self._qos.QoSProfile(
             history=self._qos.HistoryPolicy.KEEP_LAST,
             depth=PER_TOPIC_MAX,
@@ -103,12 +105,12 @@ class RclpyNode:
             durability=self._qos.DurabilityPolicy.VOLATILE,
         )
 
-    def another_node(self, what: str) -> Any:  # noqa: ANN401 - rclpy is untyped
-        """Return another node in the same context, whose name ends with `what`. It is closed with the first."""
-        self._others.append(self._made(importlib.import_module("rclpy.node").Node, f"{self._name}_{what}"))
+    def add_node(self, suffix: str) -> Any:  # noqa: ANN401 - rclpy is untyped
+        """Return another node in the same context, whose name ends with `suffix`. It is closed with the first."""
+        self._others.append(self._create_node(importlib.import_module("rclpy.node").Node, f"{self._name}_{suffix}"))
         return self._others[-1]
 
-    def _made(self, node: Any, name: str) -> Any:  # noqa: ANN401 - rclpy is untyped
+    def _create_node(self, node: Any, name: str) -> Any:  # noqa: ANN401 - rclpy is untyped
         return node(
             name,
             context=self.context,
@@ -118,7 +120,7 @@ class RclpyNode:
         )
 
     def check(self) -> None:
-        """Raise `failed` if the context was shut down, by whoever else is in this process."""
+        """Raise `failed` if other code in this process has shut down the context."""
         if not self.context.ok():
             raise self._failed("rclpy was shut down in this process; start again")
 
@@ -131,10 +133,10 @@ class RclpyNode:
 
 
 class RclpySink(LiveSink):
-    """Publishes as a node of ROS 2. Topics are reliable and latched: later subscribers receive the last message.
+    """Publishes as a ROS 2 node. Topics are reliable and latched: later subscribers receive the last message.
 
-    A topic keeps one message. The next is published when all subscribers have acknowledged the one before, so that they
-    receive every one.
+    A topic stores one message. The next one is published when all subscribers have acknowledged it, so that none is
+    lost.
     """
 
     def __init__(self, place: str) -> None:
@@ -151,21 +153,21 @@ class RclpySink(LiveSink):
             try:
                 publisher = self._ros.node.create_publisher(kind, topic, self._ros.quality(waypoints=True))
             except Exception as error:
-                raise SinkError(on_one_line(f"{topic} cannot be announced in ROS 2: {_said(error)}")) from error
+                raise SinkError(on_one_line(f"{topic} cannot be announced in ROS 2: {_error_text(error)}")) from error
             self._publishers[topic], self._kinds[topic] = publisher, kind
-        self._gather([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
+        self._await_subscribers([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
         """Send a message once the previous message on its topic was acknowledged."""
         try:
             message = filled(self._kinds[topic](), fields)
         except _WRONG_FIELDS as error:
-            raise SinkError(on_one_line(f"{topic} cannot be published as {kind}: {_said(error)}")) from error
+            raise SinkError(on_one_line(f"{topic} cannot be published as {kind}: {_error_text(error)}")) from error
         self._await_acknowledged(topic)
         try:
             self._publishers[topic].publish(message)
         except Exception as error:
-            raise SinkError(on_one_line(f"{topic} cannot be published in ROS 2: {_said(error)}")) from error
+            raise SinkError(on_one_line(f"{topic} cannot be published in ROS 2: {_error_text(error)}")) from error
 
     def close(self) -> None:
         """Wait until all subscribers have acknowledged everything."""
@@ -181,8 +183,8 @@ class RclpySink(LiveSink):
         """Leave ROS."""
         self._ros.close()
 
-    def _gather(self, topics: Collection[str]) -> None:
-        """Wait until each of `topics` has a subscriber and no more come; no longer than `WAIT_S`."""
+    def _await_subscribers(self, topics: Collection[str]) -> None:
+        """Wait until each of `topics` has a subscriber and no more join, up to `WAIT_S`."""
 
         def counts() -> list[int]:
             self._ros.check()
@@ -192,32 +194,32 @@ class RclpySink(LiveSink):
             await_subscribers(counts, WAIT_S)
 
     def _await_acknowledged(self, topic: str) -> None:
-        """Wait until all subscribers of `topic` have its messages. Raises `SinkError` if one does not for `STUCK_S`."""
+        """Wait until all subscribers of `topic` acknowledge its messages. Raises `SinkError` after `STUCK_S`."""
         until = time.monotonic() + STUCK_S
         while not self._is_acknowledged(topic):
             if time.monotonic() > until:
                 problem = f"a subscriber of {topic} has acknowledged nothing for {STUCK_S:g} s"
-                raise SinkError(f"{problem}; see `ros2 topic info -v {topic}` for who it is, and end it")
+                raise SinkError(f"{problem}; see `ros2 topic info -v {topic}` to find it, and end it")
 
     def _is_acknowledged(self, topic: str) -> bool:
         self._ros.check()
         try:
             return bool(self._publishers[topic].wait_for_all_acked(self._duration(nanoseconds=int(BLOCKED_S * 1e9))))
-        except Exception:  # noqa: BLE001 - a middleware or an rclpy that cannot tell
+        except Exception:  # noqa: BLE001 - not supported by this middleware or rclpy
             self._ros.check()
             return True
 
 
 class RclpySource(LiveSource):
-    """Receives as a node of ROS 2. A thread spins it until the source is closed.
+    """Receives as a ROS 2 node. A thread spins it until the source is closed.
 
-    Its subscriptions are as ROS 2 has them for sensors: they take messages of reliable publishers and of others.
+    Its subscriptions have ROS 2's quality of service for sensors: they accept reliable and best-effort publishers.
     """
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._ros = RclpyNode(place, SourceError)
-        self._over: threading.Event = threading.Event()
+        self._ended: threading.Event = threading.Event()
         self._problem = ""
         self._decode: Any = importlib.import_module("rclpy.serialization").deserialize_message
         executors = importlib.import_module("rclpy.executors")
@@ -231,19 +233,21 @@ class RclpySource(LiveSource):
         kinds = {topic: (kind, message_class(kind, SourceError, "rclpy")) for topic, kind in topics.items()}
         quality = self._ros.quality(waypoints=False)
         for topic, (kind, type_) in kinds.items():
-            take = partial(self._receive, topic, kind, type_)
+            receive = partial(self._receive, topic, kind, type_)
             try:
-                self._ros.node.create_subscription(type_, topic, take, quality, raw=True)
+                self._ros.node.create_subscription(type_, topic, receive, quality, raw=True)
             except Exception as error:
-                raise SourceError(on_one_line(f"{topic} cannot be subscribed to in ROS 2: {_said(error)}")) from error
+                raise SourceError(
+                    on_one_line(f"{topic} cannot be subscribed to in ROS 2: {_error_text(error)}")
+                ) from error
 
     def _check(self) -> None:
-        if self._over.is_set():
-            raise SourceError(f"rclpy receives nothing any more ({self._problem or 'closed'}); start again")
+        if self._ended.is_set():
+            raise SourceError(f"rclpy has stopped receiving ({self._problem or 'closed'}); start again")
 
     def close(self) -> None:
         """End the thread, and leave ROS."""
-        self._over.set()
+        self._ended.set()
         with suppress(Exception):  # it may be shut down already
             self._executor.wake()
         self._thread.join(END_S)
@@ -252,12 +256,12 @@ class RclpySource(LiveSource):
         self._ros.close()
 
     def _spin(self) -> None:
-        while not self._over.is_set():
+        while not self._ended.is_set():
             try:
                 self._executor.spin_once(timeout_sec=BLOCKED_S)
             except Exception as error:  # noqa: BLE001 - raised by `next`
-                self._problem = _said(error)
-                self._over.set()
+                self._problem = _error_text(error)
+                self._ended.set()
                 self._inbox.wake()
 
     def _receive(self, topic: str, kind: str, type_: Any, content: bytes) -> None:  # noqa: ANN401 - rclpy is untyped
@@ -265,7 +269,7 @@ class RclpySource(LiveSource):
             return
         try:
             fields = fields_of(self._decode(content, type_))
-        except Exception:  # noqa: BLE001 - bytes that are no message are ignored
+        except Exception:  # noqa: BLE001 - malformed messages are ignored
             return
         self._put(topic, kind, fields)
 
@@ -286,7 +290,11 @@ def _advice() -> str:
 
 
 def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are untyped
-    """Return `message` with these fields. Raises `ValueError` for a field that it does not have."""
+    """Set the fields of `message`, converted to the types that rclpy's setters require, and return it.
+
+    rclpy is strict: a `float64` must be a `float`, and a `byte` is a `bytes` object. Raises `ValueError` for unknown
+    fields.
+    """
     kinds = message.get_fields_and_field_types()
     for name, value in fields.items():
         if name not in kinds:
@@ -336,5 +344,5 @@ def _plain(value: Any, kind: str) -> Any:  # noqa: ANN401 - a field is anything
     return [_plain(one, kind) for one in value] if isinstance(value, list | tuple) else value
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return shortened(on_one_line(f"{type(error).__name__}: {error}"))

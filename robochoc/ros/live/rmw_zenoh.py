@@ -1,4 +1,4 @@
-"""rmw_zenoh: topics of a ROS 2 whose middleware is zenoh, so that no ROS has to be installed here."""
+"""Sinks and sources of a ROS 2 whose middleware is zenoh (rmw_zenoh). No ROS is required on this machine."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from functools import partial
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import ReceivedMessage, SourceError
-from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, Topic
+from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, ZenohTopic
 from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosSession
 from robochoc.ros.live.transport import LiveSink, LiveSource
 from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
 
 MESSAGE_BYTES_MAX = 256 * 1024
-"""A longer message is ignored: reports are short."""
+"""Longer messages are ignored: reports are short."""
 _CHECK_S = 1.0
 
 
 class RmwZenohSink(LiveSink):
-    """Publishes by a zenoh router. Topics are reliable and transient local: late subscribers receive the last message.
+    """Publishes via a zenoh router. Topics are reliable and transient local: late subscribers receive the last message.
 
-    With `ROS_DISTRO=humble` keys are those of ROS 2 Humble, which have no hash of the type.
+    With `ROS_DISTRO=humble`, keys have the form of ROS 2 Humble, without a hash of the type.
     """
 
     def __init__(self, place: str) -> None:
@@ -33,17 +33,17 @@ class RmwZenohSink(LiveSink):
         self._session = RosSession(place, SinkError)
 
     def _announce(self, topics: Mapping[str, str]) -> None:
-        """Declare publishers, which are visible from now on."""
+        """Declare publishers, which are then visible in ROS 2."""
         for topic, kind in topics.items():
             try:
                 type_hash = types_of(2).type_hash(kind)
             except UnknownTypeError as error:
                 raise SinkError(on_one_line(f"{topic}: {error}")) from error
-            named = Topic.of(topic, kind, NO_HASH if self._is_humble else type_hash)
+            named = ZenohTopic.for_topic(topic, kind, NO_HASH if self._is_humble else type_hash)
             self._publishers[topic] = self._session.publisher(named)
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Send a message in the background, with the given time."""
+        """Send a message in the background, stamped with `at_ns`."""
         try:
             content = types_of(2).encode(kind, fields)
         except FieldsError as error:
@@ -52,14 +52,14 @@ class RmwZenohSink(LiveSink):
         self._publishers[topic].put(content, at_ns)
 
     def close(self) -> None:
-        """Wait until the router has been sent everything."""
+        """Wait until all messages have been sent to the router."""
         try:
             self._session.wait_for_link()
         except SinkError:
             self.discard()
             raise
         if not self._session.close():
-            raise SinkError(f"the zenoh router {self._session.router} does not take our messages; see its log")
+            raise SinkError(f"the zenoh router {self._session.router} does not accept our messages; see its log")
 
     def discard(self) -> None:
         """End the session."""
@@ -67,7 +67,7 @@ class RmwZenohSink(LiveSink):
 
 
 class RmwZenohSource(LiveSource):
-    """Receives by a zenoh router. Malformed messages, and those of another definition of their type, are ignored."""
+    """Receives via a zenoh router. Messages that are malformed or have another definition of their type are ignored."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -77,13 +77,13 @@ class RmwZenohSource(LiveSource):
         """Subscribe to `topics`."""
         for name, kind in topics.items():
             try:
-                topic = Topic.of(name, kind, types_of(2).type_hash(kind))
+                topic = ZenohTopic.for_topic(name, kind, types_of(2).type_hash(kind))
             except UnknownTypeError as error:
                 raise SourceError(on_one_line(f"{name}: {error}")) from error
             self._session.subscribe(topic, partial(self._receive, topic, kind))
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the next message; the link is checked once a second."""
+        """Return the next message; check the link once a second."""
         until = time.monotonic() + wait_s
         while True:
             left = until - time.monotonic()
@@ -98,7 +98,7 @@ class RmwZenohSource(LiveSource):
         """End the session."""
         self._session.close()
 
-    def _receive(self, topic: Topic, kind: str, key: str, content: bytes) -> None:
+    def _receive(self, topic: ZenohTopic, kind: str, key: str, content: bytes) -> None:
         if key.rpartition("/")[2] not in {topic.hash, NO_HASH} or len(content) > MESSAGE_BYTES_MAX:
             return
         try:

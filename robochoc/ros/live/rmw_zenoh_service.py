@@ -1,4 +1,7 @@
-"""Services of a ROS 2 whose middleware is zenoh. A request is a query, which names its client; so does the answer."""
+"""Services of a ROS 2 whose middleware is zenoh, and the hash of their types (RIHS01).
+
+A request is a zenoh query. Its attachment, and that of the answer, contain the client's id.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,9 @@ from typing import Any
 
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX
-from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, Topic
+from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, ZenohTopic
 from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosQuery, RosSession
-from robochoc.ros.live.services import AtOnce, Refuse, Request, Services, known_fields
+from robochoc.ros.live.services import ImmediateServices, Refuse, ServiceRequest, Services, known_fields
 from robochoc.ros.message_types import FieldsError, FieldType, types_of
 from robochoc.ros.waypoint_types import short_kind
 
@@ -40,7 +43,7 @@ _NUMBERS: Mapping[str, int] = MappingProxyType(
 """The numbers of types in `type_description_interfaces/msg/FieldType`."""
 _NESTED, _BOUNDED_STRING = 1, 21
 _ARRAY, _BOUNDED, _UNBOUNDED = 48, 96, 144
-"""Numbers added to that of a type for an array, and for a sequence with and without a limit."""
+"""Added to a type's number for an array, a bounded sequence and an unbounded sequence."""
 _TIME, _INFO = "builtin_interfaces/msg/Time", "service_msgs/msg/ServiceEventInfo"
 _INFO_FIELDS = (
     ("event_type", FieldType("uint8")),
@@ -52,26 +55,28 @@ _TIME_FIELDS = (("sec", FieldType("int32")), ("nanosec", FieldType("uint32")))
 
 
 class RmwZenohServices(Services):
-    """Offers services by a zenoh router, as a node that `ros2 service list` sees. Clients wait for each answer.
+    """Offers services via a zenoh router, as a node visible to `ros2 service list`. Clients wait for each answer.
 
-    With `ROS_DISTRO=humble` keys are those of ROS 2 Humble, which have no hash of the type.
+    With `ROS_DISTRO=humble`, keys have the form of ROS 2 Humble, without a hash of the type.
 
     Args:
         place: As for the sink `rmw_zenoh`.
         services: The type of each service, such as `std_srvs/Trigger`.
-        refuse: Makes the fields of an answer that refuses, for a reason in words.
-        at_once: Those of the services that do not wait for their turn.
+        refuse: Returns the fields of an answer that refuses a request for a given reason.
+        immediate: The services that are answered without a queue.
     """
 
-    def __init__(self, place: str, services: Mapping[str, str], refuse: Refuse, at_once: AtOnce | None = None) -> None:
-        super().__init__(services, refuse, at_once)
+    def __init__(
+        self, place: str, services: Mapping[str, str], refuse: Refuse, immediate: ImmediateServices | None = None
+    ) -> None:
+        super().__init__(services, refuse, immediate)
         self._is_humble = os.environ.get("ROS_DISTRO") == "humble"
         self._publishers: dict[str, RosPublisher] = {}
         self._session = RosSession(place, SinkError)
         self.where = f"zenoh router {self._session.router}"
         try:
             for name, kind in services.items():
-                named = Topic.of_service(name, kind, NO_HASH if self._is_humble else service_hash(kind))
+                named = ZenohTopic.for_service(name, kind, NO_HASH if self._is_humble else service_hash(kind))
                 self._session.serve(named, partial(self._receive, name, kind))
         except BaseException:
             self._session.close()
@@ -81,28 +86,28 @@ class RmwZenohServices(Services):
         """Raise `SinkError` if the router has been out of reach for long."""
         self._session.check()
 
-    def reply(self, request: Request, fields: Fields) -> None:
+    def reply(self, request: ServiceRequest, fields: Fields) -> None:
         """Answer `request`."""
         _reply(request.client, self._kinds[request.name], fields)
 
     def announce(self, topic: str, kind: str) -> None:
-        """Announce a topic. It keeps the last message for later subscribers, as all of ours in zenoh do."""
+        """Announce a topic. The last message is stored for later subscribers."""
         type_hash = NO_HASH if self._is_humble else types_of(2).type_hash(kind)
-        self._publishers[topic] = self._session.publisher(Topic.of(topic, kind, type_hash))
+        self._publishers[topic] = self._session.publisher(ZenohTopic.for_topic(topic, kind, type_hash))
 
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
         """Publish a message."""
         self._publishers[topic].put(types_of(2).encode(kind, fields), time.time_ns())
 
     def close(self) -> None:
-        """Refuse what still waits, and leave the router."""
+        """Refuse the waiting requests, and leave the router."""
         self._refuse_waiting()
         self._session.close()
 
     def _receive(self, name: str, kind: str, content: bytes, query: RosQuery) -> None:
-        """Take a request, in a thread of zenoh's."""
+        """Accept a request, in a thread of zenoh."""
         if len(content) > MESSAGE_BYTES_MAX:
-            why = f"the request has {len(content):,} bytes, and at most {MESSAGE_BYTES_MAX:,} are read"
+            why = f"the request has {len(content):,} bytes; at most {MESSAGE_BYTES_MAX:,} are accepted"
             _reply(query, kind, self._refuse(why))
             return
         try:
@@ -110,7 +115,7 @@ class RmwZenohServices(Services):
         except FieldsError:
             _reply(query, kind, self._refuse(f"the request cannot be read as one of {kind}"))
             return
-        self._take(Request(name, fields, query))
+        self._accept(ServiceRequest(name, fields, query))
 
 
 def _reply(query: RosQuery, kind: str, fields: Fields) -> None:
@@ -119,11 +124,15 @@ def _reply(query: RosQuery, kind: str, fields: Fields) -> None:
 
 @cache
 def service_hash(kind: str) -> str:
-    """Return the hash of the service type `kind`, such as `std_srvs/Trigger`, all of whose fields are primitive.
+    """Return the hash of the service type `kind`, such as `std_srvs/Trigger`, whose fields must all be primitive.
+
+    ROS 2 compares the definitions of services by it (REP 2016, the packages rosidl_generator_type_description and
+    service_msgs). A service is a type with three fields: its request, its response, and the event of service
+    introspection. The hash is the SHA-256 of their descriptions in canonical JSON.
 
     Raises:
-        UnknownTypeError: One of its halves is not known.
-        ValueError: It has a field of a type of its own.
+        UnknownTypeError: The type of the request or of the response is unknown.
+        ValueError: A field is not primitive.
     """
     name = short_kind(kind).replace("/", "/srv/", 1)
     halves = {f"{name}_{half}": types_of(2).layout(f"{kind}_{half}") for half in ("Request", "Response")}
@@ -135,11 +144,11 @@ def service_hash(kind: str) -> str:
         _described(_TIME, (_field(*field) for field in _TIME_FIELDS)),
     ]
     parts = zip(("request_message", "response_message", "event_message"), (*halves, event), strict=True)
-    whole = {
+    description = {
         "type_description": _described(name, (_named(part, _NESTED, nested=one) for part, one in parts)),
         "referenced_type_descriptions": sorted(described, key=lambda one: str(one["type_name"])),
     }
-    return f"RIHS01_{hashlib.sha256(json.dumps(whole).encode()).hexdigest()}"
+    return f"RIHS01_{hashlib.sha256(json.dumps(description).encode()).hexdigest()}"
 
 
 def _event_fields(request: str, response: str) -> Iterable[dict[str, Any]]:
@@ -156,7 +165,7 @@ def _field(name: str, kind: FieldType) -> dict[str, Any]:
     if kind.name == "builtin_interfaces/Time":
         return _named(name, _NESTED, nested=_TIME)
     if kind.name not in _NUMBERS:
-        raise ValueError(f"{name} is a {kind.name}: only primitive fields are known for services")
+        raise ValueError(f"{name} has the type {kind.name}: fields of services must be primitive")
     number = _BOUNDED_STRING if kind.limit else _NUMBERS[kind.name]
     shape = {"one": 0, "array": _ARRAY, "sequence": _BOUNDED if kind.size else _UNBOUNDED}[kind.shape]
     return _named(name, number + shape, capacity=kind.size, characters=kind.limit)

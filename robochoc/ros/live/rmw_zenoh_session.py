@@ -1,8 +1,8 @@
 """A session with the zenoh router of a ROS 2: it publishes bytes on topics, and receives them.
 
-This module and the network's (`communication/network`) alone know zenoh. The session is a client of the router, which
-forwards all; so it listens on no port. zenoh's calls may wait long, and hear no signals: those that open and close have
-a thread of their own. A link that breaks is opened anew by zenoh in the background, with all that was declared.
+Only this module and `communication/network` use zenoh. The session is a client of the router, which forwards all
+messages; so it listens on no port. zenoh's calls may block for long and ignore signals: sessions are opened and closed
+in a separate thread. zenoh restores a broken link in the background, with all declarations.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ import zenoh.ext
 
 from robochoc.communication.network.zenoh_config import config
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, gid_of, sender
+from robochoc.ros.live.rmw_zenoh_keys import RosNode, ZenohTopic, attachment, gid_of, sender
 from robochoc.ros.live.ros2_names import domain_id
-from robochoc.ros.live.transport import Failed, succeeds_in_time
+from robochoc.ros.live.transport import ErrorClass, succeeds_in_time
 
 PORT = 7447
 """The default port of a zenoh router."""
 OPEN_S = 5.0
 """The longest wait for the router's answer, in seconds."""
 LATE_S = 1.0
-"""Seconds after these in which zenoh itself must have given up."""
+"""Additional seconds until zenoh itself must have given up."""
 GONE_S = 5.0
 """The longest time for which the link may be broken, in seconds."""
 CLOSE_S = 10.0
-"""The longest time that closing may take, in seconds."""
+"""The longest time for closing a session, in seconds."""
 CONFIG_FILE = "ZENOH_SESSION_CONFIG_URI"
-"""The variable that names a file with a zenoh configuration, as for ROS 2 itself: certificates, an endpoint."""
+"""The environment variable that names a zenoh configuration file, as for ROS 2 itself: certificates, an endpoint."""
 _HEARTBEAT_S = 0.5
-"""Seconds after which a subscriber learns that it misses the last message."""
+"""Seconds after which a subscriber detects that it has missed the last message."""
 _START = "start one: `ros2 run rmw_zenoh_cpp rmw_zenohd`"
 
 Receive = Callable[[str, bytes], None]
 """Called by zenoh's threads with the key of a message and its bytes."""
 ReceiveQuery = Callable[[bytes, "RosQuery"], None]
-"""Called by zenoh's threads with the bytes of a request, and that by which it is answered."""
+"""Called by zenoh's threads with the bytes of a request, and the query to answer."""
 
 
 class RouterAddress(NamedTuple):
@@ -55,8 +55,8 @@ class RouterAddress(NamedTuple):
     port: int
 
     @classmethod
-    def of(cls, place: str) -> RouterAddress:
-        """Return the address that `place` names: `HOST`, `HOST:PORT`, `//HOST:PORT` or nothing. Raises `ValueError`."""
+    def parse(cls, place: str) -> RouterAddress:
+        """Parse `HOST`, `HOST:PORT`, `//HOST:PORT` or an empty place. Raises `ValueError`."""
         wanted = f"expected rmw_zenoh, or rmw_zenoh://HOST:PORT, as in rmw_zenoh://localhost:{PORT}"
         text = place.removeprefix("//")
         try:
@@ -76,7 +76,7 @@ class RouterAddress(NamedTuple):
 class RosPublisher:
     """A publisher on one topic. Late subscribers receive its last message."""
 
-    def __init__(self, session: zenoh.Session, node: RosNode, topic: Topic, number: int) -> None:
+    def __init__(self, session: zenoh.Session, node: RosNode, topic: ZenohTopic, number: int) -> None:
         token = node.entity_token(number, "MP", topic)
         self._gid = gid_of(token)
         self._published = 0
@@ -92,19 +92,19 @@ class RosPublisher:
         self._token = session.liveliness().declare_token(token)
 
     def put(self, content: bytes, at_ns: int) -> None:
-        """Publish a message. While a link takes nothing more, this waits; zenoh closes such a link after seconds."""
+        """Publish a message. Waits while the link is congested; zenoh closes such a link after some seconds."""
         self._published += 1
         self._publisher.put(content, attachment=attachment(self._published, at_ns, self._gid))
 
 
 class RosQuery:
-    """A request of a service's client, which is answered once. A client that is gone is no error."""
+    """A request of a service's client, which is answered once. It is not an error if the client has left."""
 
     def __init__(self, query: zenoh.Query, key: str, number: int, gid: bytes) -> None:
         self._query, self._key, self._number, self._gid = query, key, number, gid
 
     def reply(self, content: bytes) -> None:
-        """Answer it. The attachment says which request of which client this answers."""
+        """Send the answer. Its attachment contains the number of the request and the client's id."""
         attached = attachment(self._number, time.time_ns(), self._gid)
         with suppress(zenoh.ZError):
             self._query.reply(self._key, content, attachment=attached)
@@ -112,41 +112,41 @@ class RosQuery:
 
 
 class RosSession:
-    """A node of ROS 2 by the router at `place`. Raises `failed` where there is none, or when it is gone."""
+    """A ROS 2 node, connected to the router at `place`. Raises `failed` if the router is missing or lost."""
 
-    def __init__(self, place: str, failed: Failed) -> None:
+    def __init__(self, place: str, failed: ErrorClass) -> None:
         self._failed = failed
         domain = domain_id(failed)
         configured = os.environ.get(CONFIG_FILE, "").strip()
         try:
-            address = None if configured and not place else RouterAddress.of(place)
+            address = None if configured and not place else RouterAddress.parse(place)
         except ValueError as error:
             raise failed(str(error)) from error
         self.router = on_one_line(f"of {configured}") if address is None else f"at {address}"
         if address is not None:
-            self._reach(address)
-        self._session = self._opened(address, Path(configured) if configured else None)
+            self._check_listening(address)
+        self._session = self._open(address, Path(configured) if configured else None)
         self._node = RosNode(domain, str(self._session.zid()))
         self._entities = 0
         self._missed_since: float | None = None
         self._declared: list[object] = [self._session.liveliness().declare_token(self._node.token)]
 
-    def publisher(self, topic: Topic) -> RosPublisher:
-        """Return a publisher on `topic`, which others see from now on."""
+    def publisher(self, topic: ZenohTopic) -> RosPublisher:
+        """Return a new publisher on `topic`, which is then visible in ROS 2."""
         self._entities += 1
         return RosPublisher(self._session, self._node, topic, self._entities)
 
-    def subscribe(self, topic: Topic, receive: Receive) -> None:
-        """Pass what is published on `topic` to `receive`, whatever its type's hash. Last messages come at once."""
+    def subscribe(self, topic: ZenohTopic, receive: Receive) -> None:
+        """Pass messages on `topic`, of any type hash, to `receive`. It gets the publishers' last messages at once."""
         self._entities += 1
 
-        def take(sample: zenoh.Sample) -> None:
+        def on_sample(sample: zenoh.Sample) -> None:
             receive(str(sample.key_expr), sample.payload.to_bytes())
 
         subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
             topic.any_key(self._node.domain),
-            zenoh.handlers.Callback(take, indirect=False),
+            zenoh.handlers.Callback(on_sample, indirect=False),
             history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
             recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
             subscriber_detection=True,
@@ -154,22 +154,22 @@ class RosSession:
         token = self._session.liveliness().declare_token(self._node.entity_token(self._entities, "MS", topic))
         self._declared += [subscriber, token]
 
-    def serve(self, service: Topic, receive: ReceiveQuery) -> None:
-        """Offer `service`, and pass its requests to `receive`. One that does not say whose it is gets an error."""
+    def serve(self, service: ZenohTopic, receive: ReceiveQuery) -> None:
+        """Offer `service`, and pass its requests to `receive`. A request without a client's id gets an error."""
         self._entities += 1
         key = service.key(self._node.domain)
 
-        def take(query: zenoh.Query) -> None:
+        def on_query(query: zenoh.Query) -> None:
             attached, payload = query.attachment, query.payload
             known = sender(attached.to_bytes()) if attached is not None else None
             if known is None or payload is None:
                 with suppress(zenoh.ZError):
-                    query.reply_err(b"a request of rmw_zenoh has a payload and an attachment")
+                    query.reply_err(b"invalid request: rmw_zenoh requires a payload and an attachment")
                 query.drop()  # type: ignore[no-untyped-call]  # zenoh's stubs
                 return
             receive(payload.to_bytes(), RosQuery(query, key, *known))
 
-        handler = zenoh.handlers.Callback(take, indirect=False)
+        handler = zenoh.handlers.Callback(on_query, indirect=False)
         queryable = self._session.declare_queryable(key, handler, complete=True)
         token = self._session.liveliness().declare_token(self._node.entity_token(self._entities, "SS", service))
         self._declared += [queryable, token]
@@ -183,28 +183,28 @@ class RosSession:
         now = time.monotonic()
         self._missed_since = now if self._missed_since is None else self._missed_since
         if now - self._missed_since > GONE_S:
-            raise self._failed(f"the zenoh router {self.router} is gone; {_START}")
+            raise self._failed(f"the connection to the zenoh router {self.router} is lost; {_START}")
 
     def wait_for_link(self) -> None:
-        """Return when there is a link. Raises `failed` if there is none for `GONE_S`."""
+        """Wait for a link to the router. Raises `failed` after `GONE_S`."""
         self.check()
         while self._missed_since is not None:
             time.sleep(0.02)
             self.check()
 
     def close(self) -> bool:
-        """End the session; return whether zenoh has sent all that it had taken over."""
+        """End the session; return whether zenoh has sent all its messages."""
         return succeeds_in_time(self._session.close, CLOSE_S)
 
-    def _reach(self, address: RouterAddress) -> None:
-        """Raise `failed` at once where nobody listens; zenoh would try on."""
+    def _check_listening(self, address: RouterAddress) -> None:
+        """Raise `failed` at once if no program listens; zenoh would retry."""
         try:
             socket.create_connection(address, OPEN_S).close()
         except (OSError, UnicodeError) as error:
             why = shortened(on_one_line(getattr(error, "strerror", None) or str(error) or type(error).__name__))
             raise self._failed(f"no zenoh router listens at {address} ({why}); {_START}") from error
 
-    def _opened(self, address: RouterAddress | None, file: Path | None) -> zenoh.Session:
+    def _open(self, address: RouterAddress | None, file: Path | None) -> zenoh.Session:
         settings: dict[str, object] = {
             "mode": "client",
             "listen/endpoints": [],
@@ -217,25 +217,25 @@ class RosSession:
             made = config(settings, file)
         except zenoh.ZError as error:
             why = shortened(on_one_line(str(error)))
-            raise self._failed(f"{CONFIG_FILE} names no zenoh configuration: {why}") from error
+            raise self._failed(f"{CONFIG_FILE} does not name a valid zenoh configuration: {why}") from error
         opening = _Opening()
-        succeeds_in_time(lambda: opening.take(zenoh.open(made)), OPEN_S + LATE_S)
+        succeeds_in_time(lambda: opening.set_session(zenoh.open(made)), OPEN_S + LATE_S)
         session = opening.session_in_time()
         if session is None:
-            raise self._failed(f"what listens as the zenoh router {self.router} does not answer as one; {_START}")
+            raise self._failed(f"the zenoh router {self.router} does not answer as a zenoh router; {_START}")
         return session
 
 
 class _Opening:
-    """A session that is being opened in a thread, which closes it again if it comes too late."""
+    """A session that is being opened in a thread. The thread closes it again if it is opened too late."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._session: zenoh.Session | None = None
         self._is_late = False
 
-    def take(self, session: zenoh.Session) -> None:
-        """Take the session, in the thread that has opened it."""
+    def set_session(self, session: zenoh.Session) -> None:
+        """Store the session, in the thread that has opened it."""
         with self._lock:
             self._session = session
             is_late = self._is_late
@@ -243,7 +243,7 @@ class _Opening:
             session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
     def session_in_time(self) -> zenoh.Session | None:
-        """Return the session; None if it is not there, and comes too late from now on."""
+        """Return the session; None if it is not open yet, and from now on counts as late."""
         with self._lock:
             self._is_late = True
             return self._session

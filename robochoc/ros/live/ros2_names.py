@@ -1,4 +1,4 @@
-"""Names of ROS 2 that hold whatever carries its messages: the domain, and a type's name in DDS and zenoh."""
+"""Names in ROS 2 that DDS and zenoh share: the domain, and the DDS name of a type."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import os
 import re
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.transport import Failed
+from robochoc.ros.live.transport import ErrorClass
 from robochoc.ros.waypoint_types import short_kind
 
 DOMAIN_MAX = 232
-"""DDS has no ports for more domains."""
+"""The largest domain for which DDS has ports."""
 _DOMAIN = re.compile(r"\d{1,9}", re.ASCII)
 
 
-def domain_id(failed: Failed) -> int:
-    """Return the domain that `ROS_DOMAIN_ID` names, 0 if it names none. Raises `failed`."""
+def domain_id(failed: ErrorClass) -> int:
+    """Return the domain in `ROS_DOMAIN_ID`; 0 if it is not set. Raises `failed`."""
     given = os.environ.get("ROS_DOMAIN_ID", "").strip()
     if not given:
         return 0
     if not _DOMAIN.fullmatch(given) or int(given) > DOMAIN_MAX:
         shown = shortened(on_one_line(given))
-        raise failed(f"ROS_DOMAIN_ID must be a whole number from 0 to {DOMAIN_MAX}, and is {shown!r}")
+        raise failed(f"ROS_DOMAIN_ID is {shown!r}: set it to a whole number from 0 to {DOMAIN_MAX}")
     return int(given)
 
 

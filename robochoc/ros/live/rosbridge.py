@@ -1,4 +1,4 @@
-"""rosbridge: topics of a ROS 1 or a ROS 2 over a WebSocket, so that neither has to be installed here."""
+"""Sinks and sources of a ROS 1 or ROS 2 over a WebSocket (rosbridge). No ROS is required on this machine."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from robochoc.robots.source import SourceError
 from robochoc.ros.live.rosbridge_connection import Connection, MalformedMessageError, incoming, outgoing
 from robochoc.ros.live.transport import LiveSink, LiveSource
 
-_LOOK_EVERY = 100
-"""Messages published between two looks at how many bytes are on their way."""
+_CHECK_EVERY = 100
+"""The number of published messages between two checks of the bytes still to be sent."""
 
 
 class RosbridgeSink(LiveSink):
@@ -25,7 +25,7 @@ class RosbridgeSink(LiveSink):
         self._published = 0
 
     def advertise(self, topics: Mapping[str, str]) -> None:
-        """Announce new topics to the server, whose complaints are raised here."""
+        """Announce new topics to the server. Raises `SinkError` for errors that it has reported."""
         self._check()
         super().advertise(topics)
 
@@ -39,11 +39,11 @@ class RosbridgeSink(LiveSink):
         """Send a message in the background."""
         self._topics[topic].publish(outgoing(fields))
         self._published += 1
-        if self._published % _LOOK_EVERY == 0 and self._connection.is_ahead():
+        if self._published % _CHECK_EVERY == 0 and self._connection.is_ahead():
             self._connection.drain()
 
     def close(self) -> None:
-        """Wait until the server has read everything."""
+        """Wait until the server has read all messages."""
         try:
             self._check()
             self._connection.drain()
@@ -53,7 +53,9 @@ class RosbridgeSink(LiveSink):
             self._connection.abort()
             raise
         if not self._connection.close() and not is_confirmed:
-            raise SinkError(f"the rosbridge at {self._connection.url} has not said that it has read all; see its log")
+            raise SinkError(
+                f"the rosbridge at {self._connection.url} has not confirmed that it has read all messages; see its log"
+            )
 
     def discard(self) -> None:
         """End the connection."""
@@ -61,9 +63,9 @@ class RosbridgeSink(LiveSink):
 
     def _check(self) -> None:
         self._connection.check()
-        if self._connection.complaint:
-            said = f"the rosbridge at {self._connection.url} complains: {self._connection.complaint}"
-            raise SinkError(f"{said}; see its log")
+        if self._connection.error:
+            problem = f"the rosbridge at {self._connection.url} reports an error: {self._connection.error}"
+            raise SinkError(f"{problem}; see its log")
 
 
 class RosbridgeSource(LiveSource):
@@ -72,8 +74,8 @@ class RosbridgeSource(LiveSource):
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._connection = Connection(place, SourceError)
-        self._over = self._connection.over
-        self._connection.on_over = self._inbox.wake
+        self._ended = self._connection.ended
+        self._connection.on_end = self._inbox.wake
 
     def listen(self, topics: Mapping[str, str]) -> None:
         """Subscribe to `topics`."""

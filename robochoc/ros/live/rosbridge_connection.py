@@ -1,6 +1,10 @@
-"""A connection to a rosbridge. roslibpy speaks the protocol (rosbridge v2); this module alone knows roslibpy.
+"""A connection to a rosbridge by roslibpy (protocol rosbridge v2), and the JSON of its messages.
 
-A place is `//HOST:PORT`, or `wss://HOST:PORT` for TLS.
+Only this module uses roslibpy. A place is `//HOST:PORT`, or `wss://HOST:PORT` for TLS.
+
+In JSON, times are sent as `secs` and `nsecs`, which the bridges of both versions of ROS accept; that of ROS 2 sends
+`sec` and `nanosec`. So the version need not be known. JSON has no NaN: it is received as null, and sent as `NaN`, which
+the bridges' parsers (Python's) accept.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from robochoc.robots.sink import Fields
 from robochoc.system.errors import RobochocError
 
 _DEPTH_MAX = 10
-"""Fields are nested no deeper."""
+"""The deepest nesting of fields."""
 _BILLION = 1_000_000_000
 _SECONDS = range(-(2**31), 2**32)
 PORT = 9090
@@ -30,17 +34,17 @@ PORT = 9090
 CONNECT_S = 5.0
 """The longest wait for a server's answer, in seconds."""
 DRAIN_S = 10.0
-"""The longest time for which the server may leave pending messages unread, in seconds."""
+"""The longest time for which the server may leave sent messages unread, in seconds."""
 LOOP_S = 10.0
-"""The longest wait for the connection's own thread, in seconds."""
+"""The longest wait for the connection's thread, in seconds."""
 CONFIRM_S = 3.0
-"""The longest wait for the confirmation that all was read, in seconds. A server that forbids services sends none."""
+"""The longest wait for the confirmation that all messages were read, in seconds. Servers without services send none."""
 CLOSE_S = 4.0
-"""The longest wait for the closing handshake, in seconds. It is shorter than roslibpy's."""
+"""The longest wait for the closing handshake, in seconds; shorter than roslibpy's."""
 MESSAGE_BYTES_MAX = 256 * 1024
-"""A longer message from the server ends the connection: reports are short."""
+"""Longer messages from the server end the connection: reports are short."""
 _BUFFERED = 1_000_000
-"""Bytes on their way to the server before we wait for it."""
+"""The number of unsent bytes above which the sink waits for the server."""
 _START = "start it there: `roslaunch rosbridge_server rosbridge_websocket.launch`, or `ros2 launch` the .xml in ROS 2"
 
 
@@ -53,8 +57,8 @@ class RosbridgeAddress(NamedTuple):
     path: str = ""
 
     @classmethod
-    def of(cls, place: str) -> RosbridgeAddress:
-        """Return the address that `place` names. Raises `ValueError`."""
+    def parse(cls, place: str) -> RosbridgeAddress:
+        """Parse a place. Raises `ValueError`."""
         wanted = f"expected rosbridge://HOST:PORT, as in rosbridge://localhost:{PORT}, or rosbridge:wss://HOST:PORT"
         try:
             parts = urlsplit(place if "//" in place else f"//{place}")
@@ -67,84 +71,84 @@ class RosbridgeAddress(NamedTuple):
 
     @property
     def url(self) -> str:
-        """The address as a URL of WebSocket."""
+        """The WebSocket URL of the address."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'wss' if self.secure else 'ws'}://{host}:{self.port}{self.path}"
 
 
 class Connection:
-    """A connection to a rosbridge. Raises `failed` when there is none, or when it is lost."""
+    """A connection to a rosbridge. Raises `failed` if no rosbridge answers, or if the connection is lost."""
 
     def __init__(self, place: str, failed: type[Exception]) -> None:
         self._failed = failed
         try:
-            address = RosbridgeAddress.of(place)
+            address = RosbridgeAddress.parse(place)
         except ValueError as error:
             raise failed(str(error)) from error
         self.url = address.url
-        self.over = threading.Event()
-        self.complaint = ""
+        self.ended = threading.Event()
+        self.error = ""
         self._transport: Any = None
-        self.on_over: Callable[[], None] = lambda: None
+        self.on_end: Callable[[], None] = lambda: None
         ready = threading.Event()
-        _reach(address, failed)
+        _check_listening(address, failed)
         self.roslibpy = _roslibpy(failed)
         self.ros = _connect(self.roslibpy, self.url)
         self.ros.on("close", self._on_close)
-        self.ros.factory.on_ready(partial(self._opened, ready))
+        self.ros.factory.on_ready(partial(self._on_open, ready))
         until = time.monotonic() + CONNECT_S
         while not ready.wait(0.02):
-            if self.over.is_set() or time.monotonic() > until:
+            if self.ended.is_set() or time.monotonic() > until:
                 self.abort()
                 secure = ", or this machine does not trust its certificate" if address.secure else ""
-                raise failed(f"what listens at {self.url} does not answer as a rosbridge does{secure}; {_START}")
+                raise failed(f"the server at {self.url} does not answer as a rosbridge{secure}; {_START}")
 
-    def _opened(self, ready: threading.Event, protocol: Any) -> None:  # noqa: ANN401 - roslibpy is untyped
+    def _on_open(self, ready: threading.Event, protocol: Any) -> None:  # noqa: ANN401 - roslibpy is untyped
         self._protocol, self._transport = protocol, protocol.transport
-        # roslibpy knows of these messages, but not what to do with them, and has no way to register for them.
+        # roslibpy ignores status messages, and has no public way to register a handler for them.
         protocol._message_handlers["status"] = self._on_status  # noqa: SLF001
         ready.set()
 
     def _on_status(self, message: Mapping[str, object]) -> None:
         if message.get("level") == "error":
-            self.complaint = self.complaint or shortened(on_one_line(str(message.get("msg", ""))[:1000]))
+            self.error = self.error or shortened(on_one_line(str(message.get("msg", ""))[:1000]))
 
     def _on_close(self, *_: object) -> None:
-        self.over.set()
-        self.on_over()
+        self.ended.set()
+        self.on_end()
 
     def topic(self, name: str, kind: str) -> Any:  # noqa: ANN401 - roslibpy is untyped
-        """Return a topic to publish on, latched, or to listen to. Bridges of both ROS know types without a `/msg/`."""
+        """Return a latched topic, to publish or subscribe. Bridges of both versions accept types without `/msg/`."""
         return self.roslibpy.Topic(self.ros, name, kind.replace("/msg/", "/"), latch=True, reconnect_on_close=False)
 
-    def serve(self, name: str, kind: str, take: Callable[[object], None]) -> None:
-        """Offer the service `name` of the type `kind`; `take` gets each call, in the connection's thread.
+    def serve(self, name: str, kind: str, receive: Callable[[object], None]) -> None:
+        """Offer the service `name` of the type `kind`; `receive` gets each call, in the connection's thread.
 
-        roslibpy's own services answer before they return; ours are answered when a team has decided.
+        roslibpy's services must answer before they return; ours are answered later, when a team has decided.
         """
-        self.ros.on(name, take)
-        self._say(op="advertise_service", type=kind, service=name)
+        self.ros.on(name, receive)
+        self._send_operation(op="advertise_service", type=kind, service=name)
 
     def respond(self, name: str, number: str | int, values: Mapping[str, object]) -> None:
-        """Answer the call of the service `name` that has this number. Whoever is gone needs no answer."""
-        self._say(op="service_response", service=name, id=number, values=dict(values), result=True)
+        """Answer the call with this number of the service `name`. Without a connection, the answer is dropped."""
+        self._send_operation(op="service_response", service=name, id=number, values=dict(values), result=True)
 
     def stop_serving(self, names: Iterable[str]) -> None:
-        """Take services back."""
+        """Stop offering services."""
         for name in names:
-            self._say(op="unadvertise_service", service=name)
+            self._send_operation(op="unadvertise_service", service=name)
 
-    def _say(self, **words: object) -> None:
-        if not self.over.is_set():
-            self.ros.send_on_ready(self.roslibpy.Message(words))
+    def _send_operation(self, **fields: object) -> None:
+        if not self.ended.is_set():
+            self.ros.send_on_ready(self.roslibpy.Message(fields))
 
     def check(self) -> None:
         """Raise `failed` if the connection is lost."""
-        if self.over.is_set():
+        if self.ended.is_set():
             raise self._failed(f"the rosbridge at {self.url} has closed the connection; see its log, and start again")
 
     def drain(self) -> None:
-        """Wait until all messages have left. Raises `failed` if the server reads nothing, or is gone."""
+        """Wait until all messages have been sent. Raises `failed` if the server stops reading, or is lost."""
         left, since = self._buffered(), time.monotonic()
         while left:
             self.check()
@@ -158,27 +162,27 @@ class Connection:
         self.check()
 
     def is_ahead(self) -> bool:
-        """Return whether more is on its way than `_BUFFERED` bytes."""
+        """Return whether more than `_BUFFERED` bytes wait to be sent."""
         return self._buffered() > _BUFFERED
 
     def _buffered(self) -> int:
-        """Return how many bytes the server has not taken yet."""
+        """Return the number of bytes that wait to be sent."""
         size: Future[int] = Future()
 
-        def look() -> None:
+        def measure() -> None:
             size.set_result(self._transport.get_write_buffer_size())
 
-        self.ros.factory.manager.loop.call_soon_threadsafe(look)
+        self.ros.factory.manager.loop.call_soon_threadsafe(measure)
         try:
             return size.result(LOOP_S)
         except TimeoutError:
-            raise self._failed(f"the connection to the rosbridge at {self.url} is stuck; start again") from None
+            raise self._failed(f"the connection to the rosbridge at {self.url} does not respond; start again") from None
 
     def confirm(self) -> bool:
-        """Wait until the server has handled all messages. Return whether it confirms that.
+        """Wait until the server has handled all messages. Return whether it confirms this.
 
-        A server that closes forgets what it has read and not handled yet. It handles requests in their order, and
-        answers any call of a service, even of one that does not exist.
+        A closing server drops messages that it has read but not handled. It handles requests in order, and answers
+        any service call, even to a service that does not exist.
         """
         answered = threading.Event()
         service = self.roslibpy.Service(self.ros, "/rosapi/get_time", "rosapi/GetTime")
@@ -190,24 +194,24 @@ class Connection:
         return answered.is_set()
 
     def close(self) -> bool:
-        """End the connection and wait for its end; return whether the server agreed, and so has read everything."""
-        if not self.over.is_set():
+        """End the connection and wait; return whether the server agreed, and thus has read all messages."""
+        if not self.ended.is_set():
             self._protocol.send_close()
-            if not self.over.wait(CLOSE_S):
+            if not self.ended.wait(CLOSE_S):
                 self.abort()
         return bool(self._protocol.wasClean)
 
     def abort(self) -> None:
         """End the connection at once."""
         factory = self.ros.factory
-        factory._stop = True  # noqa: SLF001 - it would go on trying
+        factory._stop = True  # noqa: SLF001 - otherwise it would retry
         if self._transport is not None:
             factory.manager.loop.call_soon_threadsafe(self._transport.abort)
-            self.over.wait(CLOSE_S)
+            self.ended.wait(CLOSE_S)
 
 
-def _reach(address: RosbridgeAddress, failed: type[Exception]) -> None:
-    """Raise `failed` if nothing listens at `address`, with the reason. roslibpy would not give it."""
+def _check_listening(address: RosbridgeAddress, failed: type[Exception]) -> None:
+    """Raise `failed` with the reason if no server listens at `address`. roslibpy gives no reason."""
     try:
         socket.create_connection((address.host, address.port), CONNECT_S).close()
     except OSError as error:
@@ -218,12 +222,12 @@ def _reach(address: RosbridgeAddress, failed: type[Exception]) -> None:
 
 
 def _roslibpy(failed: type[Exception]) -> Any:  # noqa: ANN401 - it is untyped
-    """Return roslibpy, which is an extra. Its log is switched off: what goes wrong is raised here."""
+    """Return the module roslibpy, which is an extra, with its log switched off: errors are raised here."""
     try:
         roslibpy = importlib.import_module("roslibpy")
         importlib.import_module("roslibpy.comm").select_factory("asyncio")
     except ModuleNotFoundError as missing:
-        raise failed(f"rosbridge needs {missing.name}; say: pip install 'robochoc[rosbridge]'") from missing
+        raise failed(f"rosbridge needs {missing.name}; run: pip install 'robochoc[rosbridge]'") from missing
     except (AttributeError, RuntimeError, TypeError, ValueError) as error:
         raise failed(f"rosbridge needs roslibpy 2.1 or later, over asyncio: {error}") from error
     for name in ("roslibpy", "autobahn"):
@@ -234,15 +238,15 @@ def _roslibpy(failed: type[Exception]) -> Any:  # noqa: ANN401 - it is untyped
 
 
 def _is_worth_logging(record: logging.LogRecord) -> bool:
-    """Return whether a record is not one of those that asyncio writes for each message to a lost server."""
+    """Return False for the records that asyncio writes for each message to a lost server."""
     return record.msg != "socket.send() raised exception."
 
 
 def _connect(roslibpy: Any, url: str) -> Any:  # noqa: ANN401 - roslibpy is untyped
-    """Return a connection that is being made. It is not made again when it is lost."""
+    """Return a new connection, which does not reconnect."""
 
     class Once(roslibpy.Ros):  # type: ignore[misc]  # untyped
-        """Takes short messages only, and none compressed, as these may become long. It does not reconnect."""
+        """Accepts only short, uncompressed messages: compressed ones may become long. It does not reconnect."""
 
         def connect(self) -> None:
             if not self.is_connecting:
@@ -255,28 +259,28 @@ def _connect(roslibpy: Any, url: str) -> Any:  # noqa: ANN401 - roslibpy is unty
                 )
             super().connect()
 
-    # The loop's thread is a daemon, and stays for the next connection of this process. It is asyncio's: Twisted's would
-    # be no other, but has thread pools, handlers of its own, and a log.
+    # The loop's thread is a daemon, which later connections of this process reuse. asyncio is used because Twisted
+    # would add thread pools, signal handlers and a log.
     connection = Once(url, transport="asyncio")
     connection.factory.manager.loop.set_exception_handler(lambda *_: None)
     return connection
 
 
 class MalformedMessageError(RobochocError, ValueError):
-    """A message from the server does not have the form of one."""
+    """A message from the server is malformed."""
 
 
 def outgoing(fields: Fields) -> dict[str, Any]:
-    """Return `fields` in the form that rosbridge takes."""
-    return {name: _sent(name, value) for name, value in fields.items()}
+    """Return `fields` as the JSON that rosbridge accepts."""
+    return {name: _encoded(name, value) for name, value in fields.items()}
 
 
-def _sent(name: str, value: object) -> object:
+def _encoded(name: str, value: object) -> object:
     match value:
         case Mapping():
             return outgoing(value)
         case list() | tuple():
-            return [_sent("", one) for one in value]
+            return [_encoded("", item) for item in value]
         case int() if name == "stamp":
             seconds, rest = divmod(value, _BILLION)
             return {"secs": seconds, "nsecs": rest}
@@ -285,13 +289,13 @@ def _sent(name: str, value: object) -> object:
 
 
 def incoming(message: object) -> tuple[dict[str, Any], int]:
-    """Return the fields of a `message` from rosbridge, and their weight: how many characters and fields it has.
+    """Return the fields of a `message` from rosbridge, and their weight: its number of characters and fields.
 
     Raises:
-        MalformedMessageError: `message` is no object, is nested too deeply, or has a time that is none.
+        MalformedMessageError: `message` is not an object, is nested too deeply, or has an invalid time.
     """
     if not isinstance(message, dict):
-        raise MalformedMessageError("no object")
+        raise MalformedMessageError("not an object")
     return _object(message, 0)
 
 
@@ -301,19 +305,19 @@ def _object(message: dict[str, Any], depth: int) -> tuple[dict[str, Any], int]:
     fields: dict[str, Any] = {}
     weight = 1
     for name, value in message.items():
-        fields[name], more = (_stamp(value), 1) if name == "stamp" else _received(value, depth + 1)
+        fields[name], more = (_stamp(value), 1) if name == "stamp" else _decoded(value, depth + 1)
         weight += len(name) + more
     return fields, weight
 
 
-def _received(value: object, depth: int) -> tuple[Any, int]:
+def _decoded(value: object, depth: int) -> tuple[Any, int]:
     match value:
         case dict():
             return _object(value, depth)
         case list():
             if depth > _DEPTH_MAX:
                 raise MalformedMessageError(f"nested more than {_DEPTH_MAX} deep")
-            parts = [_received(one, depth + 1) for one in value]
+            parts = [_decoded(item, depth + 1) for item in value]
             return [part for part, _ in parts], 1 + sum(weight for _, weight in parts)
         case str():
             return value, 1 + len(value)
@@ -324,7 +328,7 @@ def _received(value: object, depth: int) -> tuple[Any, int]:
 
 
 def _stamp(value: object) -> int:
-    """Return nanoseconds, of a time with the field names of ROS 1 or of ROS 2."""
+    """Return the nanoseconds of a time with the field names of ROS 1 or ROS 2."""
     match value:
         case {"secs": int(seconds), "nsecs": int(rest)} | {"sec": int(seconds), "nanosec": int(rest)} if (
             seconds in _SECONDS and 0 <= rest < _BILLION

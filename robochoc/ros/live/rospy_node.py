@@ -1,7 +1,7 @@
-"""rospy: a node of ROS 1 in this process, where rospy can be imported. It is on no package index.
+"""Sinks and sources as a ROS 1 node in this process, if rospy can be imported. No package index has rospy.
 
-rospy is untyped; this module alone knows it. A process has one node and keeps it: rospy can make no
-other. rospy waits forever where there is no master, so a sink or a source asks for the master first.
+rospy is untyped; only this module uses it. A process has one node until it ends: rospy cannot create another. rospy
+waits forever without a master, so sinks and sources ask the master for an answer first.
 """
 
 from __future__ import annotations
@@ -24,7 +24,15 @@ from xml.parsers.expat import ExpatError
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import SourceError
-from robochoc.ros.live.transport import LINGER_S, STUCK_S, Failed, LiveSink, LiveSource, message_class, succeeds_in_time
+from robochoc.ros.live.transport import (
+    LINGER_S,
+    STUCK_S,
+    ErrorClass,
+    LiveSink,
+    LiveSource,
+    message_class,
+    succeeds_in_time,
+)
 
 _NANO = 1_000_000_000
 MASTER_S = 3.0
@@ -36,14 +44,14 @@ NODE_S = 15.0
 GATHER_S = 5.0
 """The longest wait for subscribers that the master lists, in seconds. It may list some that no longer exist."""
 _WAITING = 10_000
-"""Messages that wait to be sent before `publish` waits, too."""
+"""The size of the queue of messages; `publish` waits while it is full."""
 _lock = threading.Lock()
 
 
-def _node(place: str, failed: Failed) -> Any:  # noqa: ANN401 - rospy is untyped
+def _node(place: str, failed: ErrorClass) -> Any:  # noqa: ANN401 - rospy is untyped
     """Return rospy, with this process's node registered. Raises `failed`."""
     if place:
-        raise failed(f"rospy takes no place, and got {shortened(place)!r}; say where the master is in ROS_MASTER_URI")
+        raise failed(f"rospy has no place, but {shortened(place)!r} was given; set the master in ROS_MASTER_URI")
     try:
         rospy = importlib.import_module("rospy")
     except ImportError as missing:
@@ -54,30 +62,30 @@ def _node(place: str, failed: Failed) -> Any:  # noqa: ANN401 - rospy is untyped
     RosMaster(failed).check()
     with _lock:
         if rospy.core.is_shutdown():
-            raise failed("the ROS node of this process was shut down, and rospy can make no other; start again")
+            raise failed("the ROS node of this process was shut down, and rospy cannot create another; start again")
         if not rospy.core.is_initialized():
             _register(rospy, failed)
     return rospy
 
 
-def _register(rospy: Any, failed: Failed) -> None:  # noqa: ANN401 - rospy is untyped
-    """Make the node. Signals stay ours. rospy's log is off: it would go to a file, and reconfigure all logging."""
+def _register(rospy: Any, failed: ErrorClass) -> None:  # noqa: ANN401 - rospy is untyped
+    """Create the node, without rospy's signal handlers and without its log, which would reconfigure all logging."""
     for name in ("rospy", "rosout", "rosgraph", "xmlrpc"):
         logging.getLogger(name).addHandler(logging.NullHandler())
         logging.getLogger(name).propagate = False
     configure, rospy.core.configure_logging = rospy.core.configure_logging, lambda *_, **__: None
     options = {"anonymous": True, "disable_signals": True, "disable_rosout": True, "disable_rostime": True}
-    is_there = succeeds_in_time(partial(rospy.init_node, "robochoc", argv=[], **options), NODE_S)
+    is_created = succeeds_in_time(partial(rospy.init_node, "robochoc", argv=[], **options), NODE_S)
     rospy.core.configure_logging = configure
-    if not is_there or not rospy.core.is_initialized():
+    if not is_created or not rospy.core.is_initialized():
         rospy.signal_shutdown("no node")
-        raise failed(f"rospy could not make a node within {NODE_S:g} s; see ROS_MASTER_URI, ROS_IP and ROS_HOSTNAME")
+        raise failed(f"rospy could not create a node within {NODE_S:g} s; see ROS_MASTER_URI, ROS_IP and ROS_HOSTNAME")
 
 
 class RospySink(LiveSink):
-    """Publishes as a node of ROS 1. Topics are latched: later subscribers receive the last message of each.
+    """Publishes as a ROS 1 node. Topics are latched: later subscribers receive the last message of each.
 
-    Messages begin to leave when all subscribers are connected, so that they receive every one.
+    The first message is sent when all subscribers are connected, so that they receive all messages.
     """
 
     def __init__(self, place: str) -> None:
@@ -87,7 +95,7 @@ class RospySink(LiveSink):
         self._publishers: dict[str, Any] = {}
         self._kinds: dict[str, Any] = {}
         self._absent: dict[str, int] = {}
-        # rospy's own queues have threads that keep a program from ending while a subscriber reads nothing.
+        # The threads of rospy's queues would keep the program running while a subscriber reads nothing.
         self._waiting: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
         self._problem = ""
         threading.Thread(target=self._send_queue, daemon=True, name="rospy sender").start()
@@ -98,11 +106,11 @@ class RospySink(LiveSink):
         self._master.check()
         if not succeeds_in_time(partial(self._register, new), NODE_S):
             raise SinkError(f"the ROS master at {self._master.uri} has not registered our topics; see its log")
-        self._gather(new)
+        self._await_subscribers(new)
 
     def _register(self, topics: Mapping[str, Any]) -> None:
         for topic, kind in topics.items():
-            with warnings.catch_warnings():  # it would want a queue
+            with warnings.catch_warnings():  # rospy recommends a queue
                 warnings.simplefilter("ignore")
                 self._publishers[topic] = self._rospy.Publisher(topic, kind, latch=True, queue_size=None)
             self._kinds[topic] = kind
@@ -113,25 +121,25 @@ class RospySink(LiveSink):
             message = filled(self._kinds[topic](), fields)
         except (ValueError, TypeError, AttributeError) as error:
             raise SinkError(f"{topic} cannot be published as {kind}: {error}") from error
-        self._hand_over(partial(self._publishers[topic].publish, message))
+        self._enqueue(partial(self._publishers[topic].publish, message))
 
     def close(self) -> None:
-        """Wait until all subscribers have been sent everything."""
+        """Wait until all messages have been sent to all subscribers."""
         try:
-            self._gather(self._publishers)
+            self._await_subscribers(self._publishers)
             self._drain()
         except SinkError:
             self.discard()
             raise
         if any(publisher.get_num_connections() for publisher in self._publishers.values()):
             time.sleep(LINGER_S)
-        self._hand_over(None)
+        self._enqueue(None)
         self._end()
 
     def discard(self) -> None:
         """Unregister the topics."""
         self._problem = self._problem or "closed"
-        with contextlib.suppress(queue.Full):  # who sends sees that there is a problem
+        with contextlib.suppress(queue.Full):  # the sending thread then sees `_problem`
             self._waiting.put_nowait(None)
         self._end()
 
@@ -143,7 +151,7 @@ class RospySink(LiveSink):
                 self._problem = shortened(on_one_line(f"{type(error).__name__}: {error}"))
             self._waiting.task_done()
 
-    def _hand_over(self, publish: Callable[[], None] | None) -> None:
+    def _enqueue(self, publish: Callable[[], None] | None) -> None:
         try:
             self._check()
             self._waiting.put(publish, timeout=STUCK_S)
@@ -164,13 +172,13 @@ class RospySink(LiveSink):
 
     def _check(self) -> None:
         if self._problem:
-            raise SinkError(f"rospy cannot publish any more ({self._problem}); start again")
+            raise SinkError(f"rospy has stopped publishing ({self._problem}); start again")
 
     def _stuck(self) -> str:
-        return f"a subscriber has read nothing for {STUCK_S:g} s; see `rostopic info` for who it is, and end it"
+        return f"a subscriber has read nothing for {STUCK_S:g} s; find it by `rostopic info`, and end it"
 
-    def _gather(self, topics: Collection[str]) -> None:
-        """Wait until all subscribers that the master knows are connected; not twice for one that did not connect."""
+    def _await_subscribers(self, topics: Collection[str]) -> None:
+        """Wait until all subscribers listed by the master are connected; only once for those that do not connect."""
         until = time.monotonic() + GATHER_S
         pause = 0.01
         while True:
@@ -192,7 +200,7 @@ class RospySink(LiveSink):
 
 
 class RospySource(LiveSource):
-    """Receives as a node of ROS 1."""
+    """Receives as a ROS 1 node."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -230,9 +238,9 @@ class RospySource(LiveSource):
 
 
 class RosMaster:
-    """The ROS master that `ROS_MASTER_URI` names. Methods raise `failed` if it does not answer."""
+    """The ROS master at `ROS_MASTER_URI`. Methods raise `failed` if it does not answer."""
 
-    def __init__(self, failed: Failed) -> None:
+    def __init__(self, failed: ErrorClass) -> None:
         self._failed = failed
         self.uri = os.environ.get("ROS_MASTER_URI", _DEFAULT_MASTER)
 
@@ -247,18 +255,18 @@ class RosMaster:
                 return {topic: set(nodes) for topic, nodes in subscribed}
             case answer:
                 raise self._failed(
-                    f"what answers at {self.uri} is not a ROS master: {shortened(on_one_line(str(answer)))}"
+                    f"the server at {self.uri} is not a ROS master: it answers {shortened(on_one_line(str(answer)))}"
                 )
 
-    def _ask(self, what: str) -> object:
+    def _ask(self, method: str) -> object:
         try:
             with xmlrpc.client.ServerProxy(self.uri, transport=_TransportWithTimeout()) as server:
-                match getattr(server, what)(_CALLER):
+                match getattr(server, method)(_CALLER):
                     case [1, _, answer]:
                         return answer
                     case answer:
-                        said = shortened(on_one_line(str(answer)))
-                        raise self._failed(f"the ROS master at {self.uri} refuses, it says: {said}; see its log")
+                        shown = shortened(on_one_line(str(answer)))
+                        raise self._failed(f"the ROS master at {self.uri} refuses the request: {shown}; see its log")
         except (OSError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:
             why = getattr(error, "strerror", None) or str(error) or type(error).__name__
             message = f"no ROS master answers at {self.uri} ({shortened(on_one_line(why))})"
@@ -266,7 +274,7 @@ class RosMaster:
 
 
 class _TransportWithTimeout(xmlrpc.client.Transport):
-    """A transport that does not wait forever."""
+    """A transport with a timeout."""
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:  # noqa: ANN401 - typeshed's is private
         connection = super().make_connection(host)
@@ -275,7 +283,7 @@ class _TransportWithTimeout(xmlrpc.client.Transport):
 
 
 def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are untyped
-    """Return `message` with these fields. Raises `ValueError` for a field that it does not have."""
+    """Set the fields of `message`, and return it. Raises `ValueError` for unknown fields."""
     for name, value in fields.items():
         if name not in message.__slots__:
             raise ValueError(f"{message._type} has no field {name!r}, only: {', '.join(message.__slots__)}")  # noqa: SLF001
@@ -294,12 +302,12 @@ def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are 
 
 def _element(message: Any, name: str) -> Any:  # noqa: ANN401 - messages are untyped
     """Return a new element of an array field."""
-    kind = message._slot_types[message.__slots__.index(name)]  # noqa: SLF001 - genpy's way to say it
+    kind = message._slot_types[message.__slots__.index(name)]  # noqa: SLF001 - genpy has no public name for it
     return message_class(kind.partition("[")[0], SinkError)()
 
 
 def fields_of(message: Any) -> dict[str, Any]:  # noqa: ANN401 - messages are untyped
-    """Return the fields of a rospy message, without `seq`: ROS 1 counts it by itself, ROS 2 has none."""
+    """Return the fields of a rospy message, without `seq`: ROS 1 sets it, and ROS 2 does not have it."""
     return {name: _plain(getattr(message, name)) for name in message.__slots__ if name != "seq"}
 
 

@@ -1,6 +1,6 @@
-"""Services of ROS, whatever carries them: requests wait for their turn, or are answered at once.
+"""The base of services over any middleware: requests wait in a queue, or are answered at once.
 
-Requests come from outside: each that can be told from others is answered, also one that cannot be read.
+Requests are untrusted: each one whose client is known is answered, even if it cannot be read.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from robochoc.robots.sink import Fields
 from robochoc.ros.message_types import types_of
 
 WAITING_MAX = 16
-"""Requests that wait for their turn. Others are refused at once."""
+"""The size of the queue of requests. Requests beyond it are refused at once."""
 ENDED = "the service has ended"
 
 Refuse = Callable[[str], Fields]
-"""Makes the fields of an answer that refuses, for a reason in words."""
-AtOnce = Mapping[str, Callable[[Fields], Fields]]
-"""By their names, services that are answered where the request comes in, also while another waits."""
+"""Returns the fields of an answer that refuses a request for a given reason."""
+ImmediateServices = Mapping[str, Callable[[Fields], Fields]]
+"""The services, by name, that are answered in the receiving thread, even while other requests wait."""
 
 
-class Request(NamedTuple):
-    """A request to the service `name`: its fields, and that by which its client knows the answer."""
+class ServiceRequest(NamedTuple):
+    """A request to the service `name`: its fields, and the client's id, whose type depends on the middleware."""
 
     name: str
     fields: Fields
@@ -32,27 +32,27 @@ class Request(NamedTuple):
 
 
 class Services(ABC):
-    """Services that are offered, by their names. It is a context manager. Raises `SinkError`, as its methods do.
+    """The services that this program offers, by their names. A context manager. All methods raise `SinkError`.
 
     Args:
         kinds: The type of each service, such as `std_srvs/Trigger`.
-        refuse: Makes the fields of an answer that refuses.
-        at_once: Those of the services that do not wait for their turn.
+        refuse: Returns the fields of an answer that refuses a request.
+        immediate: The services that are answered without a queue.
     """
 
     where: str = ""
-    """The place where they are offered, in words."""
+    """A description of the place of the services."""
     lacking: Collection[str] = ()
-    """The names of services that are not offered, as their types are not known here."""
+    """The names of services that are not offered, because their types are not installed."""
 
-    def __init__(self, kinds: Mapping[str, str], refuse: Refuse, at_once: AtOnce | None = None) -> None:
+    def __init__(self, kinds: Mapping[str, str], refuse: Refuse, immediate: ImmediateServices | None = None) -> None:
         self._kinds = {**kinds}
         self._refuse = refuse
-        self._at_once = {**(at_once or {})}
-        self._waiting: queue.Queue[Request] = queue.Queue(WAITING_MAX)
+        self._immediate = {**(immediate or {})}
+        self._waiting: queue.Queue[ServiceRequest] = queue.Queue(WAITING_MAX)
 
-    def next(self, wait_s: float) -> Request | None:
-        """Return the oldest request that waits, or that comes within `wait_s`; None if none does."""
+    def next(self, wait_s: float) -> ServiceRequest | None:
+        """Return the oldest waiting request, or the first that arrives within `wait_s`; None if none arrives."""
         self.check()
         try:
             return self._waiting.get(timeout=wait_s)
@@ -60,38 +60,38 @@ class Services(ABC):
             self.check()
             return None
 
-    def check(self) -> None:  # noqa: B027 - some middlewares have nothing that could be lost
-        """Raise `SinkError` if requests cannot come any more."""
+    def check(self) -> None:  # noqa: B027 - some middlewares have no connection
+        """Raise `SinkError` if no further requests can arrive."""
 
     @abstractmethod
-    def reply(self, request: Request, fields: Fields) -> None:
+    def reply(self, request: ServiceRequest, fields: Fields) -> None:
         """Answer `request`."""
 
     @abstractmethod
     def announce(self, topic: str, kind: str) -> None:
-        """Announce a topic on which `publish` tells all who listen."""
+        """Announce a topic for `publish`."""
 
     @abstractmethod
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
-        """Publish a message on an announced topic. It may be lost, and never waits long."""
+        """Publish a message on an announced topic without a long wait. It may be lost."""
 
     @abstractmethod
     def close(self) -> None:
-        """Refuse what still waits, and offer nothing any more."""
+        """Refuse the waiting requests, and stop offering services."""
 
-    def _take(self, request: Request) -> None:
-        """Take a request, in a thread of the middleware's."""
-        at_once = self._at_once.get(request.name)
-        if at_once is not None:
-            self.reply(request, at_once(request.fields))
+    def _accept(self, request: ServiceRequest) -> None:
+        """Answer a request at once or put it into the queue; called in a thread of the middleware."""
+        immediate = self._immediate.get(request.name)
+        if immediate is not None:
+            self.reply(request, immediate(request.fields))
             return
         try:
             self._waiting.put_nowait(request)
         except queue.Full:
-            self._refuse_now(request, f"{WAITING_MAX} requests wait already; ask again later")
+            self._refuse_now(request, f"{WAITING_MAX} requests are already waiting; try again later")
 
     def _refuse_waiting(self) -> None:
-        """Tell those who still wait that the service has ended."""
+        """Refuse all waiting requests."""
         while True:
             try:
                 request = self._waiting.get_nowait()
@@ -99,7 +99,7 @@ class Services(ABC):
                 return
             self._refuse_now(request, ENDED)
 
-    def _refuse_now(self, request: Request, why: str) -> None:
+    def _refuse_now(self, request: ServiceRequest, why: str) -> None:
         """Refuse `request` without a wait."""
         self.reply(request, self._refuse(why))
 
@@ -111,6 +111,6 @@ class Services(ABC):
 
 
 def known_fields(kind: str, fields: Fields) -> dict[str, Any]:
-    """Return those of `fields` that an answer of the service type `kind` has."""
+    """Return the `fields` that belong to an answer of the service type `kind`."""
     known = {field for field, _ in types_of(2).layout(f"{kind}_Response")}
     return {name: value for name, value in fields.items() if name in known}

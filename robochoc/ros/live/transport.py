@@ -1,4 +1,4 @@
-"""The base of the five live connections to ROS: topics are announced once, and received messages wait in an inbox."""
+"""The base of the live connections to ROS: topics are announced once, and received messages wait in an inbox."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from robochoc.robots.source import ReceivedMessage, Source, SourceError
 STUCK_S = 10.0
 """The longest time for which a subscriber may leave messages unread or unacknowledged, in seconds."""
 LINGER_S = 0.3
-"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
+"""The time for which topics remain after the last message, in seconds. Some subscribers drop unread messages then."""
 SETTLE_S = 0.3
-"""No new subscriber has come for so many seconds: then all are there."""
+"""The time without a new subscriber after which all are assumed to be connected, in seconds."""
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/([A-Za-z][A-Za-z0-9_]*)")
 
-Failed = type[SinkError] | type[SourceError]
+ErrorClass = type[SinkError] | type[SourceError]
 
 
 class LiveSink(Sink):
@@ -58,8 +58,8 @@ class LiveSink(Sink):
 class LiveSource(Source):
     """A source whose messages arrive in other threads, by `_put`."""
 
-    _over: threading.Event | None = None
-    """Set once nothing more can arrive; None for transports that cannot tell."""
+    _ended: threading.Event | None = None
+    """Set when no more messages can arrive; None for transports that cannot detect it."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -67,13 +67,13 @@ class LiveSource(Source):
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
         """Return the oldest message, or the first that arrives within `wait_s`."""
-        received = self._inbox.get(wait_s, stopped=self._over)
+        received = self._inbox.get(wait_s, stopped=self._ended)
         if received is None:
             self._check()
         return received
 
     def _check(self) -> None:
-        """Raise `SourceError` if nothing more can arrive."""
+        """Raise `SourceError` if no more messages can arrive."""
 
     def _put(self, topic: str, kind: str, fields: Fields, weight: int | None = None) -> None:
         """Store a message that has just arrived."""
@@ -82,7 +82,7 @@ class LiveSource(Source):
 
 
 def await_subscribers(counts: Callable[[], Sequence[int]], wait_s: float) -> None:
-    """Wait until each topic has a subscriber and no more come.
+    """Wait until each topic has a subscriber and no more join. Messages published earlier would be lost to them.
 
     Args:
         counts: Returns the number of subscribers of each topic.
@@ -102,22 +102,25 @@ def await_subscribers(counts: Callable[[], Sequence[int]], wait_s: float) -> Non
 
 
 def succeeds_in_time(work: Callable[[], object], limit_s: float) -> bool:
-    """Return whether `work` succeeds within `limit_s` seconds. Its thread may be left behind; signals are heard."""
-    problems: list[Exception] = []
+    """Return whether `work`, a library call that may never return, succeeds within `limit_s` seconds.
 
-    def watched() -> None:
+    It runs in a thread, which may remain after a timeout. Signals are handled meanwhile.
+    """
+    errors: list[Exception] = []
+
+    def run() -> None:
         try:
             work()
-        except Exception as problem:  # noqa: BLE001 - the caller learns that it failed
-            problems.append(problem)
+        except Exception as error:  # noqa: BLE001 - reported as False
+            errors.append(error)
 
-    doing = threading.Thread(target=watched, daemon=True, name="asks a library")
-    doing.start()
-    doing.join(limit_s)
-    return not doing.is_alive() and not problems
+    thread = threading.Thread(target=run, daemon=True, name="library call")
+    thread.start()
+    thread.join(limit_s)
+    return not thread.is_alive() and not errors
 
 
-def message_class(kind: str, failed: Failed, library: str = "rospy") -> Any:  # noqa: ANN401 - messages are untyped
+def message_class(kind: str, failed: ErrorClass, library: str = "rospy") -> Any:  # noqa: ANN401 - messages are untyped
     """Return `library`'s class of the ROS type `kind`, also in ROS 2's spelling with `/msg/`. Raises `failed`."""
     found = _TYPE.fullmatch(kind.replace("/msg/", "/"))
     try:
@@ -125,4 +128,4 @@ def message_class(kind: str, failed: Failed, library: str = "rospy") -> Any:  # 
         return getattr(package, found[2] if found else "")
     except (ImportError, AttributeError, ValueError) as missing:
         where = f"install the package {found[1]!r} for Python" if found else "expected PACKAGE/TYPE"
-        raise failed(f"{library} knows no message type {shortened(kind)!r}; {where}") from missing
+        raise failed(f"{library} has no message type {shortened(kind)!r}; {where}") from missing

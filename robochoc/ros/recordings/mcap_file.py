@@ -25,14 +25,14 @@ from robochoc.robots.sink import Fields, SinkError
 from robochoc.ros.message_types import Version, types_of
 from robochoc.ros.recordings.recording import (
     BLOCK_BYTES_MAX,
-    Block,
-    ChunkedRecording,
+    ChunkedRecordingSource,
+    MessageBlock,
     RecordedChannel,
     RecordingDamagedError,
     RecordingSink,
-    as_it_is,
-    from_lz4,
-    inside,
+    decompress_lz4,
+    recording_in_folder,
+    uncompressed,
 )
 from robochoc.ros.waypoint_types import short_kind
 
@@ -66,14 +66,14 @@ class McapSink(RecordingSink):
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
         self._sequence: dict[int, int] = {}
-        with self.sink_errors():
+        with self.as_sink_errors():
             self._writer = Writer(self.file.stream, _CHUNK_BYTES, CompressionType.ZSTD, enable_data_crcs=True)
             self._writer.start("ros2")
 
     def explain(self, original: Mapping[str, str]) -> None:
         """Keep the original names in the file, and each name at its topic."""
         super().explain(original)
-        with self.sink_errors():
+        with self.as_sink_errors():
             self._writer.add_metadata(NAMES, dict(original))
 
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
@@ -101,7 +101,7 @@ class McapSink(RecordingSink):
         return found
 
 
-class _Known(NamedTuple):
+class _WantedSchema(NamedTuple):
     """A schema whose type is wanted: its encoding, and why its messages cannot be read."""
 
     kind: str
@@ -109,21 +109,21 @@ class _Known(NamedTuple):
     fault: str
 
 
-def _from_zstd(packed: bytes, most: int) -> bytes:
+def _decompress_zstd(packed: bytes, most: int) -> bytes:
     """Decompress by a stream: the size in a frame is not trusted."""
     return zstandard.ZstdDecompressor(max_window_size=BLOCK_BYTES_MAX).stream_reader(packed).read(most)
 
 
-class McapSource(ChunkedRecording):
+class McapSource(ChunkedRecordingSource):
     """Reads an MCAP file of ROS 2 or of ROS 1, or the one in a folder that ROS 2 has recorded."""
 
-    packings = MappingProxyType({"": as_it_is, "lz4": from_lz4, "zstd": _from_zstd})
+    packings = MappingProxyType({"": uncompressed, "lz4": decompress_lz4, "zstd": _decompress_zstd})
 
     def __init__(self, place: str) -> None:
-        super().__init__(inside(place, "mcap", ".mcap", "rosbag2:FOLDER reads the .db3 of ROS 2"))
+        super().__init__(recording_in_folder(place, "mcap", ".mcap", "rosbag2:FOLDER reads the .db3 of ROS 2"))
 
-    def _blocks(self) -> Iterator[Block]:
-        self._schemas: dict[int, _Known | None] = {}
+    def _blocks(self) -> Iterator[MessageBlock]:
+        self._schemas: dict[int, _WantedSchema | None] = {}
         self._channels: dict[int, RecordedChannel | None] = {}
         self._faults: dict[tuple[str, str, bytes], str] = {}
         source = self._input
@@ -154,7 +154,7 @@ class McapSource(ChunkedRecording):
         if not tail.startswith(_RECORD.pack(Opcode.FOOTER, _FOOTER_SIZE)) or not tail.endswith(MCAP0_MAGIC):
             raise RecordingDamagedError("it has no footer: it was not written to its end")
 
-    def _chunk(self, begin: int, content: bytes) -> Iterator[Block]:
+    def _chunk(self, begin: int, content: bytes) -> Iterator[MessageBlock]:
         _, _, size, expected, length = _read(_CHUNK.format, content)
         place = _CHUNK.size + length + _SIZE.size
         packing = content[_CHUNK.size : _CHUNK.size + length].decode("ascii", "replace")
@@ -166,10 +166,10 @@ class McapSource(ChunkedRecording):
             raise RecordingDamagedError(f"the chunk at byte {begin} is damaged: its checksum is another one")
         yield from self._block(body, begin + _RECORD.size + place, packed, packing)
 
-    def _block(self, body: bytes, at: int, size: int, packing: str) -> Iterator[Block]:
+    def _block(self, body: bytes, at: int, size: int, packing: str) -> Iterator[MessageBlock]:
         starts = min((time for _, time, _ in self._messages(body)), default=None)
         if starts is not None:
-            yield Block(starts, at, size, packing, len(body))
+            yield MessageBlock(starts, at, size, packing, len(body))
 
     def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
         at = 0
@@ -199,15 +199,15 @@ class McapSource(ChunkedRecording):
         try:
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(stream)
-                _keep(self._schemas, schema.id, self._known(schema))
+                _define(self._schemas, schema.id, self._wanted_schema(schema))
             else:
                 channel = ChannelRecord.read(stream)
-                _keep(self._channels, channel.id, self._channel_of(channel))
+                _define(self._channels, channel.id, self._channel_of(channel))
         except (McapError, struct.error, ValueError) as error:
             what = "schema" if opcode == Opcode.SCHEMA else "channel"
             raise RecordingDamagedError(f"a {what} cannot be read: {type(error).__name__} {error}") from error
 
-    def _known(self, schema: Schema) -> _Known | None:
+    def _wanted_schema(self, schema: Schema) -> _WantedSchema | None:
         kind = short_kind(schema.name)
         if kind not in map(short_kind, self._kinds.values()):
             return None
@@ -216,7 +216,7 @@ class McapSource(ChunkedRecording):
             if len(self._faults) == _DEFINITIONS_MAX:
                 raise RecordingDamagedError(f"it has more than {_DEFINITIONS_MAX} definitions of its message types")
             self._faults[defined] = _fault(*defined)
-        return _Known(kind, schema.encoding, self._faults[defined])
+        return _WantedSchema(kind, schema.encoding, self._faults[defined])
 
     def _channel_of(self, channel: ChannelRecord) -> RecordedChannel | None:
         schema = self._schemas.get(channel.schema_id)
@@ -234,12 +234,12 @@ def _fault(kind: str, encoding: str, text: bytes) -> str:
     versions = [version for (known, _), version in _ENCODINGS.items() if known == encoding]
     if not versions:
         return f"its definition is written as {encoding[:40]!r}, and only ros2msg and ros1msg are known"
-    if not types_of(versions[0]).is_the_same(kind, text.decode("utf-8", "replace")):
+    if not types_of(versions[0]).has_same_fields(kind, text.decode("utf-8", "replace")):
         return f"its definition of {kind} is not that of ROS {versions[0]}"
     return ""
 
 
-def _keep(table: dict[int, T], number: int, described: T) -> None:
+def _define(table: dict[int, T], number: int, described: T) -> None:
     if table.setdefault(number, described) != described:
         raise RecordingDamagedError(f"a schema or channel {number} is described twice, and not the same way")
 

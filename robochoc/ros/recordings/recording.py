@@ -59,7 +59,7 @@ class RecordedChannel(NamedTuple):
     fault: str = ""
 
 
-class Block(NamedTuple):
+class MessageBlock(NamedTuple):
     """A part of a file that holds messages: its offset, its compression, and the time of the first wanted message."""
 
     starts: int
@@ -69,7 +69,7 @@ class Block(NamedTuple):
     unpacked: int
 
 
-class Entry(NamedTuple):
+class RecordedMessage(NamedTuple):
     """A message, with what defines its order."""
 
     at_ns: int
@@ -79,7 +79,7 @@ class Entry(NamedTuple):
     content: bytes
 
 
-class Input:
+class InputFile:
     """A file that is read from its beginning to its end. Raises `RecordingDamagedError` and `OSError`."""
 
     def __init__(self, path: Path) -> None:
@@ -131,7 +131,7 @@ class Input:
             )
 
 
-class Recording(Source):
+class RecordingSource(Source):
     """A file that gives its messages in the order of the times at which they were received."""
 
     live = False
@@ -142,25 +142,25 @@ class Recording(Source):
             raise SourceError(
                 "a recording needs the name of its file, as in mcap:run.mcap, rosbag:run.bag or rosbag2:run.db3"
             )
-        with self._errors_named():
-            self._input = Input(Path(place))
+        with self._as_source_errors():
+            self._input = InputFile(Path(place))
         self._kinds: Mapping[str, str] = {}
-        self._entries: Iterator[Entry] = iter(())
+        self._messages_left: Iterator[RecordedMessage] = iter(())
 
     def listen(self, topics: Mapping[str, str]) -> None:
         """Read all of the file once. `next` then returns the messages on these topics, from the beginning."""
         self._kinds = topics
-        with self._errors_named():
-            self._entries = self._opened()
+        with self._as_source_errors():
+            self._messages_left = self._read_messages()
 
     @abstractmethod
-    def _opened(self) -> Iterator[Entry]:
+    def _read_messages(self) -> Iterator[RecordedMessage]:
         """Read all of the file, then return the wanted messages, in order. Raises `RecordingDamagedError`."""
 
     def next(self, wait_s: float) -> ReceivedMessage | None:  # noqa: ARG002 - all has been recorded
         """Return the next message; None at the end."""
-        with self._errors_named():
-            entry = next(self._entries, None)
+        with self._as_source_errors():
+            entry = next(self._messages_left, None)
             if entry is None:
                 return None
             channel = entry.channel
@@ -173,7 +173,7 @@ class Recording(Source):
 
     def close(self) -> None:
         """Close the file."""
-        self._entries = iter(())
+        self._messages_left = iter(())
         self._input.close()
 
     def _wanted(self, topic: str, kind: str) -> bool:
@@ -184,7 +184,7 @@ class Recording(Source):
         return wanted
 
     @contextmanager
-    def _errors_named(self) -> Iterator[None]:
+    def _as_source_errors(self) -> Iterator[None]:
         """Raise errors of the file as `SourceError`, with its name."""
         try:
             yield
@@ -194,7 +194,7 @@ class Recording(Source):
             raise SourceError(on_one_line(f"{self.place}: {error.strerror or error}")) from error
 
 
-class ChunkedRecording(Recording):
+class ChunkedRecordingSource(RecordingSource):
     """A recording whose messages stand in chunks, most of them compressed."""
 
     packings: ClassVar[Mapping[str, Unpack]]
@@ -202,13 +202,13 @@ class ChunkedRecording(Recording):
 
     _unpacked = 0
 
-    def _opened(self) -> Iterator[Entry]:
+    def _read_messages(self) -> Iterator[RecordedMessage]:
         self._unpacked = 0
         self._input.rewind()
         return self._in_order(sorted(self._blocks()))
 
     @abstractmethod
-    def _blocks(self) -> Iterable[Block]:
+    def _blocks(self) -> Iterable[MessageBlock]:
         """Read all of the file, and return the blocks with wanted messages. Raises `RecordingDamagedError`."""
 
     @abstractmethod
@@ -226,20 +226,20 @@ class ChunkedRecording(Recording):
             raise RecordingDamagedError(
                 f"its {self._input.size} bytes unpack to {self._unpacked} and more, which are not read"
             )
-        return unpacked(packed, packing, size, self.packings)
+        return decompress(packed, packing, size, self.packings)
 
-    def _in_order(self, blocks: Iterable[Block]) -> Iterator[Entry]:
+    def _in_order(self, blocks: Iterable[MessageBlock]) -> Iterator[RecordedMessage]:
         """Yield all messages of `blocks`, which come in the order of their first ones."""
-        waiting: list[Entry] = []
+        waiting: list[RecordedMessage] = []
         size = 0
         for number, block in enumerate(blocks):
             while waiting and waiting[0].at_ns < block.starts:
                 entry = heapq.heappop(waiting)
                 size -= _ENTRY + len(entry.content)
                 yield entry
-            body = unpacked(self._input.part(block.at, block.size), block.packing, block.unpacked, self.packings)
+            body = decompress(self._input.part(block.at, block.size), block.packing, block.unpacked, self.packings)
             for place, (channel, at_ns, content) in enumerate(self._messages(body)):
-                heapq.heappush(waiting, Entry(at_ns, block.at, place, channel, content))
+                heapq.heappush(waiting, RecordedMessage(at_ns, block.at, place, channel, content))
                 size += _ENTRY + len(content)
                 if size > WAITING_BYTES_MAX:
                     raise RecordingDamagedError(
@@ -249,7 +249,7 @@ class ChunkedRecording(Recording):
             yield heapq.heappop(waiting)
 
 
-def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
+def decompress(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
     """Return the `size` bytes of `packed`. No more than one byte more is decompressed.
 
     Raises:
@@ -272,17 +272,17 @@ def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpa
     return body
 
 
-def as_it_is(packed: bytes, _most: int) -> bytes:
+def uncompressed(packed: bytes, _most: int) -> bytes:
     """Return the bytes of a chunk that is not compressed."""
     return packed
 
 
-def from_lz4(packed: bytes, most: int) -> bytes:
+def decompress_lz4(packed: bytes, most: int) -> bytes:
     """Return up to `most` bytes of an LZ4 frame."""
     return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=most))
 
 
-def inside(place: str, name: str, ending: str, instead: str) -> str:
+def recording_in_folder(place: str, name: str, ending: str, instead: str) -> str:
     """Return the recording in the folder `place`, or `place` itself where it is no folder.
 
     Args:
@@ -319,7 +319,7 @@ class RecordingSink(Sink):
             raise SinkError(f"a recording needs the name of its file, as in {self.ending}")
         self.original: Mapping[str, str] = MappingProxyType({})
         self._open = False
-        with self.sink_errors():
+        with self.as_sink_errors():
             self.file = PendingFile(Path(place))
         self._open = True
 
@@ -338,14 +338,14 @@ class RecordingSink(Sink):
     def advertise(self, topics: Mapping[str, str]) -> None:
         """Check that all these types are known."""
         for topic, kind in topics.items():
-            with self.sink_errors(topic):
+            with self.as_sink_errors(topic):
                 types_of(self.version).definition(kind)
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         """Append a message. The time of its publication is also that of its reception."""
         if not 0 <= at_ns < _END_OF_TIME:
             raise SinkError(on_one_line(f"{self.place}: {topic}: a recording has no time {at_ns}"))
-        with self.sink_errors(topic):
+        with self.as_sink_errors(topic):
             self.write(topic, kind, fields, at_ns)
 
     def close(self) -> None:
@@ -353,7 +353,7 @@ class RecordingSink(Sink):
         if self._open:
             self._open = False
             try:
-                with self.sink_errors():
+                with self.as_sink_errors():
                     self.finish()
                     self.file.keep()
             finally:
@@ -365,7 +365,7 @@ class RecordingSink(Sink):
         self.file.discard()
 
     @contextmanager
-    def sink_errors(self, topic: str = "") -> Iterator[None]:
+    def as_sink_errors(self, topic: str = "") -> Iterator[None]:
         """Raise errors as `SinkError`, with the name of the file and of the topic."""
         where = f"{self.place}: {topic}" if topic else self.place
         try:

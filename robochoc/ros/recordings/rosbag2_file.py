@@ -16,11 +16,11 @@ import zstandard
 from robochoc.ros.message_types import types_of
 from robochoc.ros.recordings.recording import (
     BLOCK_BYTES_MAX,
-    Entry,
     RecordedChannel,
-    Recording,
+    RecordedMessage,
     RecordingDamagedError,
-    inside,
+    RecordingSource,
+    recording_in_folder,
 )
 from robochoc.ros.waypoint_types import short_kind
 
@@ -39,11 +39,11 @@ _LIMITS = {
 }
 
 
-class Rosbag2Source(Recording):
+class Rosbag2Source(RecordingSource):
     """Reads a bag of ROS 2 in SQLite, or the one in a folder that ROS 2 has recorded."""
 
     def __init__(self, place: str) -> None:
-        super().__init__(inside(place, "rosbag2", ".db3", "mcap:FOLDER reads the .mcap of ROS 2"))
+        super().__init__(recording_in_folder(place, "rosbag2", ".db3", "mcap:FOLDER reads the .mcap of ROS 2"))
         self._rows: sqlite3.Connection | None = None
 
     def close(self) -> None:
@@ -52,7 +52,7 @@ class Rosbag2Source(Recording):
         if self._rows is not None:
             self._rows.close()
 
-    def _opened(self) -> Iterator[Entry]:
+    def _read_messages(self) -> Iterator[RecordedMessage]:
         self._input.rewind()
         if self._input.take(min(self._input.size, len(_MAGIC)), "its beginning") != _MAGIC:
             raise RecordingDamagedError("is not a ROS 2 bag in SQLite")
@@ -63,12 +63,12 @@ class Rosbag2Source(Recording):
             )
         if self._rows is not None:
             self._rows.close()
-        with _damage_named():
-            self._rows = rows = _opened(Path(self.place))
+        with _as_damage():
+            self._rows = rows = _open(Path(self.place))
             _check(rows)
             channels = self._channels(rows)
             order = _in_order(rows, channels)
-        return self._entries_of(rows, channels, order)
+        return self._messages_of(rows, channels, order)
 
     def _channels(self, rows: sqlite3.Connection) -> dict[int, RecordedChannel]:
         """Return the wanted topics by the bag's numbers."""
@@ -83,11 +83,11 @@ class Rosbag2Source(Recording):
                 found[number] = RecordedChannel(topic, 2, _fault(short_kind(kind), encoding, defined.get(kind)))
         return found
 
-    def _entries_of(
+    def _messages_of(
         self, rows: sqlite3.Connection, channels: dict[int, RecordedChannel], order: list[tuple[int, int]]
-    ) -> Iterator[Entry]:
+    ) -> Iterator[RecordedMessage]:
         for at_ns, row in order:
-            with _damage_named():
+            with _as_damage():
                 found = rows.execute("SELECT topic_id, data FROM messages WHERE rowid = ?", (row,)).fetchone()
             number, content = found or (None, None)
             channel = channels.get(number) if isinstance(number, int) else None
@@ -95,10 +95,10 @@ class Rosbag2Source(Recording):
                 raise RecordingDamagedError(f"message {row} has no topic or no content")
             if channel.fault:
                 raise RecordingDamagedError(f"the message on {channel.topic} cannot be read: {channel.fault}")
-            yield Entry(at_ns, 0, row, channel, _unpacked(content))
+            yield RecordedMessage(at_ns, 0, row, channel, _unpacked(content))
 
 
-def _opened(path: Path) -> sqlite3.Connection:
+def _open(path: Path) -> sqlite3.Connection:
     """Open the file only to read, as it stands: nothing is written, not even beside it."""
     rows = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False)
     for limit, most in _LIMITS.items():
@@ -137,7 +137,7 @@ def _fault(kind: str, encoding: object, text: str | None) -> str:
     """Return why messages of a type cannot be read; empty if they can."""
     if encoding != "cdr":
         return f"its messages are written as {str(encoding)[:40]!r}"
-    if text is not None and not types_of(2).is_the_same(kind, text):
+    if text is not None and not types_of(2).has_same_fields(kind, text):
         return f"its definition of {kind} is not that of ROS 2"
     return ""
 
@@ -171,7 +171,7 @@ def _unpacked(content: bytes) -> bytes:
 
 
 @contextmanager
-def _damage_named() -> Iterator[None]:
+def _as_damage() -> Iterator[None]:
     """Raise SQLite's errors, and texts that are no UTF-8, as `RecordingDamagedError`."""
     try:
         yield

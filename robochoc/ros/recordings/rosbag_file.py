@@ -20,13 +20,13 @@ from rosbags.rosbag1 import Writer
 from robochoc.robots.sink import Fields
 from robochoc.ros.message_types import types_of
 from robochoc.ros.recordings.recording import (
-    Block,
-    ChunkedRecording,
+    ChunkedRecordingSource,
+    MessageBlock,
     RecordedChannel,
     RecordingDamagedError,
     RecordingSink,
-    as_it_is,
-    from_lz4,
+    decompress_lz4,
+    uncompressed,
 )
 from robochoc.ros.waypoint_types import short_kind
 
@@ -49,9 +49,9 @@ class RosbagSink(RecordingSink):
         super().__init__(place)
         self._connections: dict[tuple[str, str], Connection] = {}
         self._sequence: dict[int, int] = {}
-        with self.sink_errors():
+        with self.as_sink_errors():
             self._writer = Writer(Path(place) / "bag")  # what the library opens must not exist
-            self._writer.path = cast("Path", _Opened(self.file.stream))
+            self._writer.path = cast("Path", _OpenFile(self.file.stream))
             self._writer.open()
 
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
@@ -81,7 +81,7 @@ class RosbagSink(RecordingSink):
         return found
 
 
-class _Opened(NamedTuple):
+class _OpenFile(NamedTuple):
     """A path whose file is open already: the library opens it once more, and gets that file."""
 
     stream: BinaryIO
@@ -117,16 +117,16 @@ class _Record(NamedTuple):
         return self.header.get(name, b"").decode("utf-8", "replace")
 
 
-def _from_bz2(packed: bytes, most: int) -> bytes:
+def _decompress_bz2(packed: bytes, most: int) -> bytes:
     return bz2.BZ2Decompressor().decompress(packed, max_length=most)
 
 
-class RosbagSource(ChunkedRecording):
+class RosbagSource(ChunkedRecordingSource):
     """Reads a bag of ROS 1."""
 
-    packings = MappingProxyType({"none": as_it_is, "bz2": _from_bz2, "lz4": from_lz4})
+    packings = MappingProxyType({"none": uncompressed, "bz2": _decompress_bz2, "lz4": decompress_lz4})
 
-    def _blocks(self) -> Iterator[Block]:
+    def _blocks(self) -> Iterator[MessageBlock]:
         self._channels: dict[int, RecordedChannel | None] = {}
         source = self._input
         magic = source.take(min(source.size, len(_MAGIC)), "its beginning")
@@ -174,12 +174,12 @@ class RosbagSource(ChunkedRecording):
         (size,) = _SIZE.unpack(self._input.take(_SIZE.size, "a record"))
         return int(size)
 
-    def _chunk(self, record: _Record, size: int) -> Iterator[Block]:
+    def _chunk(self, record: _Record, size: int) -> Iterator[MessageBlock]:
         packing, whole, at = record.text(b"compression"), record.number(b"size"), self._input.at
         body = self._body(self._input.take(size, "a chunk"), packing, whole)
         starts = min((time for _, time, _ in self._messages(body)), default=None)
         if starts is not None:
-            yield Block(starts, at, size, packing, whole)
+            yield MessageBlock(starts, at, size, packing, whole)
 
     def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
         for record in _records(body):

@@ -319,7 +319,7 @@ def test_what_is_missing_is_passed_over(fields: object) -> None:
 def test_a_place_in_another_frame_is_no_place_of_ours() -> None:
     reading = ReportDecoder(drones_of(pair()), "map")
     assert reading.report(heard("/A/blocked", {"header": {"frame_id": "odom"}, "point": PLACE})) is None
-    assert reading.strange == {"/A/blocked": "odom"}
+    assert reading.other_frames == {"/A/blocked": "odom"}
     assert reading.report(heard("/A/blocked", {"header": {"frame_id": "/map"}, "point": PLACE})) is not None
 
 
