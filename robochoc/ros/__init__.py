@@ -1,1 +1,1 @@
-"""The ROS Layer unit (Section 4.2): it applies decisions to robots, and reads the robots' situation."""
+"""The ROS Layer unit (Section 4.2): publishes decisions to robots, and reads the reports of robots."""

@@ -1,7 +1,7 @@
-"""The service `decide`: a request names a team and changes of its problem; the answer is what the team decides.
+"""The service `decide`: a request names a team and changes of its problem; the answer is the team's decision.
 
-The definitions are those of `robochoc_msgs/srv/Decide` (docs/ros2). Requests come from outside: whatever is
-wrong with one is answered in a sentence.
+Its definition is `robochoc_msgs/srv/Decide` (docs/ros2). Requests are untrusted: an invalid request is answered with an
+error message.
 """
 
 from __future__ import annotations
@@ -26,43 +26,43 @@ from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.errors import RobochocError
 
 DECIDE, TRIGGER = "robochoc_msgs/Decide", "std_srvs/Trigger"
-"""The types of services that are offered."""
+"""The types of the offered services."""
 CHANGES_MAX = 1_000
 CHANGES_CHARACTERS_MAX = 64 * 1024
 REFUSAL_CHARACTERS_MAX = 1_000
-"""A refusal may repeat what was asked, which may be long."""
+"""A refusal may quote the request, which may be long."""
 RESULT_CHARACTERS_MAX = 128 * 1024
-"""A longer result is left out of the answer."""
+"""Longer results are omitted from the answer."""
 
 Solve = Callable[[Team, Options], Outcome]
 
 
 class RequestError(RobochocError, ValueError):
-    """The request cannot be carried out. The message says why."""
+    """The request is invalid. The message gives the reason."""
 
 
-class _Value(msgspec.Struct, forbid_unknown_fields=True):
+class _VariableValue(msgspec.Struct, forbid_unknown_fields=True):
     variable: str
     value: int
 
 
-class _Named(msgspec.Struct, forbid_unknown_fields=True):
+class _AgentName(msgspec.Struct, forbid_unknown_fields=True):
     name: str
 
 
-class _Change(msgspec.Struct, forbid_unknown_fields=True):
-    remove_value: _Value | None = None
-    add_value: _Value | None = None
-    remove_agent: _Named | None = None
+class _ChangeRequest(msgspec.Struct, forbid_unknown_fields=True):
+    remove_value: _VariableValue | None = None
+    add_value: _VariableValue | None = None
+    remove_agent: _AgentName | None = None
 
 
 class DecideService:
-    """Answers requests about `teams`, by their names, one after the other.
+    """Answers requests about `teams`, one after the other.
 
     Args:
-        teams: The teams, as their files have them.
-        solve: Lets a team decide.
-        options: How; its `timeout` is the longest time for one request, in seconds.
+        teams: The teams from their files.
+        solve: Solves a team's problem.
+        options: The options for `solve`. Their `timeout` is the longest time for one request, in seconds.
     """
 
     def __init__(self, teams: Sequence[Team], solve: Solve, options: Options) -> None:
@@ -71,24 +71,24 @@ class DecideService:
         self._options = options
 
     def decide(self, fields: Fields) -> dict[str, Any]:
-        """Return the answer to a request `robochoc_msgs/Decide_Request`. Only `SystemExit` is raised."""
+        """Return the answer to a `robochoc_msgs/Decide_Request`. Only `SystemExit` is raised."""
         try:
             team = self._team(_text(fields, "team"))
             options = replace(self._options, timeout=self._timeout_s(fields.get("timeout", 0.0)))
             changed = apply_changes(team, _changes(_text(fields, "changes")))
             return _answer(self._solve(changed, options))
-        except (RequestError, ChangeError, InvalidInputError) as wrong:  # the last: a change leaves no team
-            return refusal(str(wrong))
+        except (RequestError, ChangeError, InvalidInputError) as error:  # InvalidInputError: no team remains
+            return refusal(str(error))
         except Exception as error:  # noqa: BLE001 - each request is answered
             return refusal(f"{type(error).__name__}: {error}")
 
     def trigger(self, team: str) -> dict[str, Any]:
-        """Return the answer to a request `std_srvs/Trigger_Request` about the team of that name."""
+        """Return the answer to a `std_srvs/Trigger_Request` about the team with this name."""
         answer = self.decide({"team": team})
-        told = {name: answer[name] for name in ("verdict", "cost") if answer.get(name)}
+        result = {name: answer[name] for name in ("verdict", "cost") if answer.get(name)}
         if answer["success"]:
-            told["assignment"] = dict(zip(answer["variables"], answer["values"], strict=True))
-        message = msgspec.json.encode(told).decode() if told else answer["message"]
+            result["assignment"] = dict(zip(answer["variables"], answer["values"], strict=True))
+        message = msgspec.json.encode(result).decode() if result else answer["message"]
         return {"success": answer["success"], "message": message}
 
     def _team(self, name: str) -> Team:
@@ -96,41 +96,41 @@ class DecideService:
             return next(iter(self._teams.values()))
         if name not in self._teams:
             known = shortened(", ".join(self._teams))
-            raise RequestError(f"no team has the name {shortened(name)!r}; known are {known}")
+            raise RequestError(f"unknown team {shortened(name)!r}; known are {known}")
         return self._teams[name]
 
-    def _timeout_s(self, asked: object) -> float | None:
-        if isinstance(asked, bool) or not isinstance(asked, int | float) or not 0 <= asked < math.inf:
-            raise RequestError(f"timeout must be seconds, or 0 for the longest, is {_shown(asked)}")
-        return min((one for one in (asked, self._options.timeout) if one), default=None)
+    def _timeout_s(self, requested: object) -> float | None:
+        if isinstance(requested, bool) or not isinstance(requested, int | float) or not 0 <= requested < math.inf:
+            raise RequestError(f"timeout is {_shown(requested)}: it must be seconds, or 0 for the longest time")
+        return min((limit for limit in (requested, self._options.timeout) if limit), default=None)
 
 
 def _text(fields: Fields, name: str) -> str:
-    """Return the text of a field; empty if it is not given. Raises `RequestError`."""
+    """Return the text of a field; empty if it is missing. Raises `RequestError`."""
     value = fields.get(name, "")
     if not isinstance(value, str):
-        raise RequestError(f"{name} must be text, is {_shown(value)}")
+        raise RequestError(f"{name} is {_shown(value)}: it must be text")
     try:
         value.encode()
     except UnicodeEncodeError as error:
         half = f"character {error.start + 1:,} is half of a pair (U+{ord(value[error.start]):04X})"
-        raise RequestError(f"{name} must be text that UTF-8 can hold, and {half}") from None
+        raise RequestError(f"{name} must be text that UTF-8 can encode: {half}") from None
     return value
 
 
 def _shown(value: object) -> str:
-    """Return a value that is wrong, short enough for a message."""
+    """Return an invalid value as short text for an error message."""
     try:
         return shortened(reprlib.repr(value))
-    except Exception:  # noqa: BLE001 - a whole number may have too many digits to be written
+    except Exception:  # noqa: BLE001 - an integer may have too many digits for `repr`
         return f"a {type(value).__name__}"
 
 
 def refusal(why: str) -> dict[str, Any]:
-    """Return the answer that nothing was decided, and why."""
-    told = on_one_line(why)
+    """Return the answer to a refused request, with the reason."""
+    message = on_one_line(why)
     most = REFUSAL_CHARACTERS_MAX
-    return {"success": False, "message": told if len(told) <= most else f"{told[: most - 3]}..."}
+    return {"success": False, "message": message if len(message) <= most else f"{message[: most - 3]}..."}
 
 
 def _answer(outcome: Outcome) -> dict[str, Any]:
@@ -138,10 +138,10 @@ def _answer(outcome: Outcome) -> dict[str, Any]:
     values = dict(sorted(outcome.assignment.items())) if decided else {}
     result = result_json(outcome).decode()
     epochs = len(outcome.epochs) or 1
-    told = f"{outcome.verdict.value}, {epochs} epoch{'s' * (epochs != 1)}"
+    summary = f"{outcome.verdict.value}, {epochs} epoch{'s' * (epochs != 1)}"
     return {
         "success": decided,
-        "message": on_one_line(f"{told}: {outcome.reason}" if outcome.reason else told),
+        "message": on_one_line(f"{summary}: {outcome.reason}" if outcome.reason else summary),
         "verdict": outcome.verdict.value,
         "cost": "" if outcome.cost is None or not decided else str(outcome.cost),
         "variables": [*values],
@@ -152,34 +152,34 @@ def _answer(outcome: Outcome) -> dict[str, Any]:
 
 
 def _changes(text: str) -> list[Change]:
-    """Return the changes that a request asks for, as JSON. Raises `RequestError`."""
+    """Parse the changes in a request, which are JSON. Raises `RequestError`."""
     if not text.strip():
         return []
     if len(text) > CHANGES_CHARACTERS_MAX:
-        raise RequestError(f"changes have {len(text):,} characters, and at most {CHANGES_CHARACTERS_MAX:,} are read")
+        raise RequestError(f"changes have {len(text):,} characters: at most {CHANGES_CHARACTERS_MAX:,} are accepted")
     try:
-        found = msgspec.json.decode(text, type=list[_Change])
+        found = msgspec.json.decode(text, type=list[_ChangeRequest])
     except msgspec.DecodeError as error:
-        raise RequestError(f"changes: {describe_decode_error(error, list[_Change])}") from error
+        raise RequestError(f"changes: {describe_decode_error(error, list[_ChangeRequest])}") from error
     except RecursionError as error:
         raise RequestError("changes are nested too deeply") from error
     if len(found) > CHANGES_MAX:
-        raise RequestError(f"there are {len(found):,} changes, and at most {CHANGES_MAX:,} are taken")
-    return [*_each(found)]
+        raise RequestError(f"there are {len(found):,} changes: at most {CHANGES_MAX:,} are accepted")
+    return [*_as_changes(found)]
 
 
-def _each(found: Sequence[_Change]) -> Iterator[Change]:
-    for number, one in enumerate(found, 1):
-        match one:
-            case _Change(remove_value=_Value() as value, add_value=None, remove_agent=None):
+def _as_changes(found: Sequence[_ChangeRequest]) -> Iterator[Change]:
+    for number, change in enumerate(found, 1):
+        match change:
+            case _ChangeRequest(remove_value=_VariableValue() as value, add_value=None, remove_agent=None):
                 yield RemoveValue(value.variable, value.value)
-            case _Change(remove_value=None, add_value=_Value() as value, remove_agent=None):
+            case _ChangeRequest(remove_value=None, add_value=_VariableValue() as value, remove_agent=None):
                 yield AddValue(value.variable, value.value)
-            case _Change(remove_value=None, add_value=None, remove_agent=_Named() as named):
+            case _ChangeRequest(remove_value=None, add_value=None, remove_agent=_AgentName() as named):
                 yield RemoveAgent(named.name)
             case _:
                 raise RequestError(f"change {number} must be one of remove_value, add_value and remove_agent")
 
 
 SERVICES: Mapping[str, str] = {DECIDE: "robochoc_msgs/srv/Decide", TRIGGER: "std_srvs/srv/Trigger"}
-"""Their names as ROS 2 writes them."""
+"""The services' types in ROS 2's spelling."""

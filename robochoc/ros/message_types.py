@@ -1,8 +1,8 @@
-"""ROS types: from a message's fields to its bytes in ROS 1 and ROS 2, and back.
+"""ROS types: encodes the fields of messages in ROS 1 and ROS 2, and decodes their bytes.
 
-Only this module knows `rosbags.typesys`. The definitions are those of ROS 1 Noetic and of ROS 2 Humble, whose types
-later ones have too, and those that installed packages bring (`mappings.py`). A definition in a recording is compared
-with ours and nothing else: rosbags makes program text of definitions and runs it.
+Only this module uses `rosbags.typesys`. It knows the types of ROS 1 Noetic, those of ROS 2 Humble (which later versions
+also have), those of installed packages (`waypoint_types.py`), and the offered services. A definition in a recording is
+untrusted: it is compared with ours line by line and never parsed by rosbags, which generates and runs program text.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ SERVICE_TYPES: Mapping[str, str] = MappingProxyType(
     {
         "robochoc_msgs/Decide_Request": DECIDE_REQUEST,
         "robochoc_msgs/Decide_Response": DECIDE_RESPONSE,
-        # ROS 2 gives a structure without fields this one.
+        # ROS 2 adds this field to a structure without fields.
         "std_srvs/Trigger_Request": "uint8 structure_needs_at_least_one_member\n",
         "std_srvs/Trigger_Response": "bool success\nstring message\n",
     }
 )
-"""The two halves of each service, as the definitions of messages."""
+"""The requests and responses of the offered services, as definitions of messages."""
 DEFINITION_MAX = 1 << 15
-"""Characters of a definition; those known here have some 5,000."""
+"""The most characters of a definition in a recording. Known definitions have up to about 5,000."""
 _LINE = re.compile(r"([A-Za-z][\w/]*)((?:<=\d+)?(?:\[[<=\d]*\])?)\s+([A-Za-z]\w*)\s*(=?)", re.ASCII)
 _SECTION = re.compile(r"MSG:\s*([\w/]+)\s*", re.ASCII)
-_OWN = re.compile(r"bool|byte|char|u?int(?:8|16|32|64)|float(?:32|64)|w?string|time|duration")
+_PRIMITIVE = re.compile(r"bool|byte|char|u?int(?:8|16|32|64)|float(?:32|64)|w?string|time|duration")
 _WELL_KNOWN = {"builtin_interfaces/Time", "builtin_interfaces/Duration"}
-"""Not every writer defines these."""
-_SECOND = 10**9
+"""Types that some recorders do not define."""
+_SECOND_NS = 10**9
 _LARGEST_SINGLE = 3.4028235677973366e38
 _TIMES = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
 _HEADER = "std_msgs/msg/Header"
@@ -76,45 +76,45 @@ Field = tuple[str, str]
 """The type and the name of a field."""
 Version = Literal[1, 2]
 """ROS 1 or ROS 2."""
-Make = Callable[[Any], Any]
+Converter = Callable[[Any], Any]
 
 
 class UnknownTypeError(RobochocError, LookupError):
-    """There is no definition of that ROS type, or the one that a package brings cannot be used."""
+    """The ROS type has no definition, or the definition in an installed package is invalid."""
 
 
 class FieldsError(RobochocError, ValueError):
-    """Fields that are not those of the type, or bytes that are no message of it. The message says why."""
+    """The fields do not match the type, or the bytes are not a message of the type. The message gives the reason."""
 
 
 class Definition(NamedTuple):
-    """A type's definition, with those of its fields' types, and its MD5 sum as ROS 1 computes it."""
+    """A type's definition, including its fields' types, and its MD5 sum as in ROS 1."""
 
     text: str
     md5: str
 
 
 class FieldType(NamedTuple):
-    """The type of a field: `float64`, `string` or `geometry_msgs/Point`, one or several of it."""
+    """The type of a field: one `float64`, `string` or `geometry_msgs/Point`, or several."""
 
     name: str
     limit: int = 0
-    """The most characters of a string; 0: any number."""
+    """The largest number of characters of a string; 0: unlimited."""
     shape: Literal["one", "array", "sequence"] = "one"
     size: int = 0
-    """The number of values in an array; the most in a sequence, 0: any number."""
+    """The number of values in an array, or the largest number in a sequence; 0: unlimited."""
 
 
-class _Kind(NamedTuple):
-    """Conversions of one type, from fields to the library's object and back; and the object without fields."""
+class _Conversion(NamedTuple):
+    """The conversions of a type from fields to the library's object and back, and its default object."""
 
-    make: Make
-    fields: Make
+    make: Converter
+    fields: Converter
     empty: Any
 
 
 class _FieldError(RobochocError):
-    """The value of a field is wrong. `path` leads to the field, the last name first."""
+    """The value of a field is invalid. `path` are the names of the fields that lead to it, innermost first."""
 
     def __init__(self, why: str, *path: str) -> None:
         super().__init__(why)
@@ -122,17 +122,17 @@ class _FieldError(RobochocError):
 
 
 class Types:
-    """The types of one version of ROS. Kinds are named `geometry_msgs/PoseStamped`, or as ROS 2 does."""
+    """The types of a version of ROS, named `geometry_msgs/PoseStamped` or `geometry_msgs/msg/PoseStamped`."""
 
     def __init__(self, version: Version) -> None:
         self.version = version
         self._store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
-        self._kinds: dict[str, _Kind] = {}
-        self._known: dict[str, _Kind] = {}
+        self._kinds: dict[str, _Conversion] = {}
+        self._known: dict[str, _Conversion] = {}
         self._definitions: dict[str, Definition] = {}
 
     def definition(self, kind: str) -> Definition:
-        """Return the definition of `kind` as recordings hold it. Raises `UnknownTypeError`."""
+        """Return the definition of `kind` for a recording. Raises `UnknownTypeError`."""
         name = self._name(kind)
         if name not in self._definitions:
             text, md5 = self._store.generate_msgdef(name, ros_version=self.version)
@@ -140,104 +140,102 @@ class Types:
         return self._definitions[name]
 
     def type_hash(self, kind: str) -> str:
-        """Return the hash of `kind` by which ROS 2 compares definitions (REP 2016). Raises `UnknownTypeError`."""
+        """Return the hash of `kind`, which ROS 2 uses to compare definitions (REP 2016). Raises `UnknownTypeError`."""
         name = self._name(kind)
-        self._made(kind, name)
+        self._conversion(kind, name)
         return self._store.hash_rihs01(name)
 
     def has_same_fields(self, kind: str, text: str) -> bool:
-        """Return whether `text` defines the fields that `kind` has. Raises `UnknownTypeError`."""
+        """Return whether `text` defines the same fields as `kind`. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)
 
     def layout(self, kind: str) -> tuple[tuple[str, FieldType], ...]:
         """Return the fields of `kind` and their types, in order. Raises `UnknownTypeError`."""
         name = self._name(kind)
-        self._made(kind, name)  # types of fields that are not defined are found out here
+        self._conversion(kind, name)  # raises `UnknownTypeError` for undefined types of fields
         return tuple((field, _field_type(desc)) for field, desc in self._store.fielddefs[name][1])
 
     def encode(self, kind: str, fields: Fields) -> bytes:
-        """Return a message's bytes: CDR in ROS 2, and ROS 1's own format.
+        """Return a message's bytes: CDR in ROS 2, ROS 1's format in ROS 1.
 
         Raises:
             UnknownTypeError: `kind` is unknown.
-            FieldsError: `fields` are not those of `kind`.
+            FieldsError: `fields` do not match `kind`.
         """
         name = self._name(kind)
         try:
-            message = self._made(kind, name).make(fields)
-        except _FieldError as wrong:
-            where = ".".join(reversed(wrong.path)) or "it"
-            raise FieldsError(f"{short_kind(kind)}: {where} {wrong}") from None
+            message = self._conversion(kind, name).make(fields)
+        except _FieldError as error:
+            where = ".".join(reversed(error.path)) or "it"
+            raise FieldsError(f"{short_kind(kind)}: {where} {error}") from None
         store = self._store
         return bytes(store.serialize_ros1(message, name) if self.version == 1 else store.serialize_cdr(message, name))
 
     def decode(self, kind: str, content: bytes) -> dict[str, Any]:
-        """Return the fields of a message, whose bytes may be anything.
+        """Return the fields of a message whose bytes are untrusted.
 
         Raises:
             UnknownTypeError: `kind` is unknown.
-            FieldsError: `content` is no `kind`.
+            FieldsError: `content` is not a message of `kind`.
         """
         name = self._name(kind)
-        made = self._made(kind, name)
+        made = self._conversion(kind, name)
         read = self._store.deserialize_ros1 if self.version == 1 else self._store.deserialize_cdr
         try:
             return cast("dict[str, Any]", made.fields(read(content, name)))
         except _DAMAGE as error:
-            raise FieldsError(f"{len(content)} bytes are no {short_kind(kind)}: {error}") from error
+            raise FieldsError(f"{len(content)} bytes are not a {short_kind(kind)}: {error}") from error
 
     def _name(self, kind: str) -> str:
-        """Return the library's name, `geometry_msgs/msg/PoseStamped`. A package's definition is registered first."""
+        """Return the library's name, `geometry_msgs/msg/PoseStamped`. Registers a package's definition if necessary."""
         short = short_kind(kind)
         name = short.replace("/", "/msg/", 1)
         if name not in self._store.fielddefs:
             text = SERVICE_TYPES.get(kind) or definition_of(kind)
             if not text:
-                problem = f"ROS {self.version} has no type {kind!r} that is known here"
-                raise UnknownTypeError(f"{problem}; its mapping can bring the definition (docs/guides/ros.md)")
+                problem = f"ROS {self.version} has no type {kind!r}"
+                raise UnknownTypeError(f"{problem}; add its definition to its mapping (docs/guides/ros.md)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})
             except TypesysError as error:
-                raise UnknownTypeError(f"the definition of {kind!r} that a package brings is wrong: {error}") from error
+                raise UnknownTypeError(f"the definition of {kind!r} in its package is invalid: {error}") from error
         return name
 
-    def _made(self, kind: str, name: str) -> _Kind:
+    def _conversion(self, kind: str, name: str) -> _Conversion:
         if kind not in self._known:
             try:
                 self._known[kind] = self._kind(name)
             except (KeyError, RecursionError) as error:
-                raise UnknownTypeError(
-                    f"the definition of {kind!r} needs types that are not defined: {error}"
-                ) from error
+                raise UnknownTypeError(f"the definition of {kind!r} requires undefined types: {error}") from error
         return self._known[kind]
 
-    def _kind(self, name: str) -> _Kind:
+    def _kind(self, name: str) -> _Conversion:
         if name not in self._kinds:
             self._kinds[name] = self._time(name) if name in _TIMES else self._struct(name)
         return self._kinds[name]
 
-    def _time(self, name: str) -> _Kind:
+    def _time(self, name: str) -> _Conversion:
         made = self._store.types[name]
         unsigned = self.version == 1 and name.endswith("Time")
         low = 0 if unsigned else -(1 << 31)
 
         def make(value: object) -> object:
-            whole = _whole(value)
-            if not low <= whole // _SECOND < 1 << 31:
-                raise _FieldError(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
-            return made(whole // _SECOND, whole % _SECOND)
+            time_ns = _integer(value)
+            if not low <= time_ns // _SECOND_NS < 1 << 31:
+                raise _FieldError(f"must be a time of ROS {self.version} in nanoseconds, is {value!r}")
+            return made(time_ns // _SECOND_NS, time_ns % _SECOND_NS)
 
-        def given(time: Any) -> int:  # noqa: ANN401 - rosbags' own type, which reads seconds as ROS 2 has them
+        def nanoseconds(time: Any) -> int:  # noqa: ANN401 - the type of rosbags, which reads signed seconds
             sec = time.sec % (1 << 32) if unsigned else time.sec
-            return int(sec) * _SECOND + int(time.nanosec)
+            return int(sec) * _SECOND_NS + int(time.nanosec)
 
-        return _Kind(make, given, made(0, 0))
+        return _Conversion(make, nanoseconds, made(0, 0))
 
-    def _struct(self, name: str) -> _Kind:
+    def _struct(self, name: str) -> _Conversion:
         made = self._store.types[name]
         parts = [(field, self._part(desc)) for field, desc in self._store.fielddefs[name][1]]
-        attributes = [*getattr(made, "__dataclass_fields__", ())]  # `from` is `from_` there
+        attributes = [*getattr(made, "__dataclass_fields__", ())]  # a field `from` has the attribute `from_`
         hidden = {"seq"} if name == _HEADER else {"structure_needs_at_least_one_member"}
         both = zip(attributes, parts, strict=False)
         shown = [(field, own, part) for own, (field, part) in both if field not in hidden]
@@ -248,9 +246,9 @@ class Types:
         def fields(message: object) -> dict[str, Any]:
             return {field: part.fields(getattr(message, own)) for field, own, part in shown}
 
-        return _Kind(make, fields, made(*[part.empty for _, part in parts]))
+        return _Conversion(make, fields, made(*[part.empty for _, part in parts]))
 
-    def _part(self, desc: Any) -> _Kind:  # noqa: ANN401 - the library's tuples
+    def _part(self, desc: Any) -> _Conversion:  # noqa: ANN401 - the library's tuples
         what, more = desc
         if what == Nodetype.BASE:
             return _scalar(more[0], more[1])
@@ -276,12 +274,12 @@ class Types:
         def fields(values: Any) -> list[Any]:  # noqa: ANN401 - an array or a list
             return cast("list[Any]", values.tolist()) if kind else [item.fields(value) for value in values]
 
-        return _Kind(make, fields, listed([item.empty] * (fixed or 0)))
+        return _Conversion(make, fields, listed([item.empty] * (fixed or 0)))
 
 
 @cache
 def types_of(version: Version) -> Types:
-    """Return the types of that version, made once."""
+    """Return the types of a version of ROS. They are created once."""
     return Types(version)
 
 
@@ -295,8 +293,8 @@ def _field_type(desc: Any) -> FieldType:  # noqa: ANN401 - the library's tuples
     return one._replace(shape="array" if what == Nodetype.ARRAY else "sequence", size=more[1])
 
 
-def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Kind]]) -> list[Any]:
-    """Return the values of all fields of a `kind`. Raises `_FieldError`."""
+def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Conversion]]) -> list[Any]:
+    """Return the values of all fields of `kind`. Raises `_FieldError`."""
     if not isinstance(value, Mapping):
         raise _FieldError(f"must be fields by their names, is {value!r}")
     names = {field for field, _ in parts}
@@ -307,8 +305,8 @@ def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Kind]]) -> 
     for field, part in parts:
         try:
             values.append(part.make(value[field]) if field in value else part.empty)
-        except _FieldError as wrong:
-            wrong.path.append(field)
+        except _FieldError as error:
+            error.path.append(field)
             raise
     return values
 
@@ -317,25 +315,25 @@ def _dtype(kind: str) -> str:
     return {"bool": "bool_", "char": "uint8", "byte": "int8"}.get(kind, kind)
 
 
-def _scalar(kind: str, limit: int) -> _Kind:
-    def as_it_is(value: object) -> object:
+def _scalar(kind: str, limit: int) -> _Conversion:
+    def unchanged(value: object) -> object:
         return value
 
     if kind == "string":
-        return _Kind(lambda value: _text(value, limit), as_it_is, "")
+        return _Conversion(lambda value: _text(value, limit), unchanged, "")
     if kind == "bool":
-        return _Kind(_truth, as_it_is, False)
+        return _Conversion(_boolean, unchanged, False)
     if kind.startswith("float"):
-        return _Kind(_single if kind == "float32" else _number, as_it_is, 0.0)
+        return _Conversion(_float32 if kind == "float32" else _float, unchanged, 0.0)
     low, high = _INTEGERS[kind]
 
     def make(value: object) -> int:
-        whole = _whole(value)
-        if not low <= whole <= high:
+        integer = _integer(value)
+        if not low <= integer <= high:
             raise _FieldError(f"must be a whole number from {low} to {high}, is {value!r}")
-        return whole
+        return integer
 
-    return _Kind(make, as_it_is, 0)
+    return _Conversion(make, unchanged, 0)
 
 
 def _text(value: object, limit: int) -> str:
@@ -345,17 +343,17 @@ def _text(value: object, limit: int) -> str:
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise _FieldError(f"must be text that UTF-8 can hold, is {value!r}") from None
+        raise _FieldError(f"must be text that UTF-8 can encode, is {value!r}") from None
     return value
 
 
-def _truth(value: object) -> bool:
+def _boolean(value: object) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise _FieldError(f"must be true or false, is {value!r}")
     return bool(value)
 
 
-def _number(value: object) -> float:
+def _float(value: object) -> float:
     if type(value) is float:
         return value
     if not isinstance(value, bool) and isinstance(value, Real):
@@ -364,22 +362,22 @@ def _number(value: object) -> float:
     raise _FieldError(f"must be a number, is {value!r}")
 
 
-def _single(value: object) -> float:
-    number = _number(value)
+def _float32(value: object) -> float:
+    number = _float(value)
     if _LARGEST_SINGLE <= abs(number) < math.inf:
         raise _FieldError(f"must be a number of single precision, is {value!r}")
     return number
 
 
-def _whole(value: object) -> int:
+def _integer(value: object) -> int:
     if not isinstance(value, bool):
         with suppress(TypeError):
-            return operator.index(value)  # type: ignore[arg-type]  # that is the question
+            return operator.index(value)  # type: ignore[arg-type]  # raises TypeError for other types
     raise _FieldError(f"must be a whole number, is {value!r}")
 
 
 def same_fields(kind: str, text: str, ours: str) -> bool:
-    """Return whether `text` gives `kind`, and the types of its fields, the same fields as `ours`."""
+    """Return whether `text` and `ours` define the same fields for `kind` and its fields' types."""
     if len(text) > DEFINITION_MAX:
         return False
     theirs = _sections(kind, text)
@@ -390,7 +388,7 @@ def same_fields(kind: str, text: str, ours: str) -> bool:
 
 
 def _sections(kind: str, text: str) -> Mapping[str, list[Field] | None]:
-    """Return the fields of `kind`, and of each type that is defined behind it; None where a line is no field."""
+    """Return the fields of `kind` and of each type defined after it; None for a type with an invalid line."""
     found: dict[str, list[Field] | None] = {kind: []}
     current = kind
     for line in text.splitlines():
@@ -408,15 +406,15 @@ def _add(found: dict[str, list[Field] | None], current: str, content: str) -> No
     fields, line = found[current], _LINE.match(content)
     if fields is None or line is None:
         found[current] = None
-    elif not line[4]:  # else it is a constant
+    elif not line[4]:  # otherwise a constant
         fields.append((_qualified(line[1], current) + line[2], line[3]))
 
 
 def _qualified(kind: str, inside: str) -> str:
-    """Return a field's type with its package, which may be left out for those of its own, and for a header."""
+    """Return a field's type with its package, which definitions may omit for types of their package and for headers."""
     if kind == "Header":
         return "std_msgs/Header"
-    if "/" in kind or _OWN.fullmatch(kind):
+    if "/" in kind or _PRIMITIVE.fullmatch(kind):
         return _short(kind)
     return f"{inside.partition('/')[0]}/{kind}"
 

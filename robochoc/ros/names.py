@@ -1,8 +1,8 @@
-"""Names for ROS. A team's files call a topic `/drone3.1/waypoint3.1`; neither ROS 1 nor ROS 2 allows that name.
+"""Legal names for ROS: a team's file may name a topic `/drone3.1/waypoint3.1`, which ROS 1 and ROS 2 do not allow.
 
-A name here is `/` and tokens of letters, digits and single underscores, each beginning with a letter: legal in ROS 1
-(wiki.ros.org/Names) and in ROS 2 (design.ros2.org, "Topic and Service name mapping to DDS"). Legal names stay as they
-are.
+A legal name is `/` and tokens of letters, digits and single underscores, each beginning with a letter, according to
+ROS 1 (wiki.ros.org/Names) and ROS 2 (design.ros2.org, "Topic and Service name mapping to DDS"). Legal names are not
+changed.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ TEAM_TOPICS: Mapping[str, str] = MappingProxyType(
         "/diagnostics": "diagnostic_msgs/DiagnosticArray",
     }
 )
-"""Topics of the whole team, which mean the same in every ROS, and their types."""
+"""The topics of the whole team, with their standard types in ROS."""
 
 NAME_MAX = 240
-"""Characters of a name: ROS 2 passes on a few more to DDS."""
+"""The most characters of a name. ROS 2 adds a few for DDS."""
 
 _LEGAL = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*_?")
 _RESERVED = {*TEAM_TOPICS, "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/bond"}
-"""Topics with a meaning of their own in every ROS."""
+"""Topics with a fixed meaning in ROS."""
 
 
 class NameClashError(RobochocError):
-    """Two topics would have one name in ROS, or a name is too long for it. The message says what to do."""
+    """Two topics would have the same name in ROS, or a name is too long. The message suggests a solution."""
 
 
 class TopicNames:
-    """The names in ROS of what `drones` publish, by the drones' numbers. Raises `NameClashError`."""
+    """The ROS names of the topics of `drones`, by the drones' numbers. Raises `NameClashError`."""
 
     original: Mapping[str, str]
-    """From a waypoint's topic in ROS to its name in the robot's file. For a drone without a topic, from its namespace
-    to the drone's name.
+    """Maps the ROS name of a waypoint's topic to its name in the robot's file, and the namespace of a drone without a
+    topic to the drone's name.
     """
 
     def __init__(self, drones: Sequence[Drone]) -> None:
@@ -53,8 +53,8 @@ class TopicNames:
         owners: dict[str, int] = {}
         for number, topic in self._topics():
             if len(topic) > NAME_MAX:
-                what = _described(drones[number])
-                raise NameClashError(on_one_line(f"{what}: the name is too long for ROS: shorten it"))
+                subject = _description(drones[number])
+                raise NameClashError(on_one_line(f"{subject}: the name is too long for ROS: shorten it"))
             other = owners.setdefault(topic, number)
             if other != number:
                 raise NameClashError(_clash(topic, drones[other], drones[number]))
@@ -64,7 +64,7 @@ class TopicNames:
         )
 
     def waypoint(self, number: int) -> str | None:
-        """Return the topic of a drone's waypoints; None if its robot's file names none."""
+        """Return the topic of a drone's waypoints; None if its robot's file has no topic."""
         return self._waypoints[number]
 
     def namespace(self, number: int) -> str:
@@ -72,7 +72,7 @@ class TopicNames:
         return self._namespaces[number]
 
     def reports(self) -> dict[str, str]:
-        """Return the topics of all that drones may report, and their types."""
+        """Return the topics of all reports of the drones, and their types."""
         return {f"{space}/{token}": kind for space in self._namespaces for token, kind in REPORTS.items()}
 
     def _topics(self) -> Iterator[tuple[int, str]]:
@@ -85,12 +85,12 @@ class TopicNames:
 
 
 def is_for_waypoints(topic: str, kind: str) -> bool:
-    """Return whether `topic`, of the ROS type `kind`, is for waypoints: no report, and no topic of the team's."""
+    """Return whether `topic`, of the ROS type `kind`, is for waypoints: not a report or a topic of the whole team."""
     return topic not in TEAM_TOPICS and REPORTS.get(topic.rpartition("/")[2]) != kind.replace("/msg/", "/")
 
 
 def ros_name(name: str) -> str:
-    """Return `name` as ROS allows it: `/drone3_1/waypoint3_1`. Different names may become the same."""
+    """Return `name` as a legal name: `/drone3_1/waypoint3_1`. Different names may become the same."""
     tokens = [_token(token) for token in name.split("/") if token] or [_token("")]
     found = "/" + "/".join(tokens)
     return f"{found}_topic" if found in _RESERVED else found
@@ -105,7 +105,7 @@ def _token(text: str) -> str:
 
 
 def _plain(char: str) -> str:
-    """Return letters and digits without accents; letters of other alphabets by their code, the rest as underscores."""
+    """Return a letter without its accent, a letter of another alphabet as its code, other characters as underscores."""
     if char.isascii():
         return char if char.isalnum() else "_"
     if unicodedata.combining(char):
@@ -114,7 +114,7 @@ def _plain(char: str) -> str:
 
 
 def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
-    """Yield the first token of the waypoints' topic where no other drone's topic has it, else all of that topic."""
+    """Yield each drone's namespace: the first token of its waypoints' topic if it is unique, else the whole topic."""
     names = [ros_name(drone.name.replace("/", "_")) for drone in drones]
     first = ["/" + topic.split("/")[1] if topic else name for topic, name in zip(waypoints, names, strict=True)]
     shared = Counter(first)
@@ -125,13 +125,15 @@ def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Ite
 
 def _clash(topic: str, first: Drone, second: Drone) -> str:
     if first.topic and second.topic and first.topic.name == second.topic.name:
-        who = [f"{drone.name} ({drone.robot})" if drone.robot else drone.name for drone in (first, second)]
-        clash = f"{who[0]} and {who[1]} both publish on {second.topic.name!r}: give each a topic of its own"
+        names = [f"{drone.name} ({drone.robot})" if drone.robot else drone.name for drone in (first, second)]
+        clash = f"{names[0]} and {names[1]} both publish on {second.topic.name!r}: give each its own topic"
     else:
-        clash = f"{_described(first)} and {_described(second)} would both publish on {topic} in ROS: rename one of them"
+        clash = (
+            f"{_description(first)} and {_description(second)} would both publish on {topic} in ROS: rename one of them"
+        )
     return on_one_line(clash)
 
 
-def _described(drone: Drone) -> str:
-    what = f"drone {drone.name!r}" if drone.topic is None else f"topic {drone.topic.name!r}"
-    return f"{what} of {drone.robot}" if drone.robot else what
+def _description(drone: Drone) -> str:
+    subject = f"drone {drone.name!r}" if drone.topic is None else f"topic {drone.topic.name!r}"
+    return f"{subject} of {drone.robot}" if drone.robot else subject

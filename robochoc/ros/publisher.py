@@ -1,4 +1,4 @@
-"""Publishes decisions, poses and reports of a mission's drones as messages."""
+"""Publishers of a mission: decisions, poses and reports of its drones as ROS messages."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ _NOT_MEASURED = {
     name: float("nan")
     for name in ("voltage", "temperature", "current", "charge", "capacity", "design_capacity", "percentage")
 }
-"""As `sensor_msgs/BatteryState` says: "if unmeasured NaN"."""
+"""NaN, as the definition of `sensor_msgs/BatteryState` requires for unmeasured values."""
 
 
 class NothingToPublishError(RobochocError):
-    """No drone of the team has a topic. The message says what to do."""
+    """No drone of the team has a topic. The message suggests a solution."""
 
 
 class Publisher:
-    """Publishes what `drones` of `team` are to do, and what they report, to each of `sinks`, which it does not close.
+    """Publishes the waypoints and reports of the `drones` of `team` to all `sinks`, which it does not close.
 
-    Times are in nanoseconds since the epoch; places in metres, in `frame`. `options` say what else is published.
-    Methods raise `SinkError`, and `NoMappingError` where a package's mapping fails.
+    Times are in nanoseconds since the epoch; places in metres, in `frame`. `options` select further messages. Methods
+    raise `SinkError`, and `NoMappingError` if a package's mapping fails.
 
     Raises:
         NameClashError: Two topics would have the same name in ROS.
-        NoMappingError: A topic has a type that no waypoint can become.
+        NoMappingError: Waypoints cannot be converted to the type of a topic.
         NothingToPublishError: No drone has a topic.
-        SinkError: A sink does not take the topics.
+        SinkError: A sink does not accept the topics.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Publisher:
             sink.advertise({**topics, **self.names.reports(), **options.topics})
 
     def decide(self, leg: Leg, at_ns: int) -> None:
-        """Publish the waypoints of `leg`: of drones that fly, and of those that land. Then what the options ask for."""
+        """Publish the waypoints of flying and landing drones in `leg`, then the messages selected by the options."""
         self._decisions += 1
         decided = waypoints(leg, self._drones, self.names, self._frame, at_ns, self._goals)
         for sink in self._sinks:
@@ -93,7 +93,7 @@ class Publisher:
         self._goals |= {number: goal.at for number, goal in leg.goals.items()}
         header = self._header(at_ns)
         if self._options.frames:
-            # All goals that stand, as a latched topic keeps its last message alone.
+            # All current goals, because a latched topic stores only its last message.
             frames = [transform(header, self._frame_of(number, GOAL), at) for number, at in sorted(self._goals.items())]
             self._team_publish("/tf_static", transforms(frames), at_ns)
         if self._options.diagnostics:
@@ -133,7 +133,7 @@ class Publisher:
         try:
             return self._mappings[waypoint.kind].fields(waypoint)
         except Exception as error:
-            problem = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
+            problem = f"the installed mapping of waypoints to {waypoint.kind} failed: {type(error).__name__}: {error}"
             raise NoMappingError(on_one_line(problem)) from error
 
     def _header(self, at_ns: int) -> Fields:
@@ -154,7 +154,10 @@ class Publisher:
 
 
 class SinkPublisher(MissionPublisher):
-    """Publishes decisions, poses and reports of `drones` of `team` into one `sink`. Raises what `Publisher` raises."""
+    """Publishes decisions, poses and reports of `drones` of `team` to one `sink`, and counts them.
+
+    Raises the exceptions of `Publisher`.
+    """
 
     def __init__(
         self, team: str, drones: Sequence[Drone], sink: Sink, frame: str, options: PublishOptions = WAYPOINTS_ONLY
@@ -185,7 +188,7 @@ class SinkPublisher(MissionPublisher):
 
     @property
     def summary(self) -> str:
-        """Return a short text on what was published, such as `10 waypoints, 6 landings`, and what came of it."""
+        """Return the counts of published messages, such as `10 waypoints, 6 landings`, and the sink's summary."""
         first = ("waypoint", "landing")
         words = [
             f"{count:,} {name}{'s' * (count != 1)}" for name, count in self._counts.items() if count or name in first
@@ -214,7 +217,7 @@ def waypoints(
 
 
 def _with_kind(drone: Drone, kind: str) -> Drone:
-    """Return `drone` with another type of its topic, unless `kind` is empty."""
+    """Return `drone` with the type `kind` of its topic; unchanged if `kind` is empty."""
     return replace(drone, topic=replace(drone.topic, type=kind)) if kind and drone.topic else drone
 
 

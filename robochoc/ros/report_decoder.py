@@ -1,7 +1,7 @@
-"""From messages to reports: what robots publish of their situation, in ROS 1 or ROS 2.
+"""Decodes the reports of robots from messages of ROS 1 or ROS 2.
 
-A drone reports in its own namespace (`names.py`). Messages come from outside. What is not as it should be is ignored: a
-value that is no number, a place in another frame.
+A drone reports in its own namespace (`names.py`). Messages are untrusted: invalid ones are ignored, such as a value
+that is not a number, or a place in another frame.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from robochoc.robots.source import REPORTS, ReceivedMessage
 from robochoc.ros.names import TopicNames
 
 REASON_MAX = 200
-"""Characters of a reason that are kept."""
-_FAR_M = 1e9
-"""Larger coordinates are no places."""
+"""The most characters of a reason; longer ones are cut."""
+_COORDINATE_MAX_M = 1e9
+"""The largest valid coordinate, in metres."""
 
 
 class ReportDecoder:
-    """Decodes the reports of `drones`. Raises `NameClashError` where their topics would have the same name.
+    """Decodes the reports of `drones`. Raises `NameClashError` if two of their topics would have the same name.
 
-    Places count in `frame`. A message without a frame is taken to be in it.
+    Only places in `frame` are accepted. Messages without a frame are assumed to be in it.
     """
 
     topics: Mapping[str, str]
@@ -33,7 +33,7 @@ class ReportDecoder:
     namespaces: Mapping[str, str]
     """The namespace of each drone's topics, by the drone's name."""
     other_frames: dict[str, str]
-    """Topics with places in another frame, and the last one of these frames."""
+    """The topics with places in another frame, and the last of these frames."""
 
     def __init__(self, drones: Sequence[Drone], frame: str) -> None:
         names = TopicNames(drones)
@@ -48,7 +48,7 @@ class ReportDecoder:
         self.other_frames = {}
 
     def report(self, received: ReceivedMessage) -> Report | None:
-        """Return what the message reports, at the time at which it was received; None where it reports nothing."""
+        """Return the report in a message, with the time of its reception; None if it has no valid report."""
         drone, token = self._tokens.get(received.topic, ("", ""))
         at_s = received.at_ns / 1e9
         match token:
@@ -70,25 +70,25 @@ class ReportDecoder:
 
     def _place(self, received: ReceivedMessage, *path: str) -> Point | None:
         """Return the point at `path` in the message; None if it is not in our frame."""
-        frame = _at(received.fields, ("header",)).get("frame_id")
+        frame = _fields_at(received.fields, ("header",)).get("frame_id")
         if isinstance(frame, str) and frame.removeprefix("/") not in {"", self._frame}:
             self.other_frames[received.topic] = on_one_line(frame[:REASON_MAX])
             return None
-        fields = _at(received.fields, path)
+        fields = _fields_at(received.fields, path)
         x, y, z = (_number(fields, axis) for axis in "xyz")
         return None if x is None or y is None or z is None else (x, y, z)
 
 
-def _at(fields: object, path: Sequence[str]) -> Mapping[str, object]:
-    """Return the fields at `path`; none where there is nothing of that kind."""
+def _fields_at(fields: object, path: Sequence[str]) -> Mapping[str, object]:
+    """Return the fields at `path`; empty if there are none."""
     for name in path:
         fields = fields.get(name) if isinstance(fields, Mapping) else None
     return fields if isinstance(fields, Mapping) else {}
 
 
 def _number(fields: Mapping[str, object], name: str) -> float | None:
-    """Return a finite number that is not too large; None for anything else."""
+    """Return a finite number that is not too large; None for all other values."""
     value = fields.get(name)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return float(value) if abs(value) <= _FAR_M and math.isfinite(value) else None
+    return float(value) if abs(value) <= _COORDINATE_MAX_M and math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Feedback from a source: robots that report over a ROS, or a recording of what they have reported."""
+"""Feedback from a source: live reports of robots, or recorded ones, and the clock of a simulation."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ PATIENCE_S = 10.0
 """The default time to wait for reports of a live source after a decision, in seconds."""
 _NOTES_MAX = 12
 _SLICE_S = 0.2
-"""The interval between calls of `idle`, and the longest time that a look at what has come may take, in seconds."""
+"""The interval between calls of `idle`, and the longest time of `poll`, in seconds."""
 
 
 class SourceFeedback(Feedback):
     """Reports from `source`, decoded by `decoder`.
 
-    After each decision a live source has `patience_s` seconds for a report that changes something; then the run is
-    over. While it is busy, that time does not pass. A recording is read to its end, as fast as possible: the clock is
-    that of its messages.
+    A run ends if a live source sends no report that changes the problem within `patience_s` seconds after a decision.
+    This time does not pass while the source is busy. A recording is read to its end as fast as possible; its messages
+    define the time.
 
-    With `sim_time` decisions have the time that comes on `/clock`. Raises `SourceError` if none comes in `patience_s`.
+    With `sim_time`, decisions have the time on `/clock`. Raises `SourceError` if none arrives within `patience_s`.
     """
 
     def __init__(
@@ -45,47 +45,47 @@ class SourceFeedback(Feedback):
         self._decoder = decoder
         self._patience_s = patience_s
         self._deadline: float | None = None
-        self._kept: Report | None = None
+        self._pending: Report | None = None
         self._now_ns: int | None = None
         self._sim = SimClock() if sim_time else None
         self._early = MessageInbox()
         self._last = math.inf
         self._idle_s = time.monotonic()
         source.assign(decoder.namespaces)
-        source.listen(with_clock(decoder.topics) if sim_time else decoder.topics)
+        source.listen(with_clock_topic(decoder.topics) if sim_time else decoder.topics)
         if not source.live:
-            self._kept = self._pull(None)
+            self._pending = self._next_report(None)
 
     @property
     def notes(self) -> list[str]:
-        """Sentences about places in another frame, and about topics of a recording that could not be used."""
+        """Notes on places in another frame, and on unused topics of a recording."""
         frames = [
-            f"places on {topic} are in the frame '{frame}', and were passed over (--frame says which is ours)"
+            f"places on {topic} are in the frame '{frame}', and were ignored (set the team's frame by --frame)"
             for topic, frame in self._decoder.other_frames.items()
         ]
-        others = [*filter(None, starmap(self._unused, self._source.others.items()))]
-        more = [f"and {len(others) - _NOTES_MAX:,} more topics were passed over"] * (len(others) > _NOTES_MAX)
+        others = [*filter(None, starmap(self._unused_note, self._source.others.items()))]
+        more = [f"and {len(others) - _NOTES_MAX:,} more topics were ignored"] * (len(others) > _NOTES_MAX)
         return [*frames, *others[:_NOTES_MAX], *more]
 
-    def _unused(self, topic: str, kind: str) -> str:
-        """Return why a topic was not used that looks like a report; empty for others."""
-        wanted = self._decoder.topics.get(topic)
-        if wanted:
-            return on_one_line(f"{topic} holds {kind}, not {wanted}, and was passed over")
+    def _unused_note(self, topic: str, kind: str) -> str:
+        """Return the reason why a topic that looks like a report was ignored; empty for other topics."""
+        expected = self._decoder.topics.get(topic)
+        if expected:
+            return on_one_line(f"{topic} has the type {kind}, not {expected}, and was ignored")
         if REPORTS.get(topic.rpartition("/")[2]) == short_kind(kind):
-            return on_one_line(f"{topic} is of no drone of this team, and was passed over")
+            return on_one_line(f"{topic} does not belong to a drone of this team, and was ignored")
         return ""
 
     def now_ns(self) -> int:
-        """Return the wall clock's time, or that of the recording, or that on `/clock`."""
+        """Return the present time of the wall clock, of the recording, or on `/clock`."""
         if self._sim is not None:
             return self._sim_ns(self._sim)
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
     def _sim_ns(self, clock: SimClock) -> int:
-        """Return the time of a simulation: the newest that has come. Waits for the first. Raises `SourceError`.
+        """Return the newest time of the simulation. Wait for the first one. Raises `SourceError`.
 
-        Other messages may come all the time meanwhile. They are kept, as an inbox does.
+        Other messages that arrive meanwhile are stored in an inbox.
         """
         deadline = time.monotonic() + self._patience_s
         while self._source.live and time.monotonic() < deadline:
@@ -93,17 +93,17 @@ class SourceFeedback(Feedback):
             if received is not None and not clock.update(received):
                 self._early.put(received, weight_of(received.fields))
             if clock.now_ns is None:
-                self._idle_now_and_then(received)
+                self._idle_if_due(received)
             elif received is None:
                 break
         if clock.now_ns is None:
             when = f"within {self._patience_s:g} s" if self._source.live else "before its first report"
-            problem = f"no time came on {CLOCK} of {self._source.place or 'the source'} {when}"
-            raise SourceError(on_one_line(f"{problem}; start the simulation, or leave out --use-sim-time"))
+            problem = f"no time received on {CLOCK} of {self._source.place or 'the source'} {when}"
+            raise SourceError(on_one_line(f"{problem}; start the simulation, or omit --use-sim-time"))
         return clock.now_ns
 
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the decision was published
-        """Take note of a decision: reports are awaited from now on."""
+        """Start the wait for reports."""
         limits = [left_s, self._patience_s if self._source.live else None]
         wait_s = min((limit for limit in limits if limit is not None), default=None)
         now = time.monotonic()
@@ -111,56 +111,54 @@ class SourceFeedback(Feedback):
         self._last = math.inf if left_s is None else now + left_s
 
     def next(self, until_s: float | None) -> Report | None:
-        """Return the next report; see `Feedback.next`."""
         soon = None
         if until_s is not None and self._source.live:
             soon = time.monotonic() + min(max(until_s - time.time(), 0), TOGETHER_S)
-        report, self._kept = self._kept or self._pull(soon), None
+        report, self._pending = self._pending or self._next_report(soon), None
         if report is not None and until_s is not None and report.at_s > until_s:
-            self._kept = report
+            self._pending = report
             return None
-        self._published(report)
+        self._publish(report)
         return report
 
     def poll(self) -> Report | None:
-        """Return a report of a live source that has come; see `Feedback.poll`."""
-        if self._kept is None and self._source.live:
-            self._kept = self._pull(time.monotonic() + _SLICE_S, wait=False)
-        report, self._kept = (self._kept, None) if self._source.live else (None, self._kept)
-        self._published(report)
+        if self._pending is None and self._source.live:
+            self._pending = self._next_report(time.monotonic() + _SLICE_S, wait=False)
+        report, self._pending = (self._pending, None) if self._source.live else (None, self._pending)
+        self._publish(report)
         return report
 
-    def _published(self, report: Report | None) -> None:
-        """Publish a report where it is to be."""
+    def _publish(self, report: Report | None) -> None:
+        """Publish a report, if any, by all publishers."""
         if report is not None:
             for publisher in self.publishers:
-                publisher.report(self._stamped(report))
+                publisher.report(self._with_sim_time(report))
 
-    def _stamped(self, report: Report) -> Report:
-        """Return `report` with the time of the simulation, if there is one."""
+    def _with_sim_time(self, report: Report) -> Report:
+        """Return `report` with the time of the simulation, if it is used."""
         now_ns = self._sim.now_ns if self._sim else None
         return report if now_ns is None else replace(report, at_s=now_ns / 1e9)
 
-    def _ends(self, soon: float | None) -> float | None:
-        """Return until when reports are awaited: no longer than `soon`."""
+    def _end_of_wait(self, soon: float | None) -> float | None:
+        """Return the end of the wait for reports, at most `soon`; None if it is unlimited."""
         if self._deadline is not None and self._source.is_busy:
             self._deadline = min(time.monotonic() + self._patience_s, self._last)
         return min((each for each in (self._deadline, soon) if each is not None), default=None)
 
-    def _idle_now_and_then(self, received: ReceivedMessage | None) -> None:
-        """Call `idle` where nothing was received, and now and then where messages come all the time."""
+    def _idle_if_due(self, received: ReceivedMessage | None) -> None:
+        """Call `idle` if no message was received, and at intervals if messages arrive continually."""
         now = time.monotonic()
         if received is None or now - self._idle_s >= _SLICE_S:
             self._idle_s = now
             self.idle()
 
-    def _pull(self, soon: float | None, *, wait: bool = True) -> Report | None:
-        """Return the next report of the source before `soon`, and before the wait is over; None if there is none.
+    def _next_report(self, soon: float | None, *, wait: bool = True) -> Report | None:
+        """Return the next report of the source before `soon` and the end of the wait; None if there is none.
 
-        Without `wait`, return None as soon as nothing has come, and `soon` at the latest.
+        Without `wait`, return None as soon as no message is available, at `soon` at the latest.
         """
         while True:
-            deadline = self._ends(soon) if wait else soon
+            deadline = self._end_of_wait(soon) if wait else soon
             left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left_s <= 0:
                 return None
@@ -168,7 +166,7 @@ class SourceFeedback(Feedback):
             if received is None and not wait:
                 return None
             if self._source.live and wait:
-                self._idle_now_and_then(received)
+                self._idle_if_due(received)
             if received is None:
                 if not self._source.live:
                     return None
@@ -182,13 +180,13 @@ class SourceFeedback(Feedback):
 
 
 class SimClock:
-    """The time of a simulation: the last one that came on `/clock`."""
+    """The time of a simulation, from its last message on `/clock`."""
 
     now_ns: int | None = None
-    """In nanoseconds; None before the first message."""
+    """The time in nanoseconds; None before the first message."""
 
     def update(self, received: ReceivedMessage) -> bool:
-        """Return whether `received` came on `/clock`. What it says is the time now, unless it is no time."""
+        """Set the time from a message on `/clock`, unless it is invalid; return False for other topics."""
         if received.topic != CLOCK:
             return False
         found = _nanoseconds(received.fields.get("clock"))
@@ -197,7 +195,7 @@ class SimClock:
 
 
 def _nanoseconds(value: object) -> int | None:
-    """Return a time in nanoseconds; None for what is none. A rosbridge sends seconds and nanoseconds apart."""
+    """Return a time in nanoseconds; None if it is invalid. A rosbridge sends seconds and nanoseconds separately."""
     if isinstance(value, int) and not isinstance(value, bool):
         return value if value // _BILLION in _SECONDS else None
     match value:
@@ -209,6 +207,6 @@ def _nanoseconds(value: object) -> int | None:
             return None
 
 
-def with_clock(topics: Mapping[str, str]) -> dict[str, str]:
-    """Return `topics` and that of the clock."""
+def with_clock_topic(topics: Mapping[str, str]) -> dict[str, str]:
+    """Return `topics` with the topic of the clock."""
     return {**topics, CLOCK: CLOCK_KIND}

@@ -1,4 +1,4 @@
-"""Topics of the whole team besides waypoints: frames for tf2 (`--tf`), and how the run stands (`--diagnostics`)."""
+"""Topics of the whole team besides waypoints: frames for tf2 (`--tf`), and the run's state (`--diagnostics`)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robochoc.ros.names import TEAM_TOPICS
 from robochoc.ros.waypoint_types import UPRIGHT, point
 
 GOAL, BODY = "goal", "base_link"
-"""The last part of the frame where a drone is to be, and of the frame of the drone itself."""
+"""The last part of the names of two frames: the goal of a drone, and the drone itself."""
 _LEVELS: Mapping[Verdict, int] = MappingProxyType(
     {Verdict.SOLUTION: 0, Verdict.OPTIMAL: 0, Verdict.UNKNOWN: 1, Verdict.NO_SOLUTION: 2}
 )
@@ -24,28 +24,28 @@ _LEVELS: Mapping[Verdict, int] = MappingProxyType(
 
 @dataclass(frozen=True)
 class PublishOptions:
-    """What is published besides the waypoints, and as what type these are."""
+    """The type of waypoints, and the messages to publish besides them."""
 
     kind: str = ""
-    """The ROS type of all waypoints; empty: those that the robots' files name."""
+    """The ROS type of all waypoints; empty: the types in the robots' files."""
     frames: bool = False
-    """True: goals are frames on `/tf_static`, and drones that fly are frames on `/tf`."""
+    """True: publish goals as frames on `/tf_static`, and flying drones as frames on `/tf`."""
     diagnostics: bool = False
-    """True: each decision is a status on `/diagnostics`."""
+    """True: publish each decision as a status on `/diagnostics`."""
 
     @property
     def topics(self) -> dict[str, str]:
         """The topics of the team, and their types."""
-        wanted = {"/tf": self.frames, "/tf_static": self.frames, "/diagnostics": self.diagnostics}
-        return {topic: kind for topic, kind in TEAM_TOPICS.items() if wanted[topic]}
+        used = {"/tf": self.frames, "/tf_static": self.frames, "/diagnostics": self.diagnostics}
+        return {topic: kind for topic, kind in TEAM_TOPICS.items() if used[topic]}
 
 
 WAYPOINTS_ONLY = PublishOptions()
-"""Nothing else, and as the files have it."""
+"""Waypoints with the types in the robots' files, and no other messages."""
 
 
 def transform(header: Fields, child: str, at: Point, rotation: Fields = UPRIGHT) -> Fields:
-    """Return the fields of a `geometry_msgs/TransformStamped`. A frame's name begins with no slash in tf2."""
+    """Return the fields of a `geometry_msgs/TransformStamped`. Names of frames have no leading slash in tf2."""
     return {
         "header": header,
         "child_frame_id": child.removeprefix("/"),
@@ -59,7 +59,7 @@ def transforms(found: Sequence[Fields]) -> Fields:
 
 
 def status(team: str, leg: Leg, epoch: int, header: Fields) -> Fields:
-    """Return the fields of a `diagnostic_msgs/DiagnosticArray`: the decision of the epoch with that number, from 1."""
+    """Return the fields of a `diagnostic_msgs/DiagnosticArray`: the decision of an epoch, numbered from 1."""
     landings = sum(goal.lands for goal in leg.goals.values())
     values = {
         "verdict": leg.verdict.value,

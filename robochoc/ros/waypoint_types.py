@@ -1,8 +1,8 @@
-"""Mappings from waypoints to messages of the ROS type that a topic has.
+"""Mappings from waypoints to messages of a topic's ROS type.
 
-Some types are built in. Packages offer others under the entry point group `robochoc.waypoints`; the entry's name is the
-ROS type, such as `mavros_msgs/PositionTarget`. It names a function that makes a message's fields of a `Waypoint`, or a
-`WaypointMapping`, which also brings the definition of a type that no distribution of ROS has.
+Some types are built in. Packages add others in the entry point group `robochoc.waypoints`. An entry's name is the ROS
+type, such as `mavros_msgs/PositionTarget`; its value is a function from a `Waypoint` to a message's fields, or a
+`WaypointMapping`, which can also define a type that no distribution of ROS has.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ GROUP = "robochoc.waypoints"
 
 _SPELLING = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
 UPRIGHT: Fields = {"w": 1.0}
-"""The orientation of what stands upright and looks along x."""
+"""The orientation of an upright robot that faces along x."""
 
 
 class NoMappingError(RobochocError):
-    """A topic has a type that no waypoint can become. The message names the types that exist."""
+    """Waypoints cannot be converted to the type of a topic. The message lists the known types."""
 
 
 @dataclass(frozen=True)
 class WaypointMapping:
-    """Makes of a waypoint the fields of a message of one ROS type.
+    """Converts waypoints to the fields of messages of one ROS type.
 
-    `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. Types of its fields
-    that none has follow it, each after a line of 80 `=` and a line `MSG: package/Type`, as in a recording.
+    `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. The definitions of
+    such types of its fields follow, each after a line of 80 `=` and a line `MSG: package/Type`, as in a recording.
     """
 
     fields: Callable[[Waypoint], Fields]
@@ -45,13 +45,13 @@ class WaypointMapping:
 
 
 def short_kind(kind: str) -> str:
-    """Return `geometry_msgs/PoseStamped`, also for `geometry_msgs/msg/PoseStamped`. Other kinds stay as they are."""
+    """Return `geometry_msgs/PoseStamped` for either spelling of it. Other texts are returned unchanged."""
     found = _SPELLING.fullmatch(kind.strip())
     return f"{found[1]}/{found[2]}" if found else kind
 
 
 def kinds() -> tuple[str, ...]:
-    """Return all types that a waypoint can become, built in and installed, sorted."""
+    """Return all built-in and installed types of waypoints, sorted."""
     return tuple(sorted({*_BUILT_IN, *map(short_kind, entry_point_names(GROUP))}))
 
 
@@ -60,7 +60,7 @@ def mapping_for(kind: str) -> WaypointMapping | None:
     """Return the mapping to `kind`, in either spelling; None if there is none.
 
     Raises:
-        NoMappingError: The mapping that a package offers is broken.
+        NoMappingError: The mapping of an installed package is broken.
     """
     short = short_kind(kind)
     if short in _BUILT_IN:
@@ -75,7 +75,7 @@ def mapping_for(kind: str) -> WaypointMapping | None:
         return None
     found = load_entry_point(namesakes[0], namesakes, _fault)
     if found.broken:
-        raise NoMappingError(on_one_line(f"{namesakes[0].value}, installed for waypoints as {kind}, {found.broken}"))
+        raise NoMappingError(on_one_line(f"{namesakes[0].value}, the mapping of waypoints to {kind}, {found.broken}"))
     if isinstance(found.what, WaypointMapping):
         return found.what
     return WaypointMapping(cast("Callable[[Waypoint], Fields]", found.what))
@@ -85,23 +85,23 @@ def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
     """Return the mapping for `topic` of `robot`. Raises `NoMappingError`."""
     found = mapping_for(kind)
     if found is None:
-        who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
-        problem = f"{who} has the type {kind!r}, and there is no mapping from waypoints to it"
-        known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP}){_meant(kind)}"
+        subject = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
+        problem = f"{subject} has the type {kind!r}, to which waypoints cannot be converted"
+        known = f"known are {', '.join(kinds())}; packages may add others ({GROUP}){_suggestion(kind)}"
         raise NoMappingError(on_one_line(f"{problem}: {known}"))
     return found
 
 
-def _meant(kind: str) -> str:
-    """Return the type that may have been meant, as the end of a message; empty if none is like it."""
-    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+def _suggestion(kind: str) -> str:
+    """Return the known type with the most similar name, as the end of a message; empty if there is none."""
+    import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     near = difflib.get_close_matches(kind, kinds(), 1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def definition_of(kind: str) -> str:
-    """Return the definition of `kind` that an installed package brings; empty if there is none."""
+    """Return the definition of `kind` in an installed package; empty if there is none."""
     try:
         found = mapping_for(kind)
     except NoMappingError:
@@ -135,7 +135,7 @@ def _with_header(part: str, make: Callable[[Waypoint], object]) -> Callable[[Way
     return lambda waypoint: {"header": header(waypoint), part: make(waypoint)}
 
 
-def _place(waypoint: Waypoint) -> Fields:
+def _point(waypoint: Waypoint) -> Fields:
     return point(waypoint.at)
 
 
@@ -149,7 +149,7 @@ def _transforms(waypoint: Waypoint) -> Fields:
 
 
 def _path(waypoint: Waypoint) -> Fields:
-    """The straight way from the goal before, if there was one."""
+    """Return the straight path from the previous goal, if there is one."""
     places = [waypoint.at] if waypoint.before is None else [waypoint.before, waypoint.at]
     stops = [{"header": header(waypoint), "pose": {"position": point(at), "orientation": UPRIGHT}} for at in places]
     return {"header": header(waypoint), "poses": stops}
@@ -173,10 +173,9 @@ def _trajectory(waypoint: Waypoint) -> Fields:
 
 
 def _text(waypoint: Waypoint) -> Fields:
-    """JSON on one line, for programs without messages of ROS."""
+    """Return JSON on one line, for programs without ROS messages."""
     place = dict(zip("xyz", waypoint.at, strict=True))
-    told = {"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands}
-    return {"data": json.dumps(told)}
+    return {"data": json.dumps({"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands})}
 
 
 _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
@@ -184,13 +183,13 @@ _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
         "geometry_msgs/PoseStamped": _with_header("pose", _pose),
         "geometry_msgs/Pose": _pose,
         "geometry_msgs/PoseWithCovarianceStamped": _with_header("pose", lambda waypoint: {"pose": _pose(waypoint)}),
-        "geometry_msgs/PointStamped": _with_header("point", _place),
-        "geometry_msgs/Point": _place,
-        "geometry_msgs/Vector3Stamped": _with_header("vector", _place),
-        "geometry_msgs/Vector3": _place,
+        "geometry_msgs/PointStamped": _with_header("point", _point),
+        "geometry_msgs/Point": _point,
+        "geometry_msgs/Vector3Stamped": _with_header("vector", _point),
+        "geometry_msgs/Vector3": _point,
         "geometry_msgs/TransformStamped": _transform_stamped,
         "geometry_msgs/Transform": _transform,
-        "geometry_msgs/Point32": _place,
+        "geometry_msgs/Point32": _point,
         "geometry_msgs/Pose2D": lambda waypoint: {"x": waypoint.at[0], "y": waypoint.at[1]},
         "geometry_msgs/PoseArray": _with_header("poses", lambda waypoint: [_pose(waypoint)]),
         "nav_msgs/Odometry": _odometry,
@@ -206,4 +205,4 @@ _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
 _DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {"tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
 )
-"""Types that rosbags does not know for ROS 1."""
+"""Definitions of types that rosbags lacks in ROS 1."""

@@ -171,8 +171,8 @@ def test_reports_that_nobody_can_use_are_told(tmp_path: Path) -> None:
     result = solved(HANGAR, "--situation", f"mcap:{place}")
     assert result.exit_code == 0
     assert result.stderr.splitlines() == [
-        "/nose/battery holds std_msgs/String, not sensor_msgs/BatteryState, and was passed over",
-        "/nobody/out_of_order is of no drone of this team, and was passed over",
+        "/nose/battery has the type std_msgs/String, not sensor_msgs/BatteryState, and was ignored",
+        "/nobody/out_of_order does not belong to a drone of this team, and was ignored",
     ]
 
 

@@ -98,11 +98,11 @@ def test_a_trigger_tells_the_assignment() -> None:
 @looped(
     ("fields", "told"),
     lambda: [
-        ({"team": "yard\x1b"}, r"no team has the name 'yard\\x1b'; known are hangar, rescue"),
-        ({}, r"no team has the name ''; known are hangar, rescue"),
-        ({"timeout": -1.0}, "timeout must be seconds, or 0 for the longest, is -1.0"),
-        ({"timeout": float("nan")}, "timeout must be seconds"),
-        ({"timeout": float("inf")}, "timeout must be seconds"),
+        ({"team": "yard\x1b"}, r"unknown team 'yard\\x1b'; known are hangar, rescue"),
+        ({}, r"unknown team ''; known are hangar, rescue"),
+        ({"timeout": -1.0}, "timeout is -1.0: it must be seconds, or 0 for the longest time"),
+        ({"timeout": float("nan")}, "it must be seconds"),
+        ({"timeout": float("inf")}, "it must be seconds"),
         ({"changes": "{"}, "changes: "),
         ({"changes": "[" * 20_000}, "changes"),
         ({"changes": '"x"'}, "changes: "),
@@ -120,11 +120,11 @@ def test_a_trigger_tells_the_assignment() -> None:
         ),
         (
             {"changes": " " * CHANGES_CHARACTERS_MAX + "[]"},
-            "changes have 65,538 characters, and at most 65,536 are read",
+            "changes have 65,538 characters: at most 65,536 are accepted",
         ),
         (
             {"changes": json.dumps([{"remove_agent": {"name": "a"}}] * 1001)},
-            "there are 1,001 changes, and at most 1,000",
+            "there are 1,001 changes: at most 1,000",
         ),
     ],
 )
@@ -316,7 +316,7 @@ def test_the_command_answers_whoever_asks() -> None:
     ):
         first = client.ask(SERVICE, team="hangar")
         assert dict(zip(first["variables"], first["values"], strict=True)) == expected
-        assert client.ask(SERVICE, team="yard")["message"] == "no team has the name 'yard'; known are hangar"
+        assert client.ask(SERVICE, team="yard")["message"] == "unknown team 'yard'; known are hangar"
         assert json.loads(client.ask("/robochoc/hangar/decide")["message"])["assignment"] == expected
         _, told = server.communicate(timeout=HANG_S)
         assert server.returncode == 0

@@ -299,7 +299,7 @@ def test_what_listens_is_no_router(answer: bytes, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(rmw_zenoh_session, "OPEN_S", 0.2)
     with (
         fake_server(answer, hangs_up=False) as port,
-        pytest.raises(SinkError, match="does not answer as one; start one"),
+        pytest.raises(SinkError, match="does not answer as a zenoh router; start one"),
     ):
         RmwZenohSink(f"127.0.0.1:{port}")
 

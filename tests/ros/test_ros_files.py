@@ -193,9 +193,9 @@ def test_the_old_file_stands_until_the_new_one_is_whole(text: str) -> None:
 def test_files_that_cannot_be_written(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     name, _, place = text.partition(":")
     for where, told in (
-        (f"no/where/{place}", "make it first"),
+        (f"no/where/{place}", "create it first"),
         (".", "Is a directory"),
-        ("", "needs the name of its file"),
+        ("", "requires a file name"),
         ("/dev/null", "is not a regular file"),
     ):
         with pytest.raises(SinkError, match=told):
@@ -271,7 +271,7 @@ def test_what_cannot_be_published_is_told_with_its_topic(text: str) -> None:
     with open_sink(text) as sink:
         with pytest.raises(SinkError, match=r": /a: .*PoseStamped: pose\.x is not a field"):
             sink.publish("/a", POSE, {"pose": {"x": 1.0}}, NOW)
-        with pytest.raises(SinkError, match="/a: a recording has no time -1"):
+        with pytest.raises(SinkError, match="/a: the time -1 ns cannot be recorded"):
             sink.publish("/a", POSE, {}, -1)
         with pytest.raises(SinkError, match=r"/a: .*no type 'my_msgs/Unheard'"):
             sink.advertise({"/a": "my_msgs/Unheard"})

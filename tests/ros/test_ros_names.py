@@ -101,7 +101,7 @@ def test_a_clash_names_topics_robots_and_the_way_out() -> None:
 
 def test_drones_do_not_share_a_topic() -> None:
     with pytest.raises(
-        NameClashError, match=r"A \(North\) and B \(South\) both publish on '/w': give each a topic of its own"
+        NameClashError, match=r"A \(North\) and B \(South\) both publish on '/w': give each its own topic"
     ):
         TopicNames([drone("A", "/w", "North"), drone("B", "/w", "South")])
 

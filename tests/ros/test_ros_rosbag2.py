@@ -74,12 +74,12 @@ def test_messages_that_are_compressed_one_by_one() -> None:
         ("ALTER TABLE topics RENAME COLUMN name TO title", "no table 'topics' with id, name"),
         ("CREATE VIEW more AS SELECT * FROM messages", "views, triggers or virtual tables"),
         ("CREATE VIRTUAL TABLE more USING fts5(text)", "views, triggers or virtual tables"),
-        ("UPDATE topics SET serialization_format = 'xml'", "its messages are written as 'xml'"),
-        ("UPDATE messages SET timestamp = -1", "has no time"),
+        ("UPDATE topics SET serialization_format = 'xml'", "its messages have the encoding 'xml'"),
+        ("UPDATE messages SET timestamp = -1", "has no valid time"),
         ("UPDATE messages SET data = 7", "no topic or no content"),
         ("UPDATE messages SET data = x'0001'", "cannot be read"),
-        ("UPDATE messages SET data = x'28b52ffd00ff'", "cannot be unpacked"),
-        ("UPDATE message_definitions SET encoded_message_definition = 'int8 lies'", "is not that of ROS 2"),
+        ("UPDATE messages SET data = x'28b52ffd00ff'", "cannot be decompressed"),
+        ("UPDATE message_definitions SET encoded_message_definition = 'int8 lies'", "differs from that of ROS 2"),
     ],
 )
 def test_what_is_no_bag_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str, told: str) -> None:
@@ -96,7 +96,7 @@ def test_a_large_message_is_not_unpacked() -> None:
     with closing(sqlite3.connect(FILE)) as rows:
         rows.execute("UPDATE messages SET data = ?", (bomb,))
         rows.commit()
-    with pytest.raises(SourceError, match="unpacks to more than 67108864 bytes"):
+    with pytest.raises(SourceError, match="decompresses to more than 67,108,864 bytes"):
         read(READ)
 
 
@@ -118,7 +118,7 @@ def test_damage_is_found_before_anything_is_acted_upon() -> None:
 def test_a_recording_that_was_not_finished() -> None:
     written()
     Path(f"{FILE}-wal").write_bytes(b"more")
-    with pytest.raises(SourceError, match=r"was not finished, as other\.db3-wal stands beside it"):
+    with pytest.raises(SourceError, match=r"was not finished: its folder has a file other\.db3-wal"):
         read(READ)
 
 
@@ -128,5 +128,5 @@ def test_folders_without_a_bag_and_with_several() -> None:
         read("rosbag2:empty")
     written()
     Path("other/more.db3").write_bytes(FILE.read_bytes())
-    with pytest.raises(SourceError, match=r"holds several recordings: name one, such as rosbag2:other/more.db3"):
+    with pytest.raises(SourceError, match=r"has several recordings: name one, such as rosbag2:other/more.db3"):
         read("rosbag2:other")

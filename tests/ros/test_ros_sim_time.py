@@ -80,7 +80,7 @@ def test_a_report_that_came_before_the_first_decision_counts(waited: WaitedClock
 
 
 def test_without_a_clock_the_run_ends_also_where_robots_report_all_the_time(waited: WaitedClock) -> None:
-    with pytest.raises(SourceError, match="no time came on /clock of tape within 3 s"):
+    with pytest.raises(SourceError, match="no time received on /clock of tape within 3 s"):
         run(Endless(clock=waited), 3.0)
 
 
@@ -95,7 +95,7 @@ def test_reports_that_come_faster_than_they_are_read_keep_no_decision_from_its_t
 
 
 def test_without_a_clock_the_run_ends(waited: WaitedClock) -> None:
-    told = r"no time came on /clock of tape within 3 s; start the simulation, or leave out --use-sim-time"
+    told = r"no time received on /clock of tape within 3 s; start the simulation, or omit --use-sim-time"
     with pytest.raises(SourceError, match=told):
         run(Tape(blocked(), clock=waited), patience_s=3)
     assert waited.waited_s == pytest.approx(3, abs=0.5)
@@ -151,7 +151,7 @@ def test_a_recording_without_a_clock(tmp_path: Path) -> None:
     code, told = solved("--situation", place, "--use-sim-time")
     assert code != 0
     assert told.count("\n") == 1
-    assert "before its first report; start the simulation, or leave out --use-sim-time" in told
+    assert "before its first report; start the simulation, or omit --use-sim-time" in told
 
 
 @pytest.mark.parametrize("words", [(), ("--situation", "flight")])
@@ -171,7 +171,7 @@ def test_what_else_is_published_needs_a_sink(word: tuple[str, ...]) -> None:
 def test_a_type_without_a_mapping_is_refused(tmp_path: Path) -> None:
     code, told = solved("--ros", f"mcap:{tmp_path}/out.mcap", "--ros-type", "sensor_msgs/Image")
     assert code != 0
-    assert "has the type 'sensor_msgs/Image', and there is no mapping from waypoints to it" in told
+    assert "has the type 'sensor_msgs/Image', to which waypoints cannot be converted" in told
 
 
 def test_a_flight_has_frames(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_the_reference_reads_what_is_written(fields: dict[str, Any]) -> None:
         (POSE, {"header": {"stamp": 1.0}}, "header.stamp must be a whole number"),
         (POSE, {"header": {"stamp": 1 << 70}}, "header.stamp must be a time in nanoseconds"),
         (POSE, {"header": {"frame_id": b"map"}}, "header.frame_id must be text"),
-        (POSE, {"header": {"frame_id": "\udc80"}}, "header.frame_id must be text that UTF-8 can hold"),
+        (POSE, {"header": {"frame_id": "\udc80"}}, "header.frame_id must be text that UTF-8 can encode"),
         (POSE, [], "it must be fields"),
         (BATTERY, {"percentage": 1e300}, "percentage must be a number of single precision"),
         (BATTERY, {"present": 1}, "present must be true or false, is 1"),
@@ -124,7 +124,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 @looped("kind", ["my_msgs/Nothing", "PoseStamped", "", "../../etc"])
 def test_types_that_nobody_defines(kind: str) -> None:
-    with pytest.raises(UnknownTypeError, match="its mapping can bring the definition"):
+    with pytest.raises(UnknownTypeError, match="add its definition to its mapping"):
         types_of(2).encode(kind, {})
 
 
@@ -204,5 +204,5 @@ def test_the_fields_of_a_type_and_their_types() -> None:
     assert found["cell_voltage"] == FieldType("float32", shape="sequence")
     assert found["location"] == FieldType("string")
     assert dict(types.layout("shape_msgs/SolidPrimitive"))["dimensions"] == FieldType("float64", 0, "sequence", 3)
-    with pytest.raises(UnknownTypeError, match="its mapping can bring the definition"):
+    with pytest.raises(UnknownTypeError, match="add its definition to its mapping"):
         types.layout("my_msgs/Nothing")

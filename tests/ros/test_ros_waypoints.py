@@ -311,7 +311,7 @@ def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "told"), [("LOOSE", "needs types that are not defined"), ("WRONG", "brings is wrong")]
+    ("name", "told"), [("LOOSE", "requires undefined types"), ("WRONG", "in its package is invalid")]
 )
 def test_a_definition_that_cannot_be_used_is_told(monkeypatch: pytest.MonkeyPatch, name: str, told: str) -> None:
     installed(monkeypatch, **{f"my_msgs__{name.title()}": f"tests.ros.test_ros_waypoints:{name}"})

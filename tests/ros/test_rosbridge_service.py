@@ -119,11 +119,11 @@ def test_too_many_at_once_are_refused_and_the_end_is_told(server: Server, offere
     [
         ([1, 2], f"the request cannot be read as one of {DECIDE}: not an object"),
         ({"team": [[[[[[[[[[[[1]]]]]]]]]]]]}, f"the request cannot be read as one of {DECIDE}: nested"),
-        ({"team": 5}, "team must be text, is 5"),
-        ({"timeout": None}, "timeout must be seconds, or 0 for the longest, is nan"),
-        ({"timeout": True}, "timeout must be seconds, or 0 for the longest, is True"),
-        ({"team": "\ud800"}, "team must be text that UTF-8 can hold, and character 1 is half of a pair (U+D800)"),
-        ({"changes": {"remove_agent": "Nose"}}, "changes must be text, is {'remove_agent': 'Nose'}"),
+        ({"team": 5}, "team is 5: it must be text"),
+        ({"timeout": None}, "timeout is nan: it must be seconds, or 0 for the longest time"),
+        ({"timeout": True}, "timeout is True: it must be seconds, or 0 for the longest time"),
+        ({"team": "\ud800"}, "team must be text that UTF-8 can encode: character 1 is half of a pair (U+D800)"),
+        ({"changes": {"remove_agent": "Nose"}}, "changes is {'remove_agent': 'Nose'}: it must be text"),
     ],
 )
 def test_what_is_no_request_is_answered(server: Server, offered: RosbridgeServices, args: object, told: str) -> None:

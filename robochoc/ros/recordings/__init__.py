@@ -1,1 +1,1 @@
-"""Recordings of ROS messages, written and read: MCAP files, and bags of ROS 1."""
+"""Recordings of ROS messages: MCAP files and ROS 1 bags are written and read, ROS 2 bags in SQLite are read."""

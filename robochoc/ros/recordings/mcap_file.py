@@ -1,7 +1,7 @@
-"""MCAP files: the container that ROS 2 records into, and that Foxglove opens (mcap.dev/spec).
+"""MCAP files: the container format of ROS 2's recorder, which Foxglove opens (mcap.dev/spec).
 
-Files are written with the profile `ros2`: messages in CDR, their definitions with them, in chunks compressed by zstd.
-Files with the profile `ros1` are read, too.
+Files are written with the profile `ros2`: messages in CDR with their definitions, in chunks compressed by zstd. Files
+with the profile `ros1` can also be read.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from robochoc.ros.recordings.recording import (
 from robochoc.ros.waypoint_types import short_kind
 
 NAMES = "robochoc:names"
-"""The metadata record of the names that topics have in the team's files."""
+"""The metadata record with the topics' names in the team's files."""
 
 _CHUNK_BYTES = 1 << 20
 _RECORD = struct.Struct("<BQ")
@@ -47,7 +47,7 @@ _SIZE = struct.Struct("<Q")
 _FOOTER_SIZE = 20
 _CHANNELS_AT_MOST = 0xFFFF
 _DEFINITIONS_MAX = 64
-"""Recordings define a type in one way; each more costs time."""
+"""The most definitions of the used types. A normal recording defines each type once."""
 _ENCODINGS: dict[tuple[str, str], Version] = {("ros2msg", "cdr"): 2, ("ros1msg", "ros1"): 1}
 """The encodings of definitions and messages."""
 
@@ -56,9 +56,9 @@ T = TypeVar("T")
 
 
 class McapSink(RecordingSink):
-    """Writes an MCAP file. The same messages make the same bytes."""
+    """Writes an MCAP file. The same messages result in the same bytes."""
 
-    ending = "mcap:run.mcap"
+    example = "mcap:run.mcap"
     version = 2
 
     def __init__(self, place: str) -> None:
@@ -71,7 +71,7 @@ class McapSink(RecordingSink):
             self._writer.start("ros2")
 
     def explain(self, original: Mapping[str, str]) -> None:
-        """Keep the original names in the file, and each name at its topic."""
+        """Store the original names in the file's metadata and in that of each topic."""
         super().explain(original)
         with self.as_sink_errors():
             self._writer.add_metadata(NAMES, dict(original))
@@ -102,7 +102,7 @@ class McapSink(RecordingSink):
 
 
 class _WantedSchema(NamedTuple):
-    """A schema whose type is wanted: its encoding, and why its messages cannot be read."""
+    """A schema of a used type, its encoding, and the reason why its messages cannot be read, if they cannot."""
 
     kind: str
     encoding: str
@@ -110,12 +110,12 @@ class _WantedSchema(NamedTuple):
 
 
 def _decompress_zstd(packed: bytes, most: int) -> bytes:
-    """Decompress by a stream: the size in a frame is not trusted."""
+    """Decompress as a stream: the size declared in a frame is untrusted."""
     return zstandard.ZstdDecompressor(max_window_size=BLOCK_BYTES_MAX).stream_reader(packed).read(most)
 
 
 class McapSource(ChunkedRecordingSource):
-    """Reads an MCAP file of ROS 2 or of ROS 1, or the one in a folder that ROS 2 has recorded."""
+    """Reads an MCAP file of ROS 2 or ROS 1, or the one in a folder recorded by ROS 2."""
 
     packings = MappingProxyType({"": uncompressed, "lz4": decompress_lz4, "zstd": _decompress_zstd})
 
@@ -127,32 +127,32 @@ class McapSource(ChunkedRecordingSource):
         self._channels: dict[int, RecordedChannel | None] = {}
         self._faults: dict[tuple[str, str, bytes], str] = {}
         source = self._input
-        if source.size < len(MCAP0_MAGIC) or source.take(len(MCAP0_MAGIC), "its beginning") != MCAP0_MAGIC:
+        if source.size < len(MCAP0_MAGIC) or source.read(len(MCAP0_MAGIC), "its beginning") != MCAP0_MAGIC:
             raise RecordingDamagedError("is not an MCAP file")
         opcode = 0
         while opcode != Opcode.DATA_END:
             begin, before = source.at, source.sum
-            opcode, size = _RECORD.unpack(source.take(_RECORD.size, "a record"))
+            opcode, size = _RECORD.unpack(source.read(_RECORD.size, "a record"))
             match opcode:
                 case Opcode.CHUNK:
-                    yield from self._chunk(begin, source.take(size, "a chunk"))
+                    yield from self._chunk(begin, source.read(size, "a chunk"))
                 case Opcode.SCHEMA | Opcode.CHANNEL | Opcode.MESSAGE:
-                    body = _RECORD.pack(opcode, size) + source.take(size, "a record")
+                    body = _RECORD.pack(opcode, size) + source.read(size, "a record")
                     yield from self._block(body, begin, len(body), "")
                 case Opcode.DATA_END:
-                    (expected,) = _read("<I", source.take(size, "a record"))
+                    (expected,) = _read("<I", source.read(size, "a record"))
                     if expected not in {0, before}:
-                        raise RecordingDamagedError("it is damaged: its checksum is another one")
+                        raise RecordingDamagedError("it is damaged: wrong checksum")
                 case _:
                     source.skip(size, "a record")
         self._check_end()
 
     def _check_end(self) -> None:
-        """Check that the file ends with a footer, and with the same bytes as it begins with."""
+        """Check that the file ends with a footer and the magic bytes."""
         size = _RECORD.size + _FOOTER_SIZE + len(MCAP0_MAGIC)
         tail = self._input.part(max(0, self._input.size - size), size)
         if not tail.startswith(_RECORD.pack(Opcode.FOOTER, _FOOTER_SIZE)) or not tail.endswith(MCAP0_MAGIC):
-            raise RecordingDamagedError("it has no footer: it was not written to its end")
+            raise RecordingDamagedError("it has no footer: the recording is incomplete")
 
     def _chunk(self, begin: int, content: bytes) -> Iterator[MessageBlock]:
         _, _, size, expected, length = _read(_CHUNK.format, content)
@@ -160,10 +160,10 @@ class McapSource(ChunkedRecordingSource):
         packing = content[_CHUNK.size : _CHUNK.size + length].decode("ascii", "replace")
         (packed,) = _read(_SIZE.format, content[_CHUNK.size + length :])
         if place + packed != len(content):
-            raise RecordingDamagedError(f"the chunk at byte {begin} has another size than it says")
+            raise RecordingDamagedError(f"the chunk at byte {begin} does not have the declared size")
         body = self._body(content[place:], packing, size)
         if expected and zlib.crc32(body) != expected:
-            raise RecordingDamagedError(f"the chunk at byte {begin} is damaged: its checksum is another one")
+            raise RecordingDamagedError(f"the chunk at byte {begin} is damaged: wrong checksum")
         yield from self._block(body, begin + _RECORD.size + place, packed, packing)
 
     def _block(self, body: bytes, at: int, size: int, packing: str) -> Iterator[MessageBlock]:
@@ -177,7 +177,7 @@ class McapSource(ChunkedRecordingSource):
             opcode, size = _read(_RECORD.format, body[at : at + _RECORD.size])
             at += _RECORD.size
             if size > len(body) - at:
-                raise RecordingDamagedError("a record does not end where its chunk does")
+                raise RecordingDamagedError("a record is longer than its chunk")
             if opcode == Opcode.MESSAGE:
                 number, _, time, _ = _read(_MESSAGE.format, body[at : at + min(size, _MESSAGE.size)])
                 channel = self._channels.get(number)
@@ -186,15 +186,13 @@ class McapSource(ChunkedRecordingSource):
                         raise RecordingDamagedError(f"the message on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, time, body[at + _MESSAGE.size : at + size]
                 elif number not in self._channels:
-                    raise RecordingDamagedError(
-                        f"a message belongs to channel {number}, which is not described before it"
-                    )
+                    raise RecordingDamagedError(f"a message has the channel {number}, which is not defined before it")
             elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
                 self._describe(opcode, body[at : at + size])
             at += size
 
     def _describe(self, opcode: int, content: bytes) -> None:
-        """Store the few names that are needed of a schema or a channel."""
+        """Store the used parts of a schema or a channel."""
         stream = ReadDataStream(BytesIO(content))
         try:
             if opcode == Opcode.SCHEMA:
@@ -220,33 +218,33 @@ class McapSource(ChunkedRecordingSource):
 
     def _channel_of(self, channel: ChannelRecord) -> RecordedChannel | None:
         schema = self._schemas.get(channel.schema_id)
-        if schema is None or not self._wanted(channel.topic, schema.kind):
+        if schema is None or not self._is_used(channel.topic, schema.kind):
             return None
         version = _ENCODINGS.get((schema.encoding, channel.message_encoding))
         if version is None and not schema.fault:
-            fault = f"its messages are written as {channel.message_encoding[:40]!r}"
+            fault = f"its messages have the encoding {channel.message_encoding[:40]!r}"
             return RecordedChannel(channel.topic, 2, fault)
         return RecordedChannel(channel.topic, version or 2, schema.fault)
 
 
 def _fault(kind: str, encoding: str, text: bytes) -> str:
-    """Return why messages of a definition cannot be read; empty if they can."""
+    """Return the reason why messages of a definition cannot be read; empty if they can."""
     versions = [version for (known, _), version in _ENCODINGS.items() if known == encoding]
     if not versions:
-        return f"its definition is written as {encoding[:40]!r}, and only ros2msg and ros1msg are known"
+        return f"its definition has the encoding {encoding[:40]!r}: only ros2msg and ros1msg can be read"
     if not types_of(versions[0]).has_same_fields(kind, text.decode("utf-8", "replace")):
-        return f"its definition of {kind} is not that of ROS {versions[0]}"
+        return f"its definition of {kind} differs from that of ROS {versions[0]}"
     return ""
 
 
 def _define(table: dict[int, T], number: int, described: T) -> None:
     if table.setdefault(number, described) != described:
-        raise RecordingDamagedError(f"a schema or channel {number} is described twice, and not the same way")
+        raise RecordingDamagedError(f"schema or channel {number} has two different definitions")
 
 
 def _read(layout: str, content: bytes) -> tuple[int, ...]:
-    """Return the numbers that `content` begins with."""
+    """Return the numbers at the beginning of `content`."""
     try:
         return struct.unpack_from(layout, content)
     except struct.error:
-        raise RecordingDamagedError("a record is shorter than its kind allows") from None
+        raise RecordingDamagedError("a record is too short for its kind") from None

@@ -1,7 +1,7 @@
-"""Recordings as sources: what MCAP files, bags of ROS 1 and bags of ROS 2 have in common when they are read.
+"""The base of recordings as sources (MCAP files, ROS 1 bags, ROS 2 bags) and as sinks.
 
-A recording may come from anywhere. It is read twice: first completely, so that nothing is acted upon that comes from a
-damaged file; then block by block, in the order of time. Sizes are checked before anything is allocated or decompressed.
+A recording is untrusted. It is read twice: first completely, so that no message of a damaged file has an effect; then
+block by block, in order of time. Sizes are checked before memory is allocated or data decompressed.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.files import PendingFile
 
 _END_OF_TIME = (1 << 32) * 10**9
-"""The first time, in nanoseconds since the epoch, that ROS 1 cannot hold."""
+"""The first time that ROS 1 cannot represent, in nanoseconds since the epoch."""
 BLOCK_BYTES_MAX = 1 << 26
-"""Bytes of a record, and of a decompressed chunk. Recorders make chunks of some megabytes."""
+"""The largest record or decompressed chunk, in bytes. Recorders write chunks of some megabytes."""
 WAITING_BYTES_MAX = 1 << 28
-"""Bytes of messages that wait for their turn. There are many only where blocks overlap in time."""
+"""The most bytes of messages waiting to be sorted by time. Many wait only if blocks overlap in time."""
 UNPACKED_BYTES_MAX = 1 << 28
-"""Bytes of a whole decompressed file, if that is more than `_RATIO` times its size."""
+"""The largest decompressed file, in bytes; files may also have `_RATIO` times their compressed size."""
 _RATIO = 100
-_ENTRY = 200
-"""About the memory of a message, besides its bytes."""
+_MESSAGE_OVERHEAD = 200
+"""The approximate memory of a message besides its content, in bytes."""
 _STEP = 1 << 20
 _OTHERS_MAX = 1_000
-"""Topics that are not wanted, and whose names are kept."""
+"""The most unused topics whose names are stored."""
 
 
 Unpack = Callable[[bytes, int], bytes]
-"""Decompresses its input, up to a number of bytes. May raise anything."""
+"""Decompresses its input, up to a number of bytes. May raise any exception."""
 
 
 class RecordingDamagedError(RobochocError):
-    """The recording is damaged. The message says what is wrong."""
+    """The recording is damaged. The message describes the damage."""
 
 
 class RecordedChannel(NamedTuple):
-    """A topic that is wanted, as a recording has it. `fault` says why its messages cannot be read."""
+    """A used topic in a recording. `fault` is the reason why its messages cannot be read, if they cannot."""
 
     topic: str
     version: Version
@@ -60,17 +60,17 @@ class RecordedChannel(NamedTuple):
 
 
 class MessageBlock(NamedTuple):
-    """A part of a file that holds messages: its offset, its compression, and the time of the first wanted message."""
+    """A part of a file with messages: the time of its first used message, its offset, sizes and compression."""
 
     starts: int
     at: int
     size: int
     packing: str
-    unpacked: int
+    decompressed_size: int
 
 
 class RecordedMessage(NamedTuple):
-    """A message, with what defines its order."""
+    """A message with its sort key: time, block, number."""
 
     at_ns: int
     block: int
@@ -80,27 +80,27 @@ class RecordedMessage(NamedTuple):
 
 
 class InputFile:
-    """A file that is read from its beginning to its end. Raises `RecordingDamagedError` and `OSError`."""
+    """A file that is read sequentially. Raises `RecordingDamagedError` and `OSError`."""
 
     def __init__(self, path: Path) -> None:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise RecordingDamagedError("is a folder" if path.is_dir() else "is no file")
+            raise RecordingDamagedError("is a folder" if path.is_dir() else "is not a file")
         self._stream: BinaryIO = path.open("rb")
         self.size = os.fstat(self._stream.fileno()).st_size
         self.at = 0
         self.sum = 0
-        """CRC-32 of all that has been read."""
+        """CRC-32 of all bytes read so far."""
 
     def rewind(self) -> None:
-        """Begin again."""
+        """Return to the beginning."""
         self.at = self.sum = self._stream.seek(0)
 
-    def take(self, size: int, what: str) -> bytes:
-        """Return the next `size` bytes."""
+    def read(self, size: int, what: str) -> bytes:
+        """Read the next `size` bytes. `what` names them in errors."""
         self._check(size, what)
         if size > BLOCK_BYTES_MAX:
             raise RecordingDamagedError(
-                f"{what} of {size} bytes before byte {self.at}: more than {BLOCK_BYTES_MAX} are not read"
+                f"{what} has {size:,} bytes, at byte {self.at:,}: at most {BLOCK_BYTES_MAX:,} are read"
             )
         content = self._stream.read(size)
         self.at += len(content)
@@ -111,10 +111,10 @@ class InputFile:
         """Skip the next `size` bytes."""
         self._check(size, what)
         for begin in range(0, size, _STEP):
-            self.take(min(_STEP, size - begin), what)
+            self.read(min(_STEP, size - begin), what)
 
     def part(self, at: int, size: int) -> bytes:
-        """Return a part of the file somewhere else. The position of `take` does not change."""
+        """Return any part of the file. The position of `read` does not change."""
         self._stream.seek(at)
         content = self._stream.read(size)
         self._stream.seek(self.at)
@@ -126,13 +126,11 @@ class InputFile:
 
     def _check(self, size: int, what: str) -> None:
         if size > self.size - self.at:
-            raise RecordingDamagedError(
-                f"it ends in the middle of {what}, at byte {self.size}: it was not written to its end"
-            )
+            raise RecordingDamagedError(f"it ends within {what}, at byte {self.size:,}: the recording is incomplete")
 
 
 class RecordingSource(Source):
-    """A file that gives its messages in the order of the times at which they were received."""
+    """A file whose messages are returned in the order in which they were received."""
 
     live = False
 
@@ -140,7 +138,7 @@ class RecordingSource(Source):
         super().__init__(place)
         if not place:
             raise SourceError(
-                "a recording needs the name of its file, as in mcap:run.mcap, rosbag:run.bag or rosbag2:run.db3"
+                "a recording requires a file name, as in mcap:run.mcap, rosbag:run.bag or rosbag2:run.db3"
             )
         with self._as_source_errors():
             self._input = InputFile(Path(place))
@@ -148,44 +146,44 @@ class RecordingSource(Source):
         self._messages_left: Iterator[RecordedMessage] = iter(())
 
     def listen(self, topics: Mapping[str, str]) -> None:
-        """Read all of the file once. `next` then returns the messages on these topics, from the beginning."""
+        """Read the whole file once. `next` then returns the messages on these topics, from the beginning."""
         self._kinds = topics
         with self._as_source_errors():
             self._messages_left = self._read_messages()
 
     @abstractmethod
     def _read_messages(self) -> Iterator[RecordedMessage]:
-        """Read all of the file, then return the wanted messages, in order. Raises `RecordingDamagedError`."""
+        """Read the whole file, then return the used messages in order. Raises `RecordingDamagedError`."""
 
-    def next(self, wait_s: float) -> ReceivedMessage | None:  # noqa: ARG002 - all has been recorded
+    def next(self, wait_s: float) -> ReceivedMessage | None:  # noqa: ARG002 - a recording has no waits
         """Return the next message; None at the end."""
         with self._as_source_errors():
-            entry = next(self._messages_left, None)
-            if entry is None:
+            message = next(self._messages_left, None)
+            if message is None:
                 return None
-            channel = entry.channel
+            channel = message.channel
             kind = self._kinds[channel.topic]
             try:
-                fields = types_of(channel.version).decode(kind, entry.content)
+                fields = types_of(channel.version).decode(kind, message.content)
             except FieldsError as error:
                 raise RecordingDamagedError(f"a message on {channel.topic} cannot be read: {error}") from error
-            return ReceivedMessage(channel.topic, kind, fields, entry.at_ns)
+            return ReceivedMessage(channel.topic, kind, fields, message.at_ns)
 
     def close(self) -> None:
         """Close the file."""
         self._messages_left = iter(())
         self._input.close()
 
-    def _wanted(self, topic: str, kind: str) -> bool:
-        """Return whether messages of that type on that topic are wanted."""
-        wanted = topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
-        if not wanted and len(self.others) < _OTHERS_MAX:
+    def _is_used(self, topic: str, kind: str) -> bool:
+        """Return whether messages of this type on this topic are used; list others in `others`."""
+        is_used = topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
+        if not is_used and len(self.others) < _OTHERS_MAX:
             self.others[topic] = kind
-        return wanted
+        return is_used
 
     @contextmanager
     def _as_source_errors(self) -> Iterator[None]:
-        """Raise errors of the file as `SourceError`, with its name."""
+        """Raise errors of the file as `SourceError` with the file's name."""
         try:
             yield
         except (RecordingDamagedError, UnknownTypeError) as error:
@@ -195,80 +193,80 @@ class RecordingSource(Source):
 
 
 class ChunkedRecordingSource(RecordingSource):
-    """A recording whose messages stand in chunks, most of them compressed."""
+    """A recording that stores its messages in chunks, usually compressed."""
 
     packings: ClassVar[Mapping[str, Unpack]]
-    """The functions that decompress chunks, by the format's names of compressions."""
+    """The functions that decompress chunks, by the compression's name in the format."""
 
-    _unpacked = 0
+    _decompressed_bytes = 0
 
     def _read_messages(self) -> Iterator[RecordedMessage]:
-        self._unpacked = 0
+        self._decompressed_bytes = 0
         self._input.rewind()
         return self._in_order(sorted(self._blocks()))
 
     @abstractmethod
     def _blocks(self) -> Iterable[MessageBlock]:
-        """Read all of the file, and return the blocks with wanted messages. Raises `RecordingDamagedError`."""
+        """Read the whole file, and return the blocks with used messages. Raises `RecordingDamagedError`."""
 
     @abstractmethod
     def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
-        """Yield the wanted messages of a block: channel, time in nanoseconds, and content.
+        """Yield the used messages of a block: channel, time in nanoseconds, and content.
 
         Raises:
             RecordingDamagedError: The block is damaged.
         """
 
     def _body(self, packed: bytes, packing: str, size: int) -> bytes:
-        """Return the content of a chunk, which should be `size` bytes."""
-        self._unpacked += size
-        if self._unpacked > max(UNPACKED_BYTES_MAX, _RATIO * self._input.size):
+        """Return the content of a chunk, which must be `size` bytes."""
+        self._decompressed_bytes += size
+        if self._decompressed_bytes > max(UNPACKED_BYTES_MAX, _RATIO * self._input.size):
             raise RecordingDamagedError(
-                f"its {self._input.size} bytes unpack to {self._unpacked} and more, which are not read"
+                f"its {self._input.size:,} bytes decompress to at least {self._decompressed_bytes:,}: that is too much"
             )
         return decompress(packed, packing, size, self.packings)
 
     def _in_order(self, blocks: Iterable[MessageBlock]) -> Iterator[RecordedMessage]:
-        """Yield all messages of `blocks`, which come in the order of their first ones."""
+        """Yield all messages of `blocks` in order. Blocks are sorted by their first messages."""
         waiting: list[RecordedMessage] = []
         size = 0
         for number, block in enumerate(blocks):
             while waiting and waiting[0].at_ns < block.starts:
-                entry = heapq.heappop(waiting)
-                size -= _ENTRY + len(entry.content)
-                yield entry
-            body = decompress(self._input.part(block.at, block.size), block.packing, block.unpacked, self.packings)
+                message = heapq.heappop(waiting)
+                size -= _MESSAGE_OVERHEAD + len(message.content)
+                yield message
+            body = decompress(
+                self._input.part(block.at, block.size), block.packing, block.decompressed_size, self.packings
+            )
             for place, (channel, at_ns, content) in enumerate(self._messages(body)):
                 heapq.heappush(waiting, RecordedMessage(at_ns, block.at, place, channel, content))
-                size += _ENTRY + len(content)
+                size += _MESSAGE_OVERHEAD + len(content)
                 if size > WAITING_BYTES_MAX:
                     raise RecordingDamagedError(
-                        f"its messages are out of order: at chunk {number}, too many wait for their turn"
+                        f"its messages are out of order: at chunk {number:,}, too many have to be sorted"
                     )
         while waiting:
             yield heapq.heappop(waiting)
 
 
 def decompress(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
-    """Return the `size` bytes of `packed`. No more than one byte more is decompressed.
+    """Return the `size` decompressed bytes of `packed`. At most one more byte is decompressed.
 
     Raises:
-        RecordingDamagedError: There are more bytes, or fewer, or they are no `packing`.
+        RecordingDamagedError: The size is not `size`, or the bytes are not compressed by `packing`.
     """
     if size > BLOCK_BYTES_MAX:
-        raise RecordingDamagedError(
-            f"a chunk says that it unpacks to {size} bytes; more than {BLOCK_BYTES_MAX} are not read"
-        )
+        raise RecordingDamagedError(f"a chunk decompresses to {size:,} bytes: at most {BLOCK_BYTES_MAX:,} are read")
     if packing not in packings:
         raise RecordingDamagedError(
-            f"a chunk is packed by {packing[:40]!r}; known are {', '.join(filter(None, packings))}"
+            f"a chunk has the unknown compression {packing[:40]!r}; known are {', '.join(filter(None, packings))}"
         )
     try:
         body = packings[packing](packed, size + 1)
-    except Exception as error:  # whatever the library raises: RuntimeError, OSError, its own
-        raise RecordingDamagedError(f"a chunk cannot be unpacked ({packing}): {error}") from error
+    except Exception as error:  # libraries raise RuntimeError, OSError and their own errors
+        raise RecordingDamagedError(f"a chunk cannot be decompressed ({packing}): {error}") from error
     if len(body) != size:
-        raise RecordingDamagedError(f"a chunk does not unpack to the {size} bytes that it says")
+        raise RecordingDamagedError(f"a chunk does not decompress to the declared {size:,} bytes")
     return body
 
 
@@ -283,16 +281,16 @@ def decompress_lz4(packed: bytes, most: int) -> bytes:
 
 
 def recording_in_folder(place: str, name: str, ending: str, instead: str) -> str:
-    """Return the recording in the folder `place`, or `place` itself where it is no folder.
+    """Return the recording in the folder `place`, or `place` itself if it is not a folder.
 
     Args:
-        place: What follows the name on the command line.
+        place: The place in the source's argument on the command line, after the name.
         name: The source's name on the command line.
-        ending: How the names of its files end.
-        instead: What to do where the folder has no such file.
+        ending: The ending of its files.
+        instead: A hint for folders without such a file.
 
     Raises:
-        SourceError: There is none in the folder, or there are several.
+        SourceError: The folder has no such file, or several.
     """
     if not place or not Path(place).is_dir():
         return place
@@ -300,15 +298,15 @@ def recording_in_folder(place: str, name: str, ending: str, instead: str) -> str
     if not files:
         raise SourceError(on_one_line(f"{place}: is a folder without a file *{ending}: {instead}"))
     if len(files) > 1:
-        raise SourceError(on_one_line(f"{place}: holds several recordings: name one, such as {name}:{files[0]}"))
+        raise SourceError(on_one_line(f"{place}: has several recordings: name one, such as {name}:{files[0]}"))
     return str(files[0])
 
 
 class RecordingSink(Sink):
-    """Writes a file. It appears in its place when it is closed: whole, or not at all."""
+    """Writes a file. It appears, complete, when the sink is closed; after an error, no file appears."""
 
-    ending: ClassVar[str]
-    """Such a sink on the command line, as an example."""
+    example: ClassVar[str]
+    """An example of such a sink on the command line."""
     version: ClassVar[Version]
 
     live = False
@@ -316,7 +314,7 @@ class RecordingSink(Sink):
     def __init__(self, place: str) -> None:
         super().__init__(place)
         if not place:
-            raise SinkError(f"a recording needs the name of its file, as in {self.ending}")
+            raise SinkError(f"a recording requires a file name, as in {self.example}")
         self.original: Mapping[str, str] = MappingProxyType({})
         self._open = False
         with self.as_sink_errors():
@@ -332,24 +330,24 @@ class RecordingSink(Sink):
         """Write the end of the file. Raises `OSError`."""
 
     def explain(self, original: Mapping[str, str]) -> None:
-        """Keep the names that topics have in the team's files."""
+        """Store the topics' names in the team's files."""
         self.original = original
 
     def advertise(self, topics: Mapping[str, str]) -> None:
-        """Check that all these types are known."""
+        """Check that the types of `topics` are known."""
         for topic, kind in topics.items():
             with self.as_sink_errors(topic):
                 types_of(self.version).definition(kind)
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Append a message. The time of its publication is also that of its reception."""
+        """Append a message. The times of publication and reception are the same."""
         if not 0 <= at_ns < _END_OF_TIME:
-            raise SinkError(on_one_line(f"{self.place}: {topic}: a recording has no time {at_ns}"))
+            raise SinkError(on_one_line(f"{self.place}: {topic}: the time {at_ns} ns cannot be recorded"))
         with self.as_sink_errors(topic):
             self.write(topic, kind, fields, at_ns)
 
     def close(self) -> None:
-        """Put the file in its place. If that fails nothing is left behind."""
+        """Complete the file. If that fails, it is deleted."""
         if self._open:
             self._open = False
             try:
@@ -360,13 +358,13 @@ class RecordingSink(Sink):
                 self.discard()
 
     def discard(self) -> None:
-        """Leave nothing behind."""
+        """Delete the unfinished file."""
         self._open = False
         self.file.discard()
 
     @contextmanager
     def as_sink_errors(self, topic: str = "") -> Iterator[None]:
-        """Raise errors as `SinkError`, with the name of the file and of the topic."""
+        """Raise errors as `SinkError` with the names of the file and the topic."""
         where = f"{self.place}: {topic}" if topic else self.place
         try:
             yield
@@ -375,5 +373,5 @@ class RecordingSink(Sink):
         except OSError as error:
             why = error.strerror or str(error)
             missing = isinstance(error, FileNotFoundError) and not Path(self.place).absolute().parent.exists()
-            hint = ": its folder does not exist, make it first" if missing else ""
+            hint = ": its folder does not exist, create it first" if missing else ""
             raise SinkError(on_one_line(f"{self.place}: {why}{hint}")) from error

@@ -1,6 +1,6 @@
-"""Bags of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0), as `rosbag play` reads them.
+"""ROS 1 bags, version 2.0 (wiki.ros.org/Bags/Format/2.0), for `rosbag play`.
 
-They are written without compression, as `rosbag record` does.
+They are written without compression, like those of `rosbag record`.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ _LAYOUTS |= {b"conn_count": "<I", b"chunk_count": "<I"}
 
 
 class RosbagSink(RecordingSink):
-    """Writes a bag of ROS 1. The same messages make the same bytes."""
+    """Writes a ROS 1 bag. The same messages result in the same bytes."""
 
-    ending = "rosbag:run.bag"
+    example = "rosbag:run.bag"
     version = 1
 
     def __init__(self, place: str) -> None:
@@ -50,12 +50,12 @@ class RosbagSink(RecordingSink):
         self._connections: dict[tuple[str, str], Connection] = {}
         self._sequence: dict[int, int] = {}
         with self.as_sink_errors():
-            self._writer = Writer(Path(place) / "bag")  # what the library opens must not exist
+            self._writer = Writer(Path(place) / "bag")  # the library requires a path that does not exist
             self._writer.path = cast("Path", _OpenFile(self.file.stream))
             self._writer.open()
 
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Append a message. Headers are numbered by topic, as ROS 1 does."""
+        """Append a message. Headers are numbered per topic, as in ROS 1."""
         found = self._connections.get((topic, kind)) or self._connection(topic, kind)
         self._sequence[found.id] = sequence = self._sequence.get(found.id, 0) + 1
         header = fields.get("header")
@@ -68,7 +68,7 @@ class RosbagSink(RecordingSink):
         self._writer.close()
 
     def discard(self) -> None:
-        """Leave nothing behind."""
+        """Delete the unfinished file."""
         with suppress(OSError):
             self._writer.abort()
         super().discard()
@@ -82,17 +82,17 @@ class RosbagSink(RecordingSink):
 
 
 class _OpenFile(NamedTuple):
-    """A path whose file is open already: the library opens it once more, and gets that file."""
+    """A path whose file is already open: the library opens it, and gets a duplicate of that file."""
 
     stream: BinaryIO
 
     def open(self, _mode: str) -> BinaryIO:
-        """Return the same file, for the library to close."""
+        """Return a duplicate of the file, which the library closes."""
         return os.fdopen(os.dup(self.stream.fileno()), "wb")
 
 
 class _Record(NamedTuple):
-    """The fields of a record's header, and where in a chunk its data begin and end."""
+    """The fields of a record's header, and the range of its data in a chunk."""
 
     header: dict[bytes, bytes]
     begin: int
@@ -100,20 +100,20 @@ class _Record(NamedTuple):
 
     @property
     def kind(self) -> int:
-        """The operation code; 0 if there is none."""
+        """The operation code; 0 if it is missing."""
         return self.number(b"op") if b"op" in self.header else 0
 
     def number(self, name: bytes) -> int:
-        """Return the number in a field; a time is in nanoseconds."""
+        """Return the number in a field; times are in nanoseconds."""
         content = self.header.get(name, b"")
         layout = _LAYOUTS[name]
         if len(content) != struct.calcsize(layout):
-            raise RecordingDamagedError(f"a record has no right {name.decode()!r} in its header")
+            raise RecordingDamagedError(f"a record has no valid {name.decode()!r} in its header")
         first, *more = struct.unpack(layout, content)
         return int(first) * 10**9 + int(more[0]) if more else int(first)
 
     def text(self, name: bytes) -> str:
-        """Return the text in a field; empty if there is none."""
+        """Return the text in a field; empty if the field is missing."""
         return self.header.get(name, b"").decode("utf-8", "replace")
 
 
@@ -122,17 +122,17 @@ def _decompress_bz2(packed: bytes, most: int) -> bytes:
 
 
 class RosbagSource(ChunkedRecordingSource):
-    """Reads a bag of ROS 1."""
+    """Reads a ROS 1 bag."""
 
     packings = MappingProxyType({"none": uncompressed, "bz2": _decompress_bz2, "lz4": decompress_lz4})
 
     def _blocks(self) -> Iterator[MessageBlock]:
         self._channels: dict[int, RecordedChannel | None] = {}
         source = self._input
-        magic = source.take(min(source.size, len(_MAGIC)), "its beginning")
+        magic = source.read(min(source.size, len(_MAGIC)), "its beginning")
         if magic != _MAGIC:
-            known = magic.startswith(b"#ROSBAG V")
-            raise RecordingDamagedError("is a bag of another version than 2.0" if known else "is not a ROS 1 bag")
+            is_bag = magic.startswith(b"#ROSBAG V")
+            raise RecordingDamagedError("is a bag of another version than 2.0" if is_bag else "is not a ROS 1 bag")
         expected = self._first()
         found = {_CHUNK: 0, _CHUNK_INFO: 0, _CONNECTION: 0}
         while source.at < source.size:
@@ -144,17 +144,17 @@ class RosbagSource(ChunkedRecordingSource):
             else:
                 source.skip(size, "a record")
         if any(found[kind] != number for kind, number in expected.items()):
-            raise RecordingDamagedError("it has less in its index than it says: it was not written to its end")
+            raise RecordingDamagedError("its index is incomplete: the recording is incomplete")
 
     def _first(self) -> dict[int, int]:
-        """Return how many records of some kinds the bag says that it has."""
+        """Return the declared numbers of chunks, chunk infos and connections."""
         record, size = self._header()
         if record.kind != _BAG:
-            raise RecordingDamagedError("it does not begin with a bag's header")
+            raise RecordingDamagedError("it does not begin with the header of a bag")
         self._input.skip(size, "its beginning")
         if not record.number(b"index_pos"):
             raise RecordingDamagedError(
-                "it has no index, so its recording was not finished: `rosbag reindex` mends that"
+                "it has no index: the recording was not finished; repair it by `rosbag reindex`"
             )
         if record.text(b"encryptor"):
             raise RecordingDamagedError("it is encrypted")
@@ -162,24 +162,24 @@ class RosbagSource(ChunkedRecordingSource):
         return {_CHUNK: chunks, _CHUNK_INFO: chunks, _CONNECTION: record.number(b"conn_count")}
 
     def _header(self) -> tuple[_Record, int]:
-        """Return the next record's header, and the size of its data, which come next."""
+        """Read the next record's header; return it and the size of the data after it."""
         source = self._input
         size = self._size()
         if size > _HEADER_AT_MOST:
             raise RecordingDamagedError(f"a record before byte {source.at} has a header of {size} bytes")
-        header = _fields(source.take(size, "a record"))
+        header = _fields(source.read(size, "a record"))
         return _Record(header, 0, 0), self._size()
 
     def _size(self) -> int:
-        (size,) = _SIZE.unpack(self._input.take(_SIZE.size, "a record"))
+        (size,) = _SIZE.unpack(self._input.read(_SIZE.size, "a record"))
         return int(size)
 
     def _chunk(self, record: _Record, size: int) -> Iterator[MessageBlock]:
-        packing, whole, at = record.text(b"compression"), record.number(b"size"), self._input.at
-        body = self._body(self._input.take(size, "a chunk"), packing, whole)
+        packing, full_size, at = record.text(b"compression"), record.number(b"size"), self._input.at
+        body = self._body(self._input.read(size, "a chunk"), packing, full_size)
         starts = min((time for _, time, _ in self._messages(body)), default=None)
         if starts is not None:
-            yield MessageBlock(starts, at, size, packing, whole)
+            yield MessageBlock(starts, at, size, packing, full_size)
 
     def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
         for record in _records(body):
@@ -187,12 +187,12 @@ class RosbagSource(ChunkedRecordingSource):
             if kind == _CONNECTION:
                 number, described = record.number(b"conn"), self._channel_of(record, body)
                 if self._channels.setdefault(number, described) != described:
-                    raise RecordingDamagedError(f"connection {number} is described twice, and not the same way")
+                    raise RecordingDamagedError(f"connection {number} has two different definitions")
             elif kind == _MESSAGE:
                 number = record.number(b"conn")
                 if number not in self._channels:
                     raise RecordingDamagedError(
-                        f"a message belongs to connection {number}, which is not described before it"
+                        f"a message has the connection {number}, which is not defined before it"
                     )
                 channel = self._channels[number]
                 if channel is not None:
@@ -204,12 +204,10 @@ class RosbagSource(ChunkedRecordingSource):
         topic = "/" + record.text(b"topic").lstrip("/")
         more = _Record(_fields(body[record.begin : record.end]), 0, 0)
         kind, md5 = more.text(b"type"), more.text(b"md5sum")
-        if not self._wanted(topic, kind):
+        if not self._is_used(topic, kind):
             return None
         ours = types_of(1).definition(kind).md5
-        fault = (
-            f"its {short_kind(kind)} has the MD5 sum {md5[:40]!r}, and that of ROS 1 is {ours}" if md5 != ours else ""
-        )
+        fault = f"its {short_kind(kind)} has the MD5 sum {md5[:40]!r}, not {ours} as in ROS 1" if md5 != ours else ""
         return RecordedChannel(topic, 1, fault)
 
 
@@ -224,16 +222,16 @@ def _records(body: bytes) -> Iterator[_Record]:
 
 
 def _span(body: bytes, at: int) -> tuple[int, int]:
-    """Return where content that is preceded by its size begins and ends."""
+    """Return the beginning and the end of content that is preceded by its size."""
     begin = at + _SIZE.size
     end = begin + int.from_bytes(body[at:begin], "little")
     if end > len(body) or begin > len(body):
-        raise RecordingDamagedError("a record does not end where its chunk does")
+        raise RecordingDamagedError("a record is longer than its chunk")
     return begin, end
 
 
 def _fields(content: bytes) -> dict[bytes, bytes]:
-    """Return the fields of a header: sizes, then `name=value`."""
+    """Parse the fields of a header: each is a size and `name=value`."""
     found, at = {}, 0
     while at < len(content):
         begin, at = _span(content, at)

@@ -154,23 +154,23 @@ def test_whatever_is_asked_is_answered_in_one_short_line_that_can_be_sent(fields
 @looped(
     ("told", "fields"),
     [
-        ("timeout must be seconds, or 0 for the longest, is True", {"timeout": True}),
-        ("timeout must be seconds, or 0 for the longest, is False", {"timeout": False}),
-        ("timeout must be seconds, or 0 for the longest, is None", {"timeout": None}),
+        ("timeout is True: it must be seconds, or 0 for the longest time", {"timeout": True}),
+        ("timeout is False: it must be seconds, or 0 for the longest time", {"timeout": False}),
+        ("timeout is None: it must be seconds, or 0 for the longest time", {"timeout": None}),
         ("", {"timeout": 10**5000}),
-        ("timeout must be seconds, or 0 for the longest, is a int", {"timeout": -(10**5000)}),
-        ("timeout must be seconds, or 0 for the longest, is nan", {"timeout": math.nan}),
-        ("timeout must be seconds, or 0 for the longest, is '5'", {"timeout": "5"}),
-        ("team must be text, is 5", {"team": 5}),
+        ("timeout is a int: it must be seconds, or 0 for the longest time", {"timeout": -(10**5000)}),
+        ("timeout is nan: it must be seconds, or 0 for the longest time", {"timeout": math.nan}),
+        ("timeout is '5': it must be seconds, or 0 for the longest time", {"timeout": "5"}),
+        ("team is 5: it must be text", {"team": 5}),
         (
-            "team must be text that UTF-8 can hold, and character 2 is half of a pair (U+DFFF)",
+            "team must be text that UTF-8 can encode: character 2 is half of a pair (U+DFFF)",
             {"team": "a\udfff"},
         ),
         (
-            "changes must be text that UTF-8 can hold, and character 29 is half of a pair (U+D800)",
+            "changes must be text that UTF-8 can encode: character 29 is half of a pair (U+D800)",
             {"changes": '[{"remove_agent": {"name": "\ud800"}}]'},
         ),
-        ("changes must be text, is [1]", {"changes": [1]}),
+        ("changes is [1]: it must be text", {"changes": [1]}),
     ],
 )
 def test_the_reason_is_the_right_one(told: str, fields: dict[str, Any]) -> None:
