@@ -111,6 +111,7 @@ class SourceFeedback(Feedback):
         self._last = math.inf if left_s is None else now + left_s
 
     def next(self, until_s: float | None) -> Report | None:
+        """Return the next report; see `Feedback.next`."""
         soon = None
         if until_s is not None and self._source.live:
             soon = time.monotonic() + min(max(until_s - time.time(), 0), TOGETHER_S)
@@ -122,6 +123,7 @@ class SourceFeedback(Feedback):
         return report
 
     def poll(self) -> Report | None:
+        """Return an available report of a live source; see `Feedback.poll`."""
         if self._pending is None and self._source.live:
             self._pending = self._next_report(time.monotonic() + _SLICE_S, wait=False)
         report, self._pending = (self._pending, None) if self._source.live else (None, self._pending)

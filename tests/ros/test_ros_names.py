@@ -95,7 +95,7 @@ def test_a_waypoint_that_is_called_like_a_report_is_no_report() -> None:
 def test_a_clash_names_topics_robots_and_the_way_out() -> None:
     with pytest.raises(NameClashError) as clash:
         TopicNames([drone("A", "/a.1/w", "North"), drone("B", "/a_1/w", "South")])
-    told = "topic '/a.1/w' of North and topic '/a_1/w' of South would both publish on /a_1/w in ROS: rename one of them"
+    told = "topic '/a.1/w' of North and topic '/a_1/w' of South would have the topic /a_1/w in ROS: rename one"
     assert str(clash.value) == told
 
 
